@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from taichi_ants.analysis.colony.contrasts import Judged
-from taichi_ants.analysis.colony.study import EVALUATION_EPSILON, MEASURES, WORLD_KINDS, WORLDS
+from taichi_ants.analysis.colony.study import (
+    EVALUATION_EPSILON,
+    MEASURES,
+    WORLD_KINDS,
+    WORLDS,
+    Judged,
+)
 from taichi_ants.analysis.colony.tables import ConditionRow, glance, headlines, means, of_largest
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.findings import seeds_in_words

@@ -93,10 +93,6 @@ class RunPoint:
         """About how much work a seed is."""
         return self.episodes * self.max_steps
 
-    def of_seeds(self, some: slice) -> RunPoint:
-        """The point for some of its seeds."""
-        return self
-
     @property
     def bytes_of_a_run(self) -> int:
         """About how many bytes the outcome of one seed takes on disk, at most."""
@@ -196,10 +192,6 @@ class ColonyPoint:
         """About how much work a seed is."""
         return self.ants * self.ticks * (self.episodes + self.rollouts)
 
-    def of_seeds(self, some: slice) -> ColonyPoint:
-        """The point for some of its seeds."""
-        return replace(self, world=self.world[some]) if isinstance(self.world, tuple) else self
-
     @property
     def bytes_of_a_run(self) -> int:
         """About how many bytes the outcome of one seed takes on disk, at most."""
@@ -259,8 +251,7 @@ class ColonyPoint:
 
 
 Point = RunPoint | ColonyPoint
-PointKind = TypeVar("PointKind", RunPoint, ColonyPoint)
-AnyPoint = TypeVar("AnyPoint", bound=Point)
+PointKind = TypeVar("PointKind", bound=Point)
 
 
 @dataclass(frozen=True)
@@ -278,15 +269,14 @@ class Study(Generic[PointKind]):
         object.__setattr__(self, "seeds", checks.checked_seeds(self.seeds))
         if not self.points:
             raise AntsError("there are no points to do; give at least one.")
-        for world, ants in dict.fromkeys((point.world, point.ants) for point in self.points):
+        places: Any = dict.fromkeys((one.world, one.pool, one.ants) for one in self.points)
+        for world, pool, ants in places:
             several = world if isinstance(world, tuple) else (world,)
-            if len(several) not in (1, len(self.seeds)) or not several:
+            if len(several) not in (1, len(self.seeds)):
                 raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
-            for one, seed in zip(several, self.seeds, strict=False):
+            starts = [*zip(several, self.seeds, strict=False), *((one, 0) for one in pool or ())]
+            for one, seed in starts:
                 checks.checked_world(one, learns=True).start(seed, ants)
-        for pool, ants in dict.fromkeys((point.pool, point.ants) for point in self.points):
-            for one in pool or ():
-                checks.checked_world(one, learns=True).start(0, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:
@@ -302,9 +292,9 @@ class Study(Generic[PointKind]):
         for _, group in itertools.groupby(self.in_order, lambda point: point.alike):
             points = list(group)
             size, end = points[0].runs_of_a_block, first + len(points)
-            for some in _pieces(first, end, max(1, size // len(self.seeds))):
-                for seeds in _pieces(0, len(self.seeds), size):
-                    yield some, seeds
+            step, seeds = max(1, size // len(self.seeds)), len(self.seeds)
+            for place, at in itertools.product(range(first, end, step), range(0, seeds, size)):
+                yield slice(place, min(place + step, end)), slice(at, min(at + size, seeds))
             first = end
 
     def settings(self) -> dict[str, Any]:
@@ -374,7 +364,9 @@ class Study(Generic[PointKind]):
         tables: dict[Any, list[np.ndarray]] = {}
         progress(0.0)
         for number, ((some, at), (first, runs)) in enumerate(zip(pieces, works, strict=True)):
-            points, seeds = tuple(one.of_seeds(at) for one in order[some]), self.seeds[at]
+            points, seeds = order[some], self.seeds[at]
+            if isinstance(first.world, tuple):  # a point of its own, with a world for each seed
+                points = (replace(first, world=first.world[at]),)
             learned = np.concatenate(tables[first.after])[at] if first.after else None
             share = first.weight * runs / total
             part = _part(progress, begun, share)
@@ -433,7 +425,15 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     points = _in_order(points)
     places: list[Any] = [place for one in points for place in (one.world, one.pool) if place]
     worlds = list(dict.fromkeys(places))
-    rows = [_facts(point, worlds, points) for point in points]
+
+    def facts(point: Point) -> dict[str, Any]:
+        """A point as names and values; worlds and other points by their number."""
+        found = {field.name: getattr(point, field.name) for field in fields(point)}
+        found |= {name: worlds.index(found[name]) for name in ("world", "pool") if found.get(name)}
+        found |= {"after": points.index(point.after)} if point.after else {}
+        return flat({**found, "task": point.task.as_dict(), "training": point.training.as_dict()})
+
+    rows = [facts(point) for point in points]
     columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
     return {
         "version": __version__,
@@ -461,7 +461,7 @@ def world_facts(world: World) -> dict[str, Any]:
     return {**where, **numbers, "sha256": digest.hexdigest()}
 
 
-def _in_order(points: Sequence[AnyPoint]) -> tuple[AnyPoint, ...]:
+def _in_order(points: Sequence[PointKind]) -> tuple[PointKind, ...]:
     pairs: Any = ((point.after, point) for point in points)
     return tuple(dict.fromkeys(point for pair in pairs for point in pair if point))
 
@@ -471,22 +471,6 @@ def _part(progress: Progress, begin: float, share: float) -> Progress:
     return lambda done: progress(begin + share * done)
 
 
-def _pieces(first: int, end: int, size: int) -> Iterator[slice]:
-    for begin in range(first, end, size):
-        yield slice(begin, min(begin + size, end))
-
-
 def _path(folder: Path, number: int) -> Path:
     """The file of a block."""
     return folder / f"{number:06d}.npz"
-
-
-def _facts(point: Point, worlds: list, points: Sequence[Point]) -> dict[str, Any]:
-    """A point as names and values; worlds and other points by their number."""
-    facts = {field.name: getattr(point, field.name) for field in fields(point)}
-    facts["world"] = worlds.index(point.world)
-    if facts.get("pool"):
-        facts["pool"] = worlds.index(facts["pool"])
-    if facts.get("after"):
-        facts["after"] = points.index(facts["after"])
-    return flat({**facts, "task": point.task.as_dict(), "training": point.training.as_dict()})

@@ -8,30 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.colony.contrasts import (
-    QUESTIONS,
-    SERIES,
-    Judged,
-    Series,
-    Sizes,
-    judge_all,
-)
-from taichi_ants.analysis.colony.study import (
-    ABC,
-    ABROAD,
-    ALONE,
-    EVALUATION_EPSILON,
-    MEASURES,
-    OF_STUDY,
-    PAPER,
-    REGIMES,
-    RULES,
-    WORLD_KINDS,
-    WORLDS,
-    Condition,
-    Design,
-    Measured,
-)
+from taichi_ants.analysis.colony import study
+from taichi_ants.analysis.colony.study import Condition, Design, Judged, Measured, Series, Sizes
 from taichi_ants.analysis.findings import Finding, Verdict, seeds_in_words, weakest
 from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of, seed_rows
 from taichi_ants.analysis.tables import (
@@ -87,7 +65,7 @@ def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, An
 
 def _stacked(measured: Measured) -> dict[str, np.ndarray]:
     """The measures as arrays (conditions, seeds)."""
-    return {name: np.stack([one[name] for one in measured.values()]) for name in OF_STUDY}
+    return {name: np.stack([one[name] for one in measured.values()]) for name in study.OF_STUDY}
 
 
 def condition_rows(measured: Measured) -> list[ConditionRow]:
@@ -121,11 +99,11 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
 
     The last is of the policies of open worlds in others, with intervals and the worst seed.
     """
-    seeds = f"{_basis(rows)}: {MEASURES['deliveries']}"
-    trained = [one for one in rows if one.condition.regime != ABROAD]
-    abroad = [one for one in rows if one.condition.regime == ABROAD]
+    seeds = f"{_basis(rows)}: {study.MEASURES['deliveries']}"
+    trained = [one for one in rows if one.condition.regime != study.ABROAD]
+    abroad = [one for one in rows if one.condition.regime == study.ABROAD]
     tables = []
-    for world_kind in WORLD_KINDS:
+    for world_kind in study.WORLD_KINDS:
         by_design: dict[Design, dict[int, ConditionRow]] = {}
         for one in trained:
             if one.condition.world_kind == world_kind:
@@ -143,7 +121,7 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
                 f"Of {count(sizes[-1], 'ant')}: the mean share of each world's own bound, and the "
                 "mean of the bounds."
             )
-            title = f"{sentence(WORLD_KINDS[world_kind])}, {seeds}"
+            title = f"{sentence(study.WORLD_KINDS[world_kind])}, {seeds}"
             tables.append(Table(title, headers, cells, [note]))
     if abroad:
         by_world: dict[str, dict[str, str]] = {}
@@ -152,9 +130,10 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
             cell = f"{figure(mean)} {interval(low, high, 0)}, {figure(one.ranges['deliveries'][0])}"
             by_world.setdefault(one.condition.world_kind, {})[one.condition.rules] = cell
         rules = list(dict.fromkeys(one.condition.rules for one in abroad))
-        cells = [[WORLDS[a], *(by[name] for name in rules)] for a, by in by_world.items()]
-        headers = ("world", *(RULES[name] for name in rules))
-        title = f"{sentence(REGIMES[ABROAD])}, {count(abroad[0].condition.ants, 'ant')}, {seeds}"
+        cells = [[study.WORLDS[a], *(by[name] for name in rules)] for a, by in by_world.items()]
+        headers = ("world", *(study.RULES[name] for name in rules))
+        ants = count(abroad[0].condition.ants, "ant")
+        title = f"{sentence(study.REGIMES[study.ABROAD])}, {ants}, {seeds}"
         note = "Mean, its 95 % interval, and the worst seed."
         tables.append(Table(title, headers, cells, [note]))
     return tables
@@ -162,13 +141,14 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
 
 def _basis(rows: Sequence[ConditionRow]) -> str:
     """The seeds and the exploration rate behind the numbers of a table."""
-    return f"{seeds_in_words(rows[0].seeds)}, exploration rate {EVALUATION_EPSILON:g}"
+    return f"{seeds_in_words(rows[0].seeds)}, exploration rate {study.EVALUATION_EPSILON:g}"
 
 
 def glance(rows: Sequence[ConditionRow]) -> Table:
     """Return what the largest colonies deliver: designs down, kinds of world across."""
-    largest = max((one.condition.ants for one in rows if one.condition.regime != ABROAD), default=0)
-    shown: dict[str, dict[Design, ConditionRow]] = {name: {} for name in WORLD_KINDS}
+    sizes = [one.condition.ants for one in rows if one.condition.regime != study.ABROAD]
+    largest = max(sizes, default=0)
+    shown: dict[str, dict[Design, ConditionRow]] = {name: {} for name in study.WORLD_KINDS}
     for one in rows:
         if one.condition.ants == largest and one.condition.world_kind in shown:
             shown[one.condition.world_kind][one.design] = one
@@ -183,7 +163,8 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
         with_, without = (number(row.estimates[n].mean, digits) for n in ("deliveries", "greedy"))
         return f"{with_} ({without}), {percent(row.estimates['of_bound'].mean)}"
 
-    designs = [Design(PAPER, ALONE), *(Design(rules) for rules in RULES), Design(ABC, ALONE)]
+    alone = [Design(rules, study.ALONE) for rules in (study.PAPER, study.ABC)]
+    designs = [alone[0], *map(Design, study.RULES), alone[1]]
     cells = [
         [sentence(one.words), *(cell(by_design.get(one)) for by_design in shown.values())]
         for one in designs
@@ -197,23 +178,22 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             range_ = "" if low == high else f" {interval(low, high, 0)}"
             line.append(figure(best.estimates["bound"].mean) + range_)
         cells.append(["Mean bound, right of way [range]", *line])
-    title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
+    title = f"{sentence(study.MEASURES['deliveries'])} of {count(largest, 'ant')}"
     note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
     return Table(title, ("", *_headers(shown)), cells, [note] if cells else [])
 
 
 def _headers(world_kinds: Iterable[str]) -> list[str]:
-    return [sentence(WORLD_KINDS[one]).replace(" (", "\n(") for one in world_kinds]
+    return [sentence(study.WORLD_KINDS[one]).replace(" (", "\n(") for one in world_kinds]
 
 
 def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
     """Return the main findings on the largest colonies: statements down, kinds of world across."""
     by_condition = {one.condition: one for one in rows}
-    world_kinds = [
-        one for one in WORLD_KINDS if any(world_kind == one and s.main for world_kind, s in judged)
-    ]
+    found_in = {world_kind for world_kind, series in judged if series.main}
+    world_kinds = [one for one in study.WORLD_KINDS if one in found_in]
     cells = []
-    for series in [one for one in SERIES if one.main]:
+    for series in [one for one in study.SERIES if one.main]:
         line = []
         for world_kind in world_kinds:
             n = max((ants for ants, _ in judged.get((world_kind, series), {})), default=1)
@@ -226,7 +206,7 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
     headers = ("Statement", *_headers(world_kinds))
     note = (
         "Below the verdict: the number of ants, and the means compared, in "
-        f"{MEASURES['deliveries']}. {_basis(rows)}."
+        f"{study.MEASURES['deliveries']}. {_basis(rows)}."
     )
     return Table("", headers, cells, [note] if cells else [], text_columns=len(headers))
 
@@ -248,7 +228,7 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     world_kinds = {one.condition.world_kind for one in rows}
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
     lines = ["Statements about the largest colonies"]
-    for question in QUESTIONS:
+    for question in study.QUESTIONS:
         verdicts = Counter(
             of_largest(findings).verdict.value
             for (_, series), findings in judged.items()
@@ -282,14 +262,14 @@ def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     """Return the findings: a table per question, a line per series and kind of world."""
     blocks: list[Block] = []
     by_condition = {one.condition: one for one in rows}
-    for question in QUESTIONS:
+    for question in study.QUESTIONS:
         lines, units, shown = [], [], ""
         for (world_kind, series), findings in judged.items():
             if series.question == question:
-                world = "" if world_kind == shown else sentence(WORLDS[world_kind])
+                world = "" if world_kind == shown else sentence(study.WORLDS[world_kind])
                 verdicts = _verdicts(by_condition, world_kind, series, findings)
                 lines.append([world, sentence(series.statement), *verdicts])
-                units.append(MEASURES[series.measure])
+                units.append(study.MEASURES[series.measure])
                 shown = world_kind
         what = f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says"
         notes = [f"{what}; {_basis(rows)}."]
@@ -338,7 +318,7 @@ class Results(NamedTuple):
     @classmethod
     def of(cls, measured: Measured) -> Results:
         """Return the results that follow from all measures."""
-        return cls(condition_rows(measured), judge_all(measured))
+        return cls(condition_rows(measured), study.judge_all(measured))
 
     @classmethod
     def read(cls, seeds: Sequence[Mapping]) -> Results:
@@ -349,7 +329,7 @@ class Results(NamedTuple):
             by_condition.setdefault(condition, []).append(row)
         return cls.of(
             {  # an empty field is None, which is nan as a float
-                one: {name: np.array([row[name] for row in rows], float) for name in OF_STUDY}
+                one: {name: np.array([row[name] for row in rows], float) for name in study.OF_STUDY}
                 for one, rows in by_condition.items()
             }
         )

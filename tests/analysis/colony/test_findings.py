@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from synthetic_colony_study import Truth, build, proportional
 
-from taichi_ants.analysis.colony.contrasts import QUESTIONS, judge_all
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABC_SILENT,
@@ -15,11 +14,13 @@ from taichi_ants.analysis.colony.study import (
     FEW,
     JOINT,
     PAPER,
+    QUESTIONS,
     QUEUES,
     SILENT,
     SOME,
     A,
     Design,
+    judge_all,
 )
 from taichi_ants.analysis.colony.tables import Results, condition_rows, found
 from taichi_ants.analysis.findings import Verdict

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from synthetic_colony_study import SIZES, build
 
-from taichi_ants.analysis.colony.contrasts import QUESTIONS, judge_all
 from taichi_ants.analysis.colony.study import (
     ABC,
     ABROAD,
@@ -14,10 +13,12 @@ from taichi_ants.analysis.colony.study import (
     JOINT,
     OF_STUDY,
     PAPER,
+    QUESTIONS,
     REGIMES,
     RULES,
     SILENT,
     Condition,
+    judge_all,
     measures_of,
 )
 from taichi_ants.analysis.colony.tables import (
