@@ -12,24 +12,15 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from taichi_ants.studies.command_line import (
-    AGAIN,
-    Parser,
-    add_common,
-    add_results,
-    load_plugin,
-    progress_bar,
-    run_command,
-    whole_number,
-    with_folder,
-)
+from taichi_ants.studies import command_line
+from taichi_ants.studies.command_line import whole_number
 
 QUICK = {"seeds": 4, "episodes": 20, "ticks": 500, "evaluation_ticks": 1000}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__)
+    parser = command_line.Parser(__doc__)
     add = parser.add_argument
     add("--seeds", type=whole_number(1, 1000), default=40, metavar="N", help="how many")
     add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
@@ -39,12 +30,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--evaluation-ticks", **counts, default=3000, help="for which colonies are followed")
     quick = f"{QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks"
     add("--quick", action="store_true", help=quick)
-    add_common(parser)
-    add_results(parser, "bridge")
+    command_line.add_common(parser)
+    command_line.add_results(parser, "bridge")
     settings, given = parser.parse_given(arguments)
     for name in QUICK.keys() - given.keys() if settings.quick else ():
         setattr(settings, name, QUICK[name])
-    return with_folder(settings, "bridge")
+    return command_line.with_folder(settings, "bridge")
 
 
 def bridge(settings: argparse.Namespace) -> None:
@@ -54,7 +45,7 @@ def bridge(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.runner import Study
 
-    load_plugin(settings.plugin)
+    command_line.load_plugin(settings.plugin)
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     points = {design: point(design, settings.episodes, settings.ticks) for design in DESIGNS}
     study = Study(tuple(points.values()), seeds)
@@ -62,7 +53,7 @@ def bridge(settings: argparse.Namespace) -> None:
 
     def work(blocks: Path, ready: Path) -> None:
         found = {}
-        with progress_bar("bridge") as progress:
+        with command_line.progress_bar("bridge") as progress:
             outcomes = study.run(blocks, **where, progress=lambda share: progress(0.6 * share))
             for number, (design, one) in enumerate(points.items()):
                 path, tables = blocks / f"followed-{number:06d}.npz", outcomes[one]["q_values"]
@@ -75,4 +66,4 @@ def bridge(settings: argparse.Namespace) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    run_command(lambda: bridge(parse_arguments(arguments)), AGAIN)
+    command_line.run_command(lambda: bridge(parse_arguments(arguments)), command_line.AGAIN)

@@ -1,8 +1,8 @@
 """Many ants in one world: the study of the colony, or one colony that lives for a while.
 
 `study` trains and evaluates 1 to 64 ants under several rules in several kinds of worlds, over many
-seeds; tables, figures and findings go to a folder. `live` lets a
-colony of any size live, or many side by side; it can be saved, resumed and drawn.
+seeds; tables, figures and findings go to a folder. `live` lets a colony of any size live, or many
+side by side; it can be saved, resumed and drawn.
 """
 
 from __future__ import annotations
@@ -16,20 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.studies.command_line import (
-    AGAIN,
-    WORLDS,
-    Parser,
-    add_common,
-    add_results,
-    add_settings,
-    given_settings,
-    load_plugin,
-    progress_bar,
-    run_command,
-    whole_number,
-    with_folder,
-)
+from taichi_ants.studies import command_line
+from taichi_ants.studies.command_line import whole_number
 from taichi_ants.studies.interruption import held, stoppable
 from taichi_ants.task import Task
 
@@ -40,21 +28,13 @@ if TYPE_CHECKING:
     from taichi_ants.studies.colony_study import Plan
     from taichi_ants.studies.runner import Study
 
-KINDS = {
-    "study": "The study of the colony",
-    "live": "One colony, or many side by side, that live for a while",
-}
 WORLD_KINDS = (
     *("paper", "open", "piles"),
     *("rocks", "one_pile", "moving", "slow", "small", "wide", "large"),
 )
 QUICK = {
-    "world_kinds": ("paper", "open", "piles"),
-    "sizes": (1, 16, 64),
-    "seeds": 8,
-    "episodes": 20,
-    "ticks": 500,
-    "rollouts": 2,
+    **{"world_kinds": ("paper", "open", "piles"), "sizes": (1, 16, 64), "seeds": 8},
+    **{"episodes": 20, "ticks": 500, "rollouts": 2},
 }
 # Settings of learning that the study chooses.
 PLANNED = (
@@ -68,20 +48,19 @@ _OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch",
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """The settings of the command line."""
-    parser = Parser(__doc__)
+    parser = command_line.Parser(__doc__)
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
-    options = {"study": _add_study, "live": _add_live}
-    for kind, words in KINDS.items():
+    for kind, (words, add_options) in KINDS.items():
         one = kinds.add_parser(kind, help=words, description=f"{words}.")
         one.set_defaults(kind=kind)
-        options[kind](one)
+        add_options(one)
     settings, given = parser.parse_given(arguments)
     if settings.kind == "study":
         for name in QUICK.keys() - given.keys() if settings.quick else ():
             setattr(settings, name, QUICK[name])
         settings.world_kinds = tuple(one for one in WORLD_KINDS if one in settings.world_kinds)
         settings.sizes = tuple(sorted({1, *settings.sizes}))
-        with_folder(settings, "colony")
+        command_line.with_folder(settings, "colony")
     else:
         _check_live(settings, given, parser.error)
     return settings
@@ -107,7 +86,7 @@ def _check_live(
         error("--frame-interval is of an animation, name one with --render, or leave it out")
 
 
-def _add_study(parser: Parser) -> None:
+def _add_study(parser: command_line.Parser) -> None:
     add = parser.add_argument
     world_kinds: dict[str, Any] = {"nargs": "+", "choices": WORLD_KINDS, "metavar": "NAME"}
     add("--world-kinds", **world_kinds, default=WORLD_KINDS, help="kinds of world")
@@ -122,12 +101,12 @@ def _add_study(parser: Parser) -> None:
     add("--rollouts", **counts, default=4, help="evaluation episodes")
     add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no other worlds")
     parser.open_settings, parser.own_settings = ("training",), PLANNED
-    add_settings(parser, _learning(0.3))
-    add_common(parser)
-    add_results(parser, "colony")
+    command_line.add_settings(parser, _learning(0.3))
+    command_line.add_common(parser)
+    command_line.add_results(parser, "colony")
 
 
-def _add_live(parser: Parser) -> None:
+def _add_live(parser: command_line.Parser) -> None:
     add = parser.add_argument
     add("--ants", **COUNT, default=80, help="how many start")
     add("--ticks", type=whole_number(1, 10_000_000), default=1000, metavar="N", help="how long")
@@ -135,10 +114,9 @@ def _add_live(parser: Parser) -> None:
     add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
     start = "of ants, by the queen or anywhere"
     add("--start", choices=("nest", "spread"), default="nest", help=start)
-    add("--world", default="open", metavar="NAME", help=WORLDS)
-    add(
-        "--sharing", choices=("shared", "independent", "frozen"), default="shared", help="of tables"
-    )
+    add("--world", default="open", metavar="NAME", help=command_line.WORLDS)
+    sharings = ("shared", "independent", "frozen")
+    add("--sharing", choices=sharings, default="shared", help="of tables")
     add("--policy", metavar="FILE", help="a policy file to start from (.npz)")
     add("--capacity", **COUNT, help="most ants at once, if births are on")
     which = "rules to start from (default: those of --policy, else the paper's)"
@@ -151,10 +129,16 @@ def _add_live(parser: Parser) -> None:
     add("--frame-interval", **COUNT, default=2, help="ticks a picture of an animation")
     figure = "foods delivered per tick over time, of all colonies together (.png and .csv)"
     add("--figure", metavar="FILE.png", help=figure)
-    add_common(parser)
+    command_line.add_common(parser)
     parser.open_settings = ("world", "task", "training")
-    add_settings(parser, _living(Task()))
-    add_settings(parser, _learning(0.1))
+    command_line.add_settings(parser, _living(Task()))
+    command_line.add_settings(parser, _learning(0.1))
+
+
+KINDS = {
+    "study": ("The study of the colony", _add_study),
+    "live": ("One colony, or many side by side, that live for a while", _add_live),
+}
 
 
 def _learning(epsilon: float) -> TrainingConfig:
@@ -169,7 +153,7 @@ def _living(task: Task) -> Task:
 
 def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingConfig:
     """Return the learner with what options change."""
-    return _learning(epsilon).but(**given_settings(settings).get("training", {}))
+    return _learning(epsilon).but(**command_line.given_settings(settings).get("training", {}))
 
 
 def study(settings: argparse.Namespace) -> None:
@@ -184,7 +168,7 @@ def study(settings: argparse.Namespace) -> None:
     asked = study_of(conditions, seeds)
 
     def work(blocks: Path, ready: Path) -> Results:
-        with progress_bar("study") as progress:
+        with command_line.progress_bar("study") as progress:
             outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
         return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
 
@@ -237,15 +221,8 @@ def live(settings: argparse.Namespace) -> None:
         colony = new_colony(settings)
     begun, began = colony.ticks, time.perf_counter()
     with held() as stopped:
-        with progress_bar("colony") as progress:
-            live(
-                colony,
-                settings.ticks,
-                progress,
-                stopped,
-                *files,
-                frame_interval=settings.frame_interval,
-            )
+        with command_line.progress_bar("colony") as progress:
+            live(colony, settings.ticks, progress, stopped, *files, settings.frame_interval)
         print(summary(colony, colony.ticks - begun, time.perf_counter() - began))
         for path in filter(None, files):
             print(f"{path} is written.")
@@ -258,7 +235,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     """A colony at the start of its episode; deliveries do not end it, so updates look beyond."""
     from taichi_ants import AntsError, Colony, load_policy, worlds
 
-    of_world = {"seed": settings.seed, **given_settings(settings).get("world", {})}
+    of_world = {"seed": settings.seed, **command_line.given_settings(settings).get("world", {})}
     world = worlds.build(settings.world, **of_world)
     policy = load_policy(settings.policy) if settings.policy else None
     if settings.sharing == "frozen" and policy is None:
@@ -266,19 +243,12 @@ def new_colony(settings: argparse.Namespace) -> Colony:
             "--sharing frozen needs a table that the ants follow; give --policy FILE, or choose "
             "another --sharing."
         )
-    colony = Colony(
-        world,
-        rules(settings, policy),
-        training_config(settings, 0.1),
-        range(settings.seed, settings.seed + settings.colonies),
-        ants=settings.ants,
-        capacity=settings.capacity,
-        start=settings.start,
-        sharing=settings.sharing,
-        q_values=policy.q_values if policy else None,
-        threads=settings.threads,
-        arch=settings.arch,
-    )
+    names = ("ants", "capacity", "start", "sharing", "threads", "arch")
+    options: dict[str, Any] = {name: getattr(settings, name) for name in names}
+    seeds = range(settings.seed, settings.seed + settings.colonies)
+    options["q_values"] = policy.q_values if policy else None
+    training = training_config(settings, 0.1)
+    colony = Colony(world, rules(settings, policy), training, seeds, **options)
     colony.begin_episode()
     return colony
 
@@ -289,19 +259,19 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     base = _living(named or (policy.task if policy else Task()))
     if policy:
         base = replace(base, observation=policy.observation)
-    return base.but(**given_settings(settings).get("task", {}))
+    return base.but(**command_line.given_settings(settings).get("task", {}))
 
 
 def start(settings: argparse.Namespace) -> None:
     """The study, or one colony."""
-    load_plugin(settings.plugin)
+    command_line.load_plugin(settings.plugin)
     if settings.kind == "live":
         live(settings)
     else:
-        with stoppable(AGAIN):
+        with stoppable(command_line.AGAIN):
             study(settings)
 
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    run_command(lambda: start(parse_arguments(arguments)))
+    command_line.run_command(lambda: start(parse_arguments(arguments)))

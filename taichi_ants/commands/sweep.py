@@ -9,28 +9,20 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from taichi_ants.studies.command_line import (
-    AGAIN,
-    Parser,
-    add_common,
-    add_results,
-    load_plugin,
-    progress_bar,
-    run_command,
-)
+from taichi_ants.studies import command_line
 
 
 def parse_arguments(
     arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
 ) -> argparse.Namespace:
     """Return the settings of the command line; a script `about` one sweep gives its file."""
-    parser = Parser(about or __doc__)
+    parser = command_line.Parser(about or __doc__)
     if file is None:
         parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
     parser.set_defaults(**({"file": file} if file else {}))
-    add_common(parser)
+    command_line.add_common(parser)
     name = f"sweep-{file.stem}" if file else "sweep-NAME, by the name of FILE"
-    add_results(parser, name, quick=False)
+    command_line.add_results(parser, name, quick=False)
     settings = parser.parse_args(arguments)
     settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
     return settings
@@ -41,11 +33,11 @@ def sweep(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.sweep import read_sweep
 
-    load_plugin(settings.plugin)
+    command_line.load_plugin(settings.plugin)
     asked = read_sweep(settings.file)
 
     def work(blocks: Path, ready: Path) -> None:
-        with progress_bar("sweep") as progress:
+        with command_line.progress_bar("sweep") as progress:
             values = asked.measured(blocks, settings.threads, settings.arch, progress)
         asked.write(values, ready, draws=not settings.no_figures)
 
@@ -56,4 +48,6 @@ def main(
     arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
 ) -> None:
     """Run the command line; the arguments are those of `parse_arguments`."""
-    run_command(lambda: sweep(parse_arguments(arguments, file, about)), AGAIN)
+    command_line.run_command(
+        lambda: sweep(parse_arguments(arguments, file, about)), command_line.AGAIN
+    )
