@@ -68,6 +68,21 @@ LATE_DESIGNS = (Design(), *OTHERS, Design(evaporation="none"))
 Crossings = Mapping[Design, Mapping[str, np.ndarray]]
 
 
+def bridges(design: Design) -> dict[str, dict[str, Any]]:
+    """Return the bridges on which its colonies are followed: the arguments of `double_bridge`.
+
+    On the bridge `LATE` the short branch is rock for the first half of the time.
+    """
+    unequal: dict[str, Any] = {"short": 23, "long": 36, "aside": design.aside}
+    equal = {"short": 23, "long": 23}
+    found = {SHORT_RIGHT: unequal, SHORT_LEFT: {**unequal, "mirrored": True}, EQUAL: equal}
+    if design.aside:
+        found[EQUAL_ASIDE] = {**equal, "aside": design.aside}
+    if design in LATE_DESIGNS:
+        found[LATE] = unequal
+    return found
+
+
 def length(bridge: str, ticks: int) -> int:
     """Return for how many ticks colonies are followed on a bridge, of those that the study asks."""
     return 2 * ticks if bridge == LATE else ticks
@@ -83,12 +98,9 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
     return [
         {
             **asdict(design),
-            "bridge": bridge,
-            "seed": seed,
-            "load": load,
+            **{"bridge": bridge, "seed": seed, "load": load},
             "from_tick": w * length(bridge, ticks) // WINDOWS,
-            "short": int(crossed[w, k, 0, s]),
-            "long": int(crossed[w, k, 1, s]),
+            **{"short": int(crossed[w, k, 0, s]), "long": int(crossed[w, k, 1, s])},
         }
         for design, bridges in found.items()
         for bridge, crossed in bridges.items()

@@ -48,15 +48,15 @@ class Estimator(NamedTuple):
         """Whether the mean lies outside of the interval of the IQM."""
         return self.mean < self.iqm_ci_low or self.mean > self.iqm_ci_high
 
-    def columns(self, name: str) -> dict[str, float]:
-        """Return the columns of a measure in a table."""
-        fields = self._fields if self.iqm is not None else self._fields[:3]
-        return {f"{name}_{field}": getattr(self, field) for field in fields}
-
 
 def centre_columns(found: Mapping[str, Estimator]) -> dict[str, float]:
-    """Return the columns of several measures."""
-    return {k: v for name, one in found.items() for k, v in one.columns(name).items()}
+    """Return the columns of several measures in a table."""
+    return {
+        f"{name}_{field}": value
+        for name, one in found.items()
+        for field, value in one._asdict().items()
+        if one.iqm is not None or "iqm" not in field
+    }
 
 
 def centres_of(
@@ -113,7 +113,7 @@ def report(
         other = f"{short(against[0], names)} {_shown(against[1])}"
         headers.append(f"{next(iter(values))} against {other}")
         lines = [[*line, note] for line, note in zip(lines, notes, strict=True)]
-    title = sentence(_spread(next(iter(values.values())).shape[1]))
+    title = _spread(next(iter(values.values())))
     return plain_text([Table(title, headers, lines, text_columns=len(headers))], _TERMINAL)
 
 
@@ -138,7 +138,7 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
         axes = figure.subplots()
         draw_lines(axes, lines)
         axes.set(xlabel=names[0], ylabel=words)
-        caption = ", ".join([sentence(_spread(values.shape[1])), *alike])
+        caption = ", ".join([_spread(values), *alike])
         style.frame(figure, sentence(words), f"{caption}.", style.legend_entries([axes]))
     style.save(figure, path)
 
@@ -179,9 +179,10 @@ def _far_apart(numbers: Sequence[float]) -> bool:
     return min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
 
 
-def _spread(seeds: int) -> str:
+def _spread(values: np.ndarray) -> str:
+    seeds = values.shape[1]
     few = f" (too few for these: take {LEAST_SEEDS} or more)" if seeds < LEAST_SEEDS else ""
-    return f"means over {seeds} seeds with 95 % intervals{few}" if seeds > 1 else "one seed"
+    return f"Means over {seeds} seeds with 95 % intervals{few}" if seeds > 1 else "One seed"
 
 
 def short(name: str, names: Sequence[str]) -> str:

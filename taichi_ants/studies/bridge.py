@@ -9,18 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants.analysis.bridge import (
-    EQUAL,
-    EQUAL_ASIDE,
-    LATE,
-    LATE_DESIGNS,
-    LOADS,
-    SHORT_LEFT,
-    SHORT_RIGHT,
-    WINDOWS,
-    Design,
-    length,
-)
+from taichi_ants.analysis.bridge import LATE, LOADS, WINDOWS, Design, bridges, length
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import kept
@@ -51,28 +40,14 @@ def task(design: Design) -> Task:
     return replace(rules, pheromone=trail, life=Life(regrowth=0))
 
 
-def bridges(design: Design) -> dict[str, dict[str, Any]]:
-    """Return the bridges on which its colonies are followed: the arguments of `double_bridge`.
-
-    On the bridge `LATE` the short branch is rock for the first half of the time.
-    """
-    unequal: dict[str, Any] = {"short": 23, "long": 36, "aside": design.aside}
-    equal = {"short": 23, "long": 23}
-    found = {SHORT_RIGHT: unequal, SHORT_LEFT: {**unequal, "mirrored": True}, EQUAL: equal}
-    if design.aside:
-        found[EQUAL_ASIDE] = {**equal, "aside": design.aside}
-    if design in LATE_DESIGNS:
-        found[LATE] = unequal
-    return found
-
-
 def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
     """How colonies of a design learn.
 
     The short branch lies to the right in about half of the episodes and to the left in the others,
     so that no colony can learn on which side it is.
     """
-    pool = tuple(double_bridge(**bridges(design)[name]) for name in (SHORT_RIGHT, SHORT_LEFT))
+    right, left, *_ = bridges(design).values()
+    pool = double_bridge(**right), double_bridge(**left)
     training = scheduled(TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0), episodes)
     several = pool[0], task(design), training, pool, design.ants
     return ColonyPoint(*several, episodes=episodes, ticks=ticks, rollouts=1)

@@ -6,7 +6,7 @@ worlds one in `WORLDS` there and one in `_place` here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -225,25 +225,25 @@ def write_results(
     files.write_text(folder / "findings.md", markdown(tables.found(*results)))
     files.write_text(folder / REPORT, plain_text(tables.on_one_screen(*results), _WIDTH))
     policies = files.check_writable_folder(folder / POLICIES)
-    for name, q_values, facts, seen in median_policies(conditions, seeds, values, outcomes):
-        save_policy(policies / f"{name}.npz", q_values, facts, seen)
+    _save_policies(conditions, seeds, values, outcomes, policies)
     if draws:
         style.save_all(draw_all(results.rows), folder / FIGURES)
     return results
 
 
-def median_policies(
-    conditions: Plan, seeds: Sequence[int], found: Measured, outcomes: Mapping[Any, Outcome]
-) -> Iterator[tuple[str, np.ndarray, dict[str, Any], str]]:
-    """Yield for each jointly trained, compared condition the policy of its median seed.
-
-    As a name, action values float32 (n_states, 5), what made them, and their observation.
-    """
+def _save_policies(
+    conditions: Plan,
+    seeds: Sequence[int],
+    values: Measured,
+    outcomes: Mapping[Any, Outcome],
+    folder: Path,
+) -> None:
+    """Save of each jointly trained, compared condition the policy of its median seed."""
     for condition, point in conditions.items():
         world_kind, rules, regime, ants = condition
         if rules not in COMPARED or regime != study.JOINT:
             continue
-        deliveries = found[condition]["deliveries"]
+        deliveries = values[condition]["deliveries"]
         run = int(np.argsort(deliveries, kind="stable")[(len(seeds) - 1) // 2])
         metadata = {
             **condition._asdict(),
@@ -254,5 +254,5 @@ def median_policies(
             "ticks": point.ticks,
             "deliveries_per_1000_ticks": deliveries[run],
         }
-        table = outcomes[point]["q_values"][run]
-        yield f"{world_kind}_{rules}_{ants}", table, metadata, point.task.observation
+        path = folder / f"{world_kind}_{rules}_{ants}.npz"
+        save_policy(path, outcomes[point]["q_values"][run], metadata, point.task.observation)

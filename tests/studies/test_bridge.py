@@ -15,9 +15,10 @@ from taichi_ants.analysis.bridge import (
     SHORT_RIGHT,
     WINDOWS,
     Design,
+    bridges,
 )
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies.bridge import bridges, crossings, point, task
+from taichi_ants.studies.bridge import crossings, point, task
 from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
 
 TICKS = 100
