@@ -70,11 +70,10 @@ def choices(
     Args:
         short, long: Steps to cross the branches, see `crossing_steps`; a step is 2 seconds.
         colonies: How many; the first ones stay the same if there are more.
-        ants: How many choose, in turn one at the nest and one at the food, as many of both.
-        k: How many marks a branch seems to have more than there are.
-        n: How strongly marks attract.
-        opens: Number of ants that choose before the short branch opens; until then all ants take
-            the long one. From 0 (it is open from the start) to `ants`.
+        ants: How many choose, in turn one at the nest and one at the food; an even number.
+        k, n: Marks that a branch seems to have more than there are, and how strongly marks attract.
+        opens: Number of ants, from 0 to `ants`, that choose before the short branch opens; until
+            then all take the long one.
 
     Raises:
         AntsError: An argument is not allowed.
@@ -96,11 +95,10 @@ def choices(
 
 
 def class_shares(took: np.ndarray, first: int = 501, last: int = 1000) -> np.ndarray:
-    """The distribution of colonies over the five classes of the share on the short branch.
+    """Percent of colonies, float64 (5,), by their share of ants on the short branch.
 
-    Percent, float64 (5,), of the colonies with 0-20 %, ... 80-100 % of the ants `first` to `last`,
-    counted from 1, on the short branch; `took` is from `choices`. A share on a border belongs to
-    the class above. AntsError if there are no such ants.
+    Of the ants `first` to `last`, counted from 1, in the array `took` from `choices`: 0-20 %, ...
+    80-100 %; a share on a border belongs to the class above. AntsError if there are no such ants.
     """
     checked_whole("last", last, 1, took.shape[1])
     checked_whole("first", first, 1, last)

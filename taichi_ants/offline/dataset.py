@@ -34,9 +34,9 @@ class Dataset(Record):
     """Transitions, one row each; see `record` and `record_colony`.
 
     An *episode* is what one ant does from the step in which it appears to the one with which its
-    data end: terminated by a delivery that is a terminal state, or truncated, by its death, by a
-    delivery that is not terminal but ends the ant's episode, or by the end of the recording. The
-    *behaviour policy* is the one that chose the actions. The arrays (n,) are read-only.
+    data end: terminated by a delivery that is a terminal state, or truncated, by its death, by
+    another delivery that ends its episode, or by the end of the recording. The *behaviour policy*
+    is the one that chose the actions. The arrays (n,) are read-only.
 
     Attributes:
         world, task: The world that the ants started in, and the rules.
@@ -84,12 +84,8 @@ class Dataset(Record):
             array = np.ascontiguousarray(array).view()
             array.flags.writeable = False
             object.__setattr__(self, name, array)
-        most = {
-            "run": len(self.seeds),
-            "state": self.task.n_states,
-            "action": N_ACTIONS,
-            "next_state": self.task.n_states,
-        }
+        most = {"run": len(self.seeds), "action": N_ACTIONS}
+        most |= dict.fromkeys(("state", "next_state"), self.task.n_states)
         for name, size in most.items():
             array = getattr(self, name)
             if array.min() < 0 or array.max() >= size:
@@ -105,15 +101,12 @@ class Dataset(Record):
     def _check_episodes(self) -> None:
         """Episodes stand one after the other, each of one ant, and end where their flags say."""
         goes_on = ~(self.terminated | self.truncated)
-        jumps = np.diff(self.episode)
-        chained = (
-            (self.next_state[:-1] == self.state[1:])
-            & (np.diff(self.step) == 1)
-            & (np.diff(self.agent) == 0)
-            & (np.diff(self.run) == 0)
-        )
-        ordered = self.episode[0] == 0 and (jumps == ~goes_on[:-1]).all()
-        ordered = ordered and (np.diff(self.run) >= 0).all() and not goes_on[-1]
+        names = ("run", "episode", "agent", "step")
+        run, episode, agent, step = (np.diff(getattr(self, name)) for name in names)
+        chained = (step == 1) & (agent == 0) & (run == 0)
+        chained &= self.next_state[:-1] == self.state[1:]
+        ordered = self.episode[0] == 0 and (episode == ~goes_on[:-1]).all()
+        ordered = ordered and (run >= 0).all() and not goes_on[-1]
         if not ordered or not chained[goes_on[:-1]].all():
             raise AntsError(
                 "the episodes of a data set do not stand one after the other, each from its first "
@@ -174,12 +167,8 @@ class Dataset(Record):
 
     def facts(self) -> dict[str, Any]:
         """Return all except the transitions, for files; `described` reads it."""
-        return {
-            "world": self.world.as_dict(),
-            "task": self.task.as_dict(),
-            "seeds": self.seeds,
-            "behaviour": dict(self.behaviour),
-        }
+        facts = {"world": self.world.as_dict(), "task": self.task.as_dict()}
+        return {**facts, "seeds": self.seeds, "behaviour": dict(self.behaviour)}
 
     @staticmethod
     def described(facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -135,11 +135,7 @@ def record_colony(
 
 
 def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, np.ndarray]:
-    """Let a tick pass; what each ant did in it.
-
-    Ants choose by `tables`, see `Colony.q_values`; those that have drawn ahead, by the ones
-    `before`.
-    """
+    """Let a tick pass; what each ant did in it, by `tables`, or `before` if it has drawn ahead."""
     step, acting = colony.ticks, colony.living & colony.running[:, None]
     run, slot = np.nonzero(acting)
     owner = (run, slot)[: tables.ndim - 2]
@@ -156,12 +152,8 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
     event, action = colony.events[run, slot], colony.actions[run, slot]
     chances = action_probabilities(values, colony.epsilon)[np.arange(len(run)), action]
     return {
-        "run": run,
-        "agent": agent,
-        "step": np.full(len(run), step),
-        "state": state,
-        "action": action,
-        "reward": colony.task.rewards.by_event()[event],
+        **{"run": run, "agent": agent, "step": np.full(len(run), step)},
+        **{"state": state, "action": action, "reward": colony.task.rewards.by_event()[event]},
         "next_state": colony.states[run, slot],
         "terminated": (event == Event.DELIVERED) & (colony.task.delivery == "terminates"),
         "behaviour_probability": chances,

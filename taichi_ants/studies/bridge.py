@@ -64,12 +64,8 @@ def followed(
 ) -> dict[str, np.ndarray]:
     """Return what `crossings` counts on each bridge while nobody learns; the file `path` keeps it.
 
-    Args:
-        path: Of an .npz file; if it is there, nothing is left to do.
-        design, learned: The design, and the point that gave the tables.
-        seeds, q_values: Of the training, and its tables, float32 (seeds, n_states, 5).
-        ticks: Length of the episode on each bridge, and its half on `LATE`.
-        where: Threads and arch of colonies.
+    The point of the design has `learned` the tables `q_values`, float32 (seeds, n_states, 5). An
+    episode has `ticks`, twice as many on `LATE`; `where` are threads and arch of colonies.
     """
 
     def counted() -> dict[str, np.ndarray]:
@@ -93,14 +89,10 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     """Run an episode, and count who has crossed the bridge by which branch.
 
     An ant has crossed when it comes to one room from the other; its branch is the one in which it
-    was last. Foragers come to the food without food, carriers to the queen with food.
-
-    Args:
-        colony: On the bridge in all worlds; schedule "by_world", in which ants keep their slots.
-        bridge: The arguments of `double_bridge`.
-        ticks: Length of the episode.
-        opens: Tick after which the short branch, rock until then, can be entered; 0 if it always
-            can. Otherwise the colony must have one world.
+    was last. Foragers come to the food without food, carriers to the queen with food. Until tick
+    `opens` the short branch is rock, if it is not 0; then the colony must have one world. Its
+    schedule is "by_world", in which ants keep their slots; `bridge` are arguments of
+    `double_bridge`.
 
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.

@@ -107,15 +107,9 @@ def plan(
                 conditions[Condition(world_kind, rules, regime, n)] = copies
         for rules in COMPARED if world_kind != OPEN else ():
             after = trained(OPEN, rules, sizes[-1])
-            abroad = replace(
-                after,
-                world=places[world_kind],
-                task=task_in(world_kind, after.task),
-                pool=None,
-                ants=LARGE_SIZE if world_kind == "large" else sizes[-1],
-                episodes=0,
-                after=after,
-            )
+            where: Any = {"world": places[world_kind], "task": task_in(world_kind, after.task)}
+            n = LARGE_SIZE if world_kind == "large" else sizes[-1]
+            abroad = replace(after, **where, pool=None, ants=n, episodes=0, after=after)
             conditions[Condition(world_kind, rules, study.ABROAD, abroad.ants)] = abroad
     return conditions
 
@@ -161,10 +155,8 @@ def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
 
 def greedy(point: ColonyPoint) -> ColonyPoint:
     """Return the same ants, evaluated without exploration."""
-    calm = replace(point.training, min_epsilon=0.0)
-    if not point.episodes:
-        return replace(point, training=calm)
-    return replace(point, training=calm, pool=None, episodes=0, after=point)
+    calm = replace(point, training=replace(point.training, min_epsilon=0.0))
+    return replace(calm, pool=None, episodes=0, after=point) if point.episodes else calm
 
 
 def study_of(conditions: Plan, seeds: Sequence[int]) -> Study[ColonyPoint]:
@@ -247,11 +239,8 @@ def _save_policies(
         run = int(np.argsort(deliveries, kind="stable")[(len(seeds) - 1) // 2])
         metadata = {
             **condition._asdict(),
-            "task": point.task.as_dict(),
-            "training": point.training.as_dict(),
-            "seed": seeds[run],
-            "episodes": point.episodes,
-            "ticks": point.ticks,
+            **{"task": point.task.as_dict(), "training": point.training.as_dict()},
+            **{"seed": seeds[run], "episodes": point.episodes, "ticks": point.ticks},
             "deliveries_per_1000_ticks": deliveries[run],
         }
         path = folder / f"{world_kind}_{rules}_{ants}.npz"
