@@ -72,17 +72,6 @@ def centres_of(
     return [{name: Estimator(*several[p]) for name, several in rows.items()} for p in range(points)]
 
 
-def summary_rows(
-    settings: Sequence[Settings], values: Mapping[str, np.ndarray], with_iqm: Sequence[str] = ()
-) -> list[dict[str, Any]]:
-    """Return a row for each point: what varies, the number of seeds, and `centres_of` measures."""
-    seeds = next(iter(values.values())).shape[1]
-    return [
-        {**one, "seeds": seeds, **centre_columns(found)}
-        for one, found in zip(settings, centres_of(values, with_iqm), strict=True)
-    ]
-
-
 def columns_of(rows: Sequence[Settings]) -> list[str]:
     """The names in rows, in order of appearance."""
     return list(dict.fromkeys(name for row in rows for name in row))

@@ -115,7 +115,7 @@ def record_colony(
     if len(dict.fromkeys(colony.worlds)) > 1:
         raise AntsError("the colony lives in different worlds; record a colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}
-    facts |= {"training": colony.training.as_dict()}
+    facts["training"] = colony.training.as_dict()
     pieces = []
     for episode in range(episodes):
         colony.begin_episode(ticks)

@@ -122,7 +122,10 @@ class Sweep:
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
         with_iqm = [name for name in values if MEASURES[self.kind][name].uses_iqm]
-        rows = sweeps.summary_rows(self.settings, values, with_iqm)
+        rows = [
+            {**one, "seeds": len(self.study.seeds), **sweeps.centre_columns(centres)}
+            for one, centres in zip(self.settings, sweeps.centres_of(values, with_iqm), strict=True)
+        ]
         files.write_csv(folder / SUMMARY, rows, sweeps.columns_of(rows))
         found = self.findings(values[first])
         if self.against:

@@ -120,18 +120,13 @@ def _each(rules: Iterable[str], *regimes: str) -> list[Design]:
 
 _LEARNED = study.ALONE, study.FEW, study.SOME, study.JOINT
 _RISING = study.PAPER, study.A, study.BC, study.ABC, study.QUEUES
+_MAIN = study.PAPER, study.ABC, study.QUEUES
 _MEASURES = "deliveries", "per_ant"
 FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
     "rules": partial(_dots, "What each rule adds", _each(study.RULES, study.JOINT)),
     "scaling": partial(
         _lines, "More ants: what a colony delivers", _each(_RISING, study.JOINT), _MEASURES
     ),
-    "training": partial(
-        _dots, "With how many ants to train", _each((study.PAPER, study.ABC), *_LEARNED)
-    ),
-    "elsewhere": partial(
-        _dots,
-        "Trained in open worlds, in others",
-        _each((study.PAPER, study.ABC, study.QUEUES), study.ABROAD),
-    ),
+    "training": partial(_dots, "With how many ants to train", _each(_MAIN[:2], *_LEARNED)),
+    "elsewhere": partial(_dots, "Trained in open worlds, in others", _each(_MAIN, study.ABROAD)),
 }
