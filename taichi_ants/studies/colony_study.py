@@ -70,9 +70,8 @@ def plan(
 ) -> Plan:
     """Return the conditions of some kinds of world, which are names in `WORLDS`.
 
-    The sizes ascend; ants that were trained elsewhere are as many as the last. The epsilon of the
-    training is that of the first episode: it decays to `EVALUATION_EPSILON` while the learning rate
-    decays to a tenth, and both stay there for the last 30 % of the episodes.
+    The sizes ascend; ants that were trained elsewhere are as many as the last. Epsilon decays to
+    `EVALUATION_EPSILON` as the learning rate to a tenth; the last 30 % of episodes have these.
 
     Raises:
         AntsError: There is no such kind of world, or ants cannot learn together with the learner.
