@@ -14,7 +14,6 @@ from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
 try:
@@ -128,7 +127,6 @@ class HexColonyParallelEnv(ParallelEnv):
         self._worlds.begin(np.ones(1, bool), [seed])
         self._slots = list(range(self._worlds.colony.ants))  # of the agents
         self.agents = self._names(self._slots)
-        self._worlds.events[:] = Event.NONE
         return self._told(self.agents, self._slots)
 
     @property
@@ -229,7 +227,7 @@ class HexColonyParallelEnv(ParallelEnv):
         """A picture, uint8 (height, width, 3); None without a render mode."""
         if not self._begun:
             EnvLogger.error_render_before_reset()
-        return None if self.render_mode is None else self._worlds.render()[0]
+        return None if self.render_mode is None else self._worlds.draw(0)
 
 
 def most_births(life: Life, foods: int, ticks: int) -> int:

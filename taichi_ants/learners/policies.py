@@ -204,13 +204,17 @@ def checked_values(q_values: Any, task: Task) -> np.ndarray:
             f"q_values has shape {values.shape}; for the observation {task.observation!r} it must "
             f"end in {shape}."
         )
-    # A float64 beyond the range of float32 becomes infinite, which the next check reports.
-    with np.errstate(over="ignore"):
+    return finite("q_values is", values)
+
+
+def finite(what: str, values: np.ndarray) -> np.ndarray:
+    """Action values (..., 5) as float32; AntsError, which starts with `what`, unless finite."""
+    with np.errstate(over="ignore"):  # a float64 that float32 cannot hold becomes infinite
         tables = values.astype(np.float32, copy=False)
     if not np.isfinite(tables).all():
         *_, state, action = where = np.argwhere(~np.isfinite(tables))[0]
         raise AntsError(
-            f"q_values is {tables[tuple(where)]} for state {state} and action {action}; it must "
-            "be finite."
+            f"{what} {tables[tuple(where)]} for state {state} and action {action}; numbers must be "
+            "finite, so give an action that shall never be taken a low one."
         )
     return tables
