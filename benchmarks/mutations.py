@@ -199,8 +199,8 @@ MUTATIONS = [
         "2",
         "tests/worlds/test_world_validation.py",
     ),
-    ("worlds/starts.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
-    ("worlds/geometry.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
+    ("worlds/world.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
+    ("worlds/world.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
     ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
     # Settings.
     ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),

@@ -23,8 +23,7 @@ from taichi_ants.learners.config import TrainingConfig, share_of_one
 from taichi_ants.learners.policies import checked_values
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
-from taichi_ants.worlds.starts import STARTS
-from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import STARTS, World
 
 if TYPE_CHECKING:
     from taichi_ants.learners.learner import Learner

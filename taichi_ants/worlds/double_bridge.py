@@ -20,7 +20,6 @@ import numpy as np
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid, normal_form
 from taichi_ants.settings import Is, checked
-from taichi_ants.worlds import geometry
 from taichi_ants.worlds.world import World
 
 ROOM_RADIUS = 5  # of the rooms around queen and food: room for 90 ants beside the queen
@@ -61,8 +60,8 @@ def double_bridge(
     """
     grid = AxialGrid(bridge_ranges(short, long, mirrored, aside))
     queen, pile, corridors = _walked(short, long, mirrored, aside)
-    to_pile = geometry.distances(grid, pile)
-    walled = np.minimum(geometry.distances(grid, queen), to_pile) > ROOM_RADIUS
+    to_pile = grid.distances(pile)
+    walled = np.minimum(grid.distances(queen), to_pile) > ROOM_RADIUS
     walled[grid.index(corridors)] = False
     return World(
         grid.ranges,
