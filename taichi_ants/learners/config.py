@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -120,6 +120,25 @@ class TrainingConfig(Settings, path="training"):
     def as_dict(self) -> dict[str, Any]:
         """The settings as names and numbers, for files; `TrainingConfig(**facts)` reads them."""
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
+
+
+@dataclass(frozen=True)
+class Hyperparameters(Settings, path="training"):
+    """Base of the hyperparameters of a learner; as such, none.
+
+    Each field is declared as `Annotated[int, Is(...)]` or `Annotated[float, Is(...)]`, for kernels
+    i32 and f32. AntsError if a value is outside its range, or a field is not declared so.
+    """
+
+    def __post_init__(self) -> None:
+        kinds = {one.name: one.kind for one in declared(type(self))}
+        for one in fields(self):
+            if kinds.get(one.name) not in (int, float):
+                raise AntsError(
+                    f"the field {one.name} has the type {one.type}; declare it as "
+                    "Annotated[int, Is(...)] or Annotated[float, Is(...)]."
+                )
+        self.check()
 
 
 def share_of_one(value: Any) -> bool:

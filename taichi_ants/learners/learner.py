@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taichi_ants.errors import AntsError, checked_whole, shown
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ def td_learner(
             is not drawn. What it computes is tried when it is first used.
     """
     check_td_error(name, td_error, draws_next_action)
-    from taichi_ants.learners.td_errors import learn_by  # Taichi starts to be imported
+    from taichi_ants.learners.memory import learn_by  # Taichi starts to be imported
 
     return Learner(
         name,
