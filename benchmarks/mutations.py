@@ -205,7 +205,7 @@ MUTATIONS = [
     # Settings.
     ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
     ("settings.py", "elif value != one.default:", "elif False:", SETTINGS),
-    ("settings.py", "if math.isfinite(value) else None", "", SETTINGS),
+    ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "made[one.name] = one.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
 ]

@@ -195,9 +195,6 @@ class HexColonyVectorEnv(AntVectorEnv):
     start, max_steps, observation_format, evaporation: As of `HexColonyParallelEnv`.
     autoreset_mode, max_episode_steps: As of `HexForageVectorEnv`.
     render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
-
-    Raises:
-        AntsError: An argument is not allowed.
     """
 
     metadata = METADATA

@@ -33,21 +33,14 @@ class HexColonyParallelEnv(ParallelEnv):
     All agents act at once. Actions, observations and rewards are those of `HexForageEnv`; each ant
     gets what its own action pays. `state()` is a map of the whole world, for centralised critics.
 
-    ## Starting State
-    The world as it is drawn. The ants that it lists come first; all others start where `start`
-    says, on cells and with headings that the seed decides.
-
     ## Episode End
     An ant that dies of age is terminated, and leaves `agents`; its number does not come back. After
     `max_steps` steps all are truncated. A delivery ends nothing, whatever the task's `delivery`
     says: its ant goes on, and `info["event"]` is DELIVERED.
 
     ## Info
-    - `state`: int64, the state as a number.
-    - `action_mask`: int8 (5,), 1 for what can succeed if no other ant is faster; in a dead end for
-      the moves, which turn the ant.
-    - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset` and
-      in the step of an ant's birth.
+    As of `HexForageEnv`, without `reason`. The `action_mask` is 1 for what can succeed if no other
+    ant is faster; `event` is NONE in the step of an ant's birth, too.
 
     ## Arguments
     world: A registered name, the path of a map, or a `World`.
@@ -64,9 +57,6 @@ class HexColonyParallelEnv(ParallelEnv):
     possible_agents: All that can ever live in one episode: the ants that start, and as many as
         food can become, see `most_births`.
     agents: Those that live now; only after the first reset.
-
-    Raises:
-        AntsError: An argument is not allowed.
     """
 
     metadata: ClassVar[dict] = {**METADATA, "name": "colony_v0", "is_parallelizable": True}

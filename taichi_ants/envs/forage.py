@@ -162,7 +162,8 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
 
     ## Arguments
     world: Name of a registered world, path of a text map, its text, or a World.
-    task: The rules, a `taichi_ants.Task`, or its `as_dict()`; None is the paper's.
+    task: The rules, a `taichi_ants.Task`, or its `as_dict()`; None is the paper's. AntsError if it
+        has what only colonies have.
     delivery: A delivery "terminates" or "truncates" the episode, or it "continues"; None is the
         task's, by default "terminates".
     evaporation: Whether trails evaporate; None is as the task says of training, by default not.
@@ -170,9 +171,6 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     observation_format: "cells", "index" or "one_hot".
     render_mode: "rgb_array": `render` draws uint8 (720, 1280, 3). "ansi": it writes a text map of
         the world as it is, its heading for the ant.
-
-    Raises:
-        AntsError: An argument is not allowed, or the task has what only colonies have.
     """
 
     metadata = METADATA
@@ -235,21 +233,13 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         }
 
     def action_masks(self) -> np.ndarray:
-        """Return which actions can succeed now, bool (5,), as `info["action_mask"]` does.
-
-        Raises:
-            ResetNeeded: No episode has begun.
-        """
+        """Return which actions can succeed now, bool (5,), as `info["action_mask"]` does."""
         if not self._begun:
             raise ResetNeeded("no episode is under way; call reset() before action_masks().")
         return ACTION_MASKS[self._arrays["percepts"][0]].astype(bool)
 
     def render(self) -> Any:
-        """A picture or a text map of the world as it is, see `render_mode`; None without one.
-
-        Raises:
-            ResetNeeded: No episode has begun.
-        """
+        """A picture or a text map of the world as it is, see `render_mode`; None without one."""
         if not self._begun:
             raise ResetNeeded("no episode is under way; call reset() before render().")
         return None if self.render_mode is None else self._ants.draw(0)
@@ -265,15 +255,9 @@ class HexForageVectorEnv(AntVectorEnv):
     num_envs: How many; each takes 4 bytes for each cell of its world.
     world: As of `HexForageEnv`, or a list of worlds of the same ranges: environment i lives in
         number i modulo their number.
-    autoreset_mode: What follows the end of an episode, `gymnasium.vector.AutoresetMode` or its
-        name. "NextStep": the next step begins an episode, whatever the action. "SameStep": the step
-        that ends one begins the next; `infos["final_obs"]` and `infos["final_info"]` tell how it
-        ended. "Disabled": the caller resets with `options={"reset_mask": ended}`.
+    autoreset_mode: A `gymnasium.vector.AutoresetMode` or its name; the default is "NextStep".
     max_episode_steps: Another step limit, as `gymnasium.make` has; the lower one counts.
     All others: as of `HexForageEnv`; `render` draws all worlds.
-
-    Raises:
-        AntsError: An argument is not allowed, or the task has what only colonies have.
     """
 
     metadata = METADATA

@@ -31,9 +31,6 @@ class Shown:
         space: The space of one ant. "cells": MultiDiscrete (k,), int64: the k parts of a state.
             "index": Discrete, the state itself. "one_hot": Box (sum of the sizes of all parts,),
             float32: a 1 for each part, at its value, as `gymnasium.spaces.flatten` of "cells".
-
-    Raises:
-        AntsError: There is no such format, or one_hot would take too much memory.
     """
 
     def __init__(self, observation: Observation, form: ObservationFormat) -> None:
@@ -90,8 +87,8 @@ def tabulate(
 ) -> npt.NDArray[np.float32]:
     """The table of a policy that is a function of what an ant sees.
 
-    The function is called once, with all states. Its table does what the function does, but
-    greedily: of a policy with probabilities it keeps the most probable action.
+    The function is called once, with all states. The table acts greedily: of a policy with
+    probabilities it keeps the most probable action.
 
         table = tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
 
@@ -104,9 +101,6 @@ def tabulate(
 
     Returns:
         Action values, float32 (n_states, 5). Of actions: 1 for the action, 0 for the others.
-
-    Raises:
-        AntsError: There is no such observation or format, or the function returns something else.
     """
     if not callable(function):
         raise AntsError(f"function is {shown(function)}; it must be a function of what is seen.")

@@ -274,11 +274,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         return infos | {f"_{name}": have.copy() for name in facts}
 
     def render(self) -> tuple[Any, ...] | None:
-        """A picture or a text map of each world, see `render_mode`; None without one.
-
-        Raises:
-            ResetNeeded: No episode has begun.
-        """
+        """A picture or a text map of each world, see `render_mode`; None without one."""
         if self.render_mode is None:
             return None
         if self._over is None:

@@ -29,9 +29,6 @@ class Traffic(Settings, path="task.traffic"):
     places with the ant on it, if that ant has no food, does not move itself, and does not pick up a
     food in view; the ant that is pushed is paid as for a move onto an empty cell. With `follow`, a
     queue moves as one; a ring of ants that want each other's cells stays where it is.
-
-    Raises:
-        AntsError: A value is not a flag, or would change nothing.
     """
 
     swap: Annotated[bool, Is("let ants with food change places with ants without")] = False
@@ -55,7 +52,7 @@ class Traffic(Settings, path="task.traffic"):
 
     @classmethod
     def named(cls) -> Mapping[str, Traffic]:
-        """Values that have names."""
+        """Values that have names: "blocking", "right_of_way" and "following"."""
         return {
             "blocking": cls(),
             "right_of_way": cls(swap=True),
@@ -74,9 +71,6 @@ class Life(Settings, path="task.life"):
 
     None means that ants do not die, food does not grow back, or food stays. With `regrowth` 0, food
     grows back in the same tick.
-
-    Raises:
-        AntsError: A value is outside its range.
     """
 
     births: Annotated[bool, Is("turn each food item that the queen is given into an ant")] = False
@@ -98,9 +92,6 @@ class Task(Settings, path="task"):
     kernels read. `traffic` may be one of the names of `Traffic.named`. A delivery that "terminates"
     is a terminal state, so its target is the reward alone; the update of one that "truncates"
     bootstraps from what the ant then sees. An episode of one ant ends in both.
-
-    Raises:
-        AntsError: A value is not allowed; the message names it.
     """
 
     observation: Annotated[str, Is("what an ant sees", choices=observations.names)] = "paper"
