@@ -351,21 +351,6 @@ def all_of(cls: Any) -> Iterator[Setting]:
             yield from all_of(one.kind)
 
 
-def table(cls: Any) -> str:
-    """The settings of a class as a table in Markdown, for the documentation."""
-    rows = ["| Setting | Values | Default | Meaning |", "|---|---|---|---|"]
-    for one in all_of(cls):
-        if not one.is_group:
-            unit = f", in {one.rule.unit}" if one.rule.unit else ""
-            usual = one.default if one.rule.usual is None else one.rule.usual
-            default, meaning = "none" if usual is MISSING else f"`{usual!r}`", one.rule.help
-            if one.rule.only is not None:
-                other, *values = one.rule.only
-                meaning += f"; only with `{other}` {' or '.join(map(repr, values))}"
-            rows.append(f"| `{one.path}` | {one.allowed}{unit} | {default} | {meaning} |")
-    return "\n".join(rows)
-
-
 def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     """The end of a message about a name that does not exist, with the names that are near it."""
     several = list(known)

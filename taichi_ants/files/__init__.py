@@ -96,12 +96,7 @@ def check_writable_file(path: PathLike) -> Path:
 
 def write_text(path: PathLike, text: str) -> None:
     """Write text as UTF-8, line ends unchanged."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: PathLike, content: bytes) -> None:
-    """Write a file."""
-    write_atomically(path, lambda file: file.write(content))
+    write_atomically(path, lambda file: file.write(text.encode("utf-8")))
 
 
 def to_json(value: Any, indent: int | None = None) -> str:
@@ -193,15 +188,12 @@ def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Pat
 
     The message names `chosen` instead: the folder above it that a user chose.
     """
-    try:
-        folder = Path(path)
+    folder = Path(path)
+    with writing(chosen or path):
+        if "\0" in str(path):
+            raise OSError("it contains a null character")
         folder.mkdir(parents=True, exist_ok=True)
         _try_to_write(folder)
-    except (OSError, ValueError) as error:
-        raise AntsError(
-            f"cannot write to the folder {named(chosen or path)}: {_reason(error)}; choose another "
-            "folder."
-        ) from error
     return folder
 
 
@@ -231,7 +223,7 @@ def _target_of(path: PathLike) -> Path:
     """Return the regular file that a path names, links followed; it need not exist."""
     expect("path", path, str, os.PathLike)
     if "\0" in os.fspath(path):
-        raise AntsError(f"{named(path)} contains a null character; name a file to write to.")
+        raise OSError("it contains a null character")
     target = Path(os.path.realpath(path))
     # Replacing a device, a pipe or a folder would destroy it or fail.
     if str(path).endswith(os.sep) or (target.exists() and not target.is_file()):

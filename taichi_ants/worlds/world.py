@@ -132,9 +132,6 @@ class World:
             seed: Any whole number; decides cells (ties of distance), and headings of placed ants.
             n: Number of ants, at least 1. If fewer than the listed ants, the first of these.
             where: "nest": on the free cells nearest to the queen. "spread": on any free cells.
-
-        Raises:
-            AntsError: An argument is not allowed, or too few cells are free.
         """
         seed, n = whole("seed", seed), whole("n", n)
         if n < 1:
