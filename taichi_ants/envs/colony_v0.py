@@ -187,14 +187,10 @@ class HexColonyParallelEnv(ParallelEnv):
         self, names: list[str], slots: list[int]
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Return observations and infos of the agents in these slots."""
-        worlds = self._worlds
-        states = worlds.colony.states[0, slots]
-        observations = dict(zip(names, worlds.shown.show(states), strict=True))
-        masks, events = worlds.action_masks()[0, slots], worlds.events[0, slots]
-        said = zip(names, states.astype(np.int64), masks, events, strict=True)
+        facts = {key: values[slots] for key, values in self._worlds.facts().items()}
+        observations = dict(zip(names, self._worlds.shown.show(facts["state"]), strict=True))
         infos = {
-            name: {"state": state, "action_mask": mask, "event": event}
-            for name, state, mask, event in said
+            name: {key: values[k] for key, values in facts.items()} for k, name in enumerate(names)
         }
         return observations, infos
 

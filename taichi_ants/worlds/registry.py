@@ -108,10 +108,9 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
     if builder is None:
         if os.path.exists(name_or_path):
             return load_map(name_or_path)
-        known = ", ".join(names())
         raise AntsError(
             f"there is no world named {shown(os.fspath(name_or_path))} and no such file; choose "
-            f"one of {known}, or give the path of a map file."
+            f"one of {', '.join(names())}, or give the path of a map file."
         )
     try:
         world = builder(**given, **({"seed": seed} if is_drawn(name_or_path) else {}))
