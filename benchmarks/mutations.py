@@ -199,13 +199,13 @@ MUTATIONS = [
         "2",
         "tests/worlds/test_world_validation.py",
     ),
-    ("worlds/starts.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
-    ("worlds/geometry.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
+    ("worlds/world.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
+    ("worlds/world.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
     ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
     # Settings.
     ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
     ("settings.py", "elif value != one.default:", "elif False:", SETTINGS),
-    ("settings.py", "if math.isfinite(value) else None", "", SETTINGS),
+    ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "made[one.name] = one.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
 ]

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
+    from taichi_ants.envs.formats import tabulate
     from taichi_ants.envs.minari_data import from_minari, to_minari
-    from taichi_ants.envs.tabulation import tabulate
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
@@ -34,7 +34,7 @@ _NAMES_IN = {
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
     "engines.runs.training": ("continue_training", "evaluate", "train"),
     "envs.minari_data": ("from_minari", "to_minari"),
-    "envs.tabulation": ("tabulate",),
+    "envs.formats": ("tabulate",),
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
     "learners.policies": ("load_policy", "save_policy"),

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,12 +20,11 @@ from taichi_ants.errors import (
     shown,
     whole,
 )
-from taichi_ants.learners.config import TrainingConfig, share_of_one
+from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import checked_values
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
-from taichi_ants.worlds.starts import STARTS
-from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import STARTS, World
 
 if TYPE_CHECKING:
     from taichi_ants.learners.learner import Learner
@@ -109,11 +109,8 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     """One seed or several different ones as a tuple."""
     if isinstance(seeds, np.ndarray):
         seeds = seeds.ravel().tolist()
-    # Text can be iterated over too, but is no sequence of numbers.
-    given = (
-        seeds if isinstance(seeds, Iterable) and not isinstance(seeds, (str, bytes)) else (seeds,)
-    )
-    several = tuple(whole("a seed", seed) for seed in given)
+    given = entries_of(seeds)
+    several = tuple(whole("a seed", seed) for seed in ([seeds] if given is None else given))
     if not several:
         raise AntsError("seeds is empty; give at least one whole number.")
     taken: set[int] = set()
@@ -145,7 +142,7 @@ def checked_max_steps(value: int, task: Task) -> int:
 
 def checked_share(name: str, value: float) -> float:
     """A number from 0 to 1."""
-    if not share_of_one(value):
+    if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= value <= 1:
         raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
     return float(value)
 

@@ -17,13 +17,12 @@ _MOST_CHARACTERS = 1000  # of a message
 class AntsError(ValueError):
     """Something that the caller asked for cannot be done.
 
-    Its message is one sentence that names the value, what is allowed and what to do. The command
-    lines print it on standard error and exit with status 2; library users catch it as a
-    `ValueError`. Where a value makes it very long, its middle is left out.
+    Its message is one sentence that names the value, what is allowed and what to do; the middle of
+    a very long one is left out. Command lines print it on standard error and exit with status 2.
     """
 
     def __init__(self, message: object) -> None:
-        # Other libraries raise an exception anew from itself: `type(error)(error)`.
+        # Other libraries copy an exception as `type(error)(error)`, so it may not be text.
         super().__init__(without_middle(str(message)))
 
 
@@ -34,7 +33,7 @@ def without_middle(message: str, most: int = _MOST_CHARACTERS) -> str:
 
 
 def unusable(thing: Any, fault: object) -> AntsError:
-    """What says that a learner or an observation cannot be used."""
+    """The error of a learner or an observation that cannot be used."""
     kind, said = type(thing).__name__, str(fault).replace(".)", ")")
     return AntsError(f"{kind.lower()} {thing.name!r} cannot be used: {said}; see help({kind}).")
 
@@ -154,12 +153,9 @@ def check_array(name: str, value: Any, dtype: str | np.dtype, shape: tuple[int, 
 def expect(name: str, value: object, *kinds: type) -> None:
     """Raises AntsError, naming the value `name`, if it is of none of the kinds."""
     if not isinstance(value, kinds):
-        words = " or ".join(_PLAIN.get(kind.__name__) or _with_article(kind) for kind in kinds)
-        raise AntsError(f"{name} is {shown(value)}; it must be {words}.")
+        names = (kind.__name__ for kind in kinds)
+        words = [_PLAIN.get(n, f"{'an' if n[0] in 'AEIOU' else 'a'} {n}") for n in names]
+        raise AntsError(f"{name} is {shown(value)}; it must be {' or '.join(words)}.")
 
 
 _PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}
-
-
-def _with_article(kind: type) -> str:
-    return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"

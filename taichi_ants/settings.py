@@ -92,9 +92,8 @@ Flag = Annotated[bool, Is()]
 class Setting(NamedTuple):
     """One setting as it was declared.
 
-    `path` is its full name, as in sweep files; `kind` is bool, int, float, str, list, or a class of
-    settings; `words` are those that are allowed, where they are fixed; `default` is MISSING if it
-    has none; `rule` is all that was declared of it.
+    `path` is its full name; `kind` is bool, int, float, str, list, or a class of settings; `words`
+    are those that are allowed, where they are fixed; `default` is MISSING if it has none.
     """
 
     name: str
@@ -107,7 +106,7 @@ class Setting(NamedTuple):
 
     @property
     def is_group(self) -> bool:
-        """Whether it is a class of settings itself."""
+        """Whether it is a class of settings."""
         return issubclass(self.kind, Settings)
 
     @property
@@ -146,21 +145,15 @@ class Setting(NamedTuple):
 
     def _converted(self, value: Any) -> Any:
         """The value as one of the kind; None if it is of another one."""
-        flag = is_flag(value)
-        if self.kind is bool:
-            return bool(value) if flag else None
-        if self.kind is int:
-            try:
-                return None if flag else operator.index(value)
-            except TypeError:
-                return None
-        if self.kind is float:
-            if flag or not isinstance(value, Real):
-                return None
-            try:
-                return float(value) if math.isfinite(value) else None
-            except OverflowError:  # an integer beyond all floats
-                return None
+        if self.kind is bool or is_flag(value):
+            return bool(value) if self.kind is bool and is_flag(value) else None
+        try:
+            if self.kind is int:
+                return operator.index(value)
+            if self.kind is float:
+                return float(value) if isinstance(value, Real) and math.isfinite(value) else None
+        except (TypeError, OverflowError):  # the latter of integers beyond all floats
+            return None
         if self.kind is str:
             allowed = self.allowed_words
             fits = isinstance(value, str) and (not allowed or value in allowed)
@@ -217,6 +210,7 @@ class Settings:
 
     `path` is the full name of the settings, as in sweep files and messages. The names that a class
     returns from `named` are taken for their values wherever the class is a setting of another one.
+    AntsError if a value is outside its range, or would change nothing.
     """
 
     path: ClassVar[str] = ""
@@ -234,7 +228,7 @@ class Settings:
         return {}
 
     def check(self) -> None:
-        """Take each value as one of its kind; AntsError if one is wrong, or changes nothing."""
+        """Take each value as one of its kind."""
         for one in declared(type(self)):
             object.__setattr__(self, one.name, one.checked(getattr(self, one.name)))
         for one in declared(type(self)):
@@ -259,7 +253,7 @@ class Settings:
         """The same with some changes; settings that mean nothing any more have their defaults.
 
         A group can be changed by a mapping of its own settings, in which "" names the value to
-        start from. AntsError as for the class, or if there is no such setting.
+        start from.
         """
         return self._changed(changes)
 
@@ -294,10 +288,7 @@ _DECLARED: dict[Any, tuple[Setting, ...]] = {}
 
 
 def declared(cls: Any) -> tuple[Setting, ...]:
-    """The settings of a class, in the order of its fields, or of a function's arguments.
-
-    Fields and arguments that are not declared with an `Is` are left out.
-    """
+    """The settings of a class or function: its fields or arguments with an `Is`, in order."""
     if cls not in _DECLARED:
         _DECLARED[cls] = tuple(_read(cls))
     return _DECLARED[cls]
@@ -319,7 +310,6 @@ def _read(cls: Any) -> Iterator[Setting]:
 
 
 def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
-    """The fields of a class or the arguments of a function, with their defaults or MISSING."""
     if isinstance(cls, type):
         for one in fields(cls):
             usual = one.default if one.default_factory is MISSING else one.default_factory()
@@ -359,21 +349,6 @@ def all_of(cls: Any) -> Iterator[Setting]:
         yield one
         if one.is_group:
             yield from all_of(one.kind)
-
-
-def table(cls: Any) -> str:
-    """The settings of a class as a table in Markdown, for the documentation."""
-    rows = ["| Setting | Values | Default | Meaning |", "|---|---|---|---|"]
-    for one in all_of(cls):
-        if not one.is_group:
-            unit = f", in {one.rule.unit}" if one.rule.unit else ""
-            usual = one.default if one.rule.usual is None else one.rule.usual
-            default, meaning = "none" if usual is MISSING else f"`{usual!r}`", one.rule.help
-            if one.rule.only is not None:
-                other, *values = one.rule.only
-                meaning += f"; only with `{other}` {' or '.join(map(repr, values))}"
-            rows.append(f"| `{one.path}` | {one.allowed}{unit} | {default} | {meaning} |")
-    return "\n".join(rows)
 
 
 def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
@@ -417,16 +392,12 @@ def nested(named: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _kind_of(hint: Any) -> tuple[type, tuple[str, ...], bool]:
-    """The kind, its words, and whether it may be None."""
-    optional = False
-    if get_origin(hint) in (Union, UnionType):
+    optional = get_origin(hint) in (Union, UnionType)
+    if optional:
         (hint,) = [one for one in get_args(hint) if one is not NoneType]
-        optional = True
     if get_origin(hint) is Literal:
         return str, get_args(hint), optional
-    if get_origin(hint) is Sequence:
-        return list, (), optional
-    return hint, (), optional
+    return list if get_origin(hint) is Sequence else hint, (), optional
 
 
 def _below(path: str, name: object) -> str:

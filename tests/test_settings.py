@@ -15,7 +15,7 @@ import pytest
 from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, learners
-from taichi_ants.settings import Is, Setting, Settings, all_of, declared, nested, table
+from taichi_ants.settings import Is, Setting, Settings, all_of, declared, nested
 from taichi_ants.task import Pheromone, Task, Traffic
 from taichi_ants.worlds import double_bridge, open_world
 
@@ -86,6 +86,21 @@ class Soup(Settings, path="kitchen.soup"):
     ] = None
     salt: Annotated[int, Is("of salt", unit="g", least=0, most=20_000), Is(most=50_000)] = 3
     note: str = ""  # not a setting
+
+
+def table(cls: type) -> str:
+    """The settings of a class as a table of the documentation, in Markdown."""
+    rows = ["| Setting | Values | Default | Meaning |", "|---|---|---|---|"]
+    for one in all_of(cls):
+        if not one.is_group:
+            unit = f", in {one.rule.unit}" if one.rule.unit else ""
+            usual = one.default if one.rule.usual is None else one.rule.usual
+            default, meaning = "none" if usual is MISSING else f"`{usual!r}`", one.rule.help
+            if one.rule.only is not None:
+                other, *values = one.rule.only
+                meaning += f"; only with `{other}` {' or '.join(map(repr, values))}"
+            rows.append(f"| `{one.path}` | {one.allowed}{unit} | {default} | {meaning} |")
+    return "\n".join(rows)
 
 
 def refused(make) -> str:

@@ -16,5 +16,5 @@ register(
 )
 register(
     "taichi_ants/HexColony-v0",
-    vector_entry_point="taichi_ants.envs.colony_vector:HexColonyVectorEnv",
+    vector_entry_point="taichi_ants.envs.colony:HexColonyVectorEnv",
 )

@@ -1,4 +1,4 @@
-"""Worlds of ants whose actions are given: what the environments of a colony have in common."""
+"""Worlds of ants whose actions are given, and the vector environment in which each is one."""
 
 from __future__ import annotations
 
@@ -7,30 +7,27 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.envs.arguments import worlds_of
-from taichi_ants.envs.forage import ACTION_MASKS
-from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.errors import check_one_of, checked_flag
+from taichi_ants.envs.formats import ObservationFormat
+from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, Worlds
+from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.task import Task
-from taichi_ants.task.constants import RIGHT
+from taichi_ants.task.constants import N_ACTIONS, RIGHT
 from taichi_ants.task.events import Event
-from taichi_ants.worlds import World
 
 # The usual length of an episode of a colony, in ticks.
 MAX_STEPS = 1000
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
-class ColonyWorlds:
+class ColonyWorlds(Ants):
     """W worlds of ants that do what is given; all arrays are by world and slot, (W, slots).
 
     Attributes:
         colony: The ants.
-        shown: How they show what they see.
-        max_steps: Ticks of an episode.
         acted: Which slots held an ant that acted in the last step.
         rewards: float64, what that paid.
         events: The result, int64, an `Event`; NONE where no ant acted.
@@ -38,7 +35,7 @@ class ColonyWorlds:
 
     def __init__(
         self,
-        world: str | World | Sequence[str | World],
+        world: Worlds,
         n_worlds: int,
         task: Task | None,
         ants: int,
@@ -48,19 +45,16 @@ class ColonyWorlds:
         observation_format: ObservationFormat,
         evaporation: bool | None,
         render_mode: str | None,
+        max_episode_steps: int | None = None,
     ) -> None:
         task = checks.checked_task(Task() if task is None else task)
-        falls = task.evaporation_in_training
-        if evaporation is not None:
-            falls = checked_flag("evaporation", evaporation)
-        if render_mode is not None:
-            check_one_of("render_mode", render_mode, METADATA["render_modes"])
-        self.max_steps = checks.checked_max_steps(max_steps, task)
-        worlds = worlds_of(world, n_worlds)
-        self.shown = Shown(task.sees, observation_format)
+        super().__init__(
+            *(world, n_worlds, task, max_steps, max_episode_steps, observation_format),
+            *(evaporation, render_mode, METADATA["render_modes"]),
+        )
         self.colony = Colony(
-            [worlds[w % len(worlds)] for w in range(n_worlds)],
-            replace(task, evaporation_in_evaluation=falls),
+            [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
+            replace(task, evaporation_in_evaluation=self.evaporates),
             training=None,
             seeds=range(n_worlds),
             ants=ants,
@@ -71,7 +65,7 @@ class ColonyWorlds:
         shape = n_worlds, self.colony.capacity
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
         self.events = np.full(shape, Event.NONE, np.int64)
-        self._scene: Any = None
+        self._last: dict[str, np.ndarray] = {}
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
         """Begin an episode in some worlds, `which` bool (W,).
@@ -88,6 +82,7 @@ class ColonyWorlds:
             self.colony.begin_some(new, given)
         if (which & ~new).any():
             self.colony.begin_some(which & ~new)
+        self.events = np.where(which[:, None], Event.NONE, self.events)
 
     def step(self, actions: np.ndarray) -> None:
         """Let each ant do what is given, integers 0 to 4; stopped worlds stand still."""
@@ -103,6 +98,39 @@ class ColonyWorlds:
         """In which worlds the episode has come to its last step, bool (W,)."""
         return self.colony.episode_ticks >= self.max_steps
 
+    def advance(
+        self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Let all ants act; see the base."""
+        self.step(actions.reshape(self.acted.shape))
+        rewards, ended = self.rewards.reshape(-1), self.ended & ~waiting
+        truncated = np.repeat(ended, self.colony.capacity)
+        terminated = (self.events.reshape(-1) == Event.DELIVERED) & (
+            self.task.delivery == "terminates"
+        )
+        if mode is AutoresetMode.SAME_STEP:
+            begins = ended
+            if (terminated | truncated).any():
+                self._last = self.facts()
+        else:
+            begins = waiting
+            self.colony.stop(ended)
+        if begins.any():
+            self.begin(begins)
+        return rewards, terminated, truncated
+
+    def facts(self, last: bool = False) -> dict[str, np.ndarray]:
+        """The infos of all slots; see the base."""
+        return (
+            self._last
+            if last
+            else {
+                "state": self.colony.states.reshape(-1).astype(np.int64),
+                "action_mask": self.action_masks().reshape(-1, N_ACTIONS),
+                "event": self.events.reshape(-1),
+            }
+        )
+
     def action_masks(self) -> np.ndarray:
         """Which actions can succeed, int8 (W, slots, 5).
 
@@ -110,7 +138,7 @@ class ColonyWorlds:
         all. Whether it does succeed depends on what the others do in the same tick. In a dead end
         the moves count, which turn the ant.
         """
-        colony, traffic = self.colony, self.colony.task.traffic
+        colony, traffic = self.colony, self.task.traffic
         masks = ACTION_MASKS.take(colony.percepts, axis=0, mode="clip")
         if traffic.shared:
             base = np.arange(len(masks))[:, None] * colony.grid.size
@@ -123,26 +151,87 @@ class ColonyWorlds:
             masks[..., : RIGHT + 1] |= enters
         return masks
 
-    def render(self) -> tuple[np.ndarray, ...]:
-        """A picture of each world, uint8 (height, width, 3)."""
+    def draw(self, world: int) -> np.ndarray:
+        """A picture of a world, uint8 (height, width, 3)."""
         from taichi_ants.rendering import Scene, Status
 
         if self._scene is None:
             self._scene = Scene(self.colony.grid)
-        pictures = []
-        deliveries = self.colony.deliveries
-        for world, ticks in enumerate(self.colony.episode_ticks.tolist()):
-            snapshot = self.colony.snapshot(world)
-            lines = {
-                "step": ticks,
-                "ants": len(snapshot.ant_cells),
-                "with food": snapshot.ant_carries.sum(),
-                "delivered": deliveries[world],
-            }
-            status = Status(tuple((name, str(value)) for name, value in lines.items()))
-            pictures.append(self._scene.draw(snapshot, status))
-        return tuple(pictures)
+        snapshot = self.colony.snapshot(world)
+        lines = {
+            "step": self.colony.episode_ticks[world],
+            "ants": len(snapshot.ant_cells),
+            "with food": snapshot.ant_carries.sum(),
+            "delivered": self.colony.deliveries[world],
+        }
+        status = Status(tuple((name, str(value)) for name, value in lines.items()))
+        return self._scene.draw(snapshot, status)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """All but what draws, which is made when it is used."""
-        return {**vars(self), "_scene": None}
+
+class HexColonyVectorEnv(AntVectorEnv):
+    """Ants of one or more worlds, each of them an environment of a `gymnasium.vector.VectorEnv`.
+
+    Environment number w * ants + i is ant number i of world number w. The ants of a world share its
+    cells, its food and its trails, and act at the same time. Any library that trains one agent on a
+    vector environment so trains one policy that all ants follow ("parameter sharing"). Actions,
+    observations and rewards are those of `HexForageEnv`, infos those of `HexForageVectorEnv` except
+    `reason`; each ant gets what its own action pays, and its mask is 1 for what can succeed if no
+    other ant is faster.
+
+    ## Episode End
+    After `max_steps` steps all ants of a world are truncated at once. A delivery ends nothing in
+    the world; its ant goes on from where it stands. If the task's delivery is "terminates", the
+    default, the delivering ant is nevertheless `terminated`, and its next observation begins its
+    next episode: what comes later is not credited to the delivery. Since it begins in the step in
+    which it ends, this needs the autoreset mode `SAME_STEP`; with delivery "truncates" no ant is
+    ever terminated, and all modes are possible. All three modes reset whole worlds.
+
+    ## Arguments
+    num_envs: How many ants there are in all worlds together, a multiple of `ants`.
+    world: A registered name, the path of a map, a `World`, or a list of these, of the same
+        ranges: world number w is number w modulo their number.
+    task: The rules; None: the paper's. Ants are neither born nor do they die here.
+    ants: How many live in each world.
+    start, max_steps, observation_format, evaporation: As of `HexColonyParallelEnv`.
+    autoreset_mode, max_episode_steps: As of `HexForageVectorEnv`.
+    render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
+    """
+
+    metadata = METADATA
+
+    def __init__(
+        self,
+        num_envs: int = 64,
+        world: Worlds = "paper",
+        task: Task | None = None,
+        ants: int = 64,
+        start: str = "nest",
+        max_steps: int = MAX_STEPS,
+        observation_format: ObservationFormat = "cells",
+        evaporation: bool | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.SAME_STEP,
+        render_mode: str | None = None,
+        max_episode_steps: int | None = None,
+    ) -> None:
+        n, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
+        if n % ants:
+            raise AntsError(
+                f"num_envs is {num_envs}; it counts ants, so make it a multiple of ants, {ants}."
+            )
+        worlds = ColonyWorlds(
+            *(world, n // ants, task, ants, start, None, max_steps),
+            *(observation_format, evaporation, render_mode, max_episode_steps),
+        )
+        super().__init__(worlds, n // ants, n, autoreset_mode, render_mode)
+        rules = worlds.task
+        if rules.life.births or rules.life.lifespan is not None:
+            raise AntsError(
+                f"life of the task is {rules.life}; a vector environment has a fixed number of "
+                "ants, so leave out births and lifespan, or take the parallel_env of colony_v0."
+            )
+        same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
+        if rules.delivery == "terminates" and not same_step:
+            raise AntsError(
+                f"autoreset_mode is {self.autoreset_mode.value!r}, but an ant that delivers goes "
+                'on at once; take "SameStep", or a task with delivery "truncates".'
+            )

@@ -14,7 +14,6 @@ from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life, Task
 from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
 try:
@@ -34,21 +33,14 @@ class HexColonyParallelEnv(ParallelEnv):
     All agents act at once. Actions, observations and rewards are those of `HexForageEnv`; each ant
     gets what its own action pays. `state()` is a map of the whole world, for centralised critics.
 
-    ## Starting State
-    The world as it is drawn. The ants that it lists come first; all others start where `start`
-    says, on cells and with headings that the seed decides.
-
     ## Episode End
     An ant that dies of age is terminated, and leaves `agents`; its number does not come back. After
     `max_steps` steps all are truncated. A delivery ends nothing, whatever the task's `delivery`
     says: its ant goes on, and `info["event"]` is DELIVERED.
 
     ## Info
-    - `state`: int64, the state as a number.
-    - `action_mask`: int8 (5,), 1 for what can succeed if no other ant is faster; in a dead end for
-      the moves, which turn the ant.
-    - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset` and
-      in the step of an ant's birth.
+    As of `HexForageEnv`, without `reason`. The `action_mask` is 1 for what can succeed if no other
+    ant is faster; `event` is NONE in the step of an ant's birth, too.
 
     ## Arguments
     world: A registered name, the path of a map, or a `World`.
@@ -65,9 +57,6 @@ class HexColonyParallelEnv(ParallelEnv):
     possible_agents: All that can ever live in one episode: the ants that start, and as many as
         food can become, see `most_births`.
     agents: Those that live now; only after the first reset.
-
-    Raises:
-        AntsError: An argument is not allowed.
     """
 
     metadata: ClassVar[dict] = {**METADATA, "name": "colony_v0", "is_parallelizable": True}
@@ -128,7 +117,6 @@ class HexColonyParallelEnv(ParallelEnv):
         self._worlds.begin(np.ones(1, bool), [seed])
         self._slots = list(range(self._worlds.colony.ants))  # of the agents
         self.agents = self._names(self._slots)
-        self._worlds.events[:] = Event.NONE
         return self._told(self.agents, self._slots)
 
     @property
@@ -199,14 +187,10 @@ class HexColonyParallelEnv(ParallelEnv):
         self, names: list[str], slots: list[int]
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Return observations and infos of the agents in these slots."""
-        worlds = self._worlds
-        states = worlds.colony.states[0, slots]
-        observations = dict(zip(names, worlds.shown.show(states), strict=True))
-        masks, events = worlds.action_masks()[0, slots], worlds.events[0, slots]
-        said = zip(names, states.astype(np.int64), masks, events, strict=True)
+        facts = {key: values[slots] for key, values in self._worlds.facts().items()}
+        observations = dict(zip(names, self._worlds.shown.show(facts["state"]), strict=True))
         infos = {
-            name: {"state": state, "action_mask": mask, "event": event}
-            for name, state, mask, event in said
+            name: {key: values[k] for key, values in facts.items()} for k, name in enumerate(names)
         }
         return observations, infos
 
@@ -229,7 +213,7 @@ class HexColonyParallelEnv(ParallelEnv):
         """A picture, uint8 (height, width, 3); None without a render mode."""
         if not self._begun:
             EnvLogger.error_render_before_reset()
-        return None if self.render_mode is None else self._worlds.render()[0]
+        return None if self.render_mode is None else self._worlds.draw(0)
 
 
 def most_births(life: Life, foods: int, ticks: int) -> int:

@@ -3,50 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.error import InvalidAction, ResetNeeded
-from gymnasium.spaces import Discrete, MultiDiscrete
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
+from gymnasium.spaces import Discrete
+from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
+from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
-from taichi_ants.envs.arguments import (
-    StepLimit,
-    checked_actions,
-    checked_autoreset,
-    checked_reset_mask,
-    lower_limit,
-    seeds_of,
-    worlds_of,
-)
-from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
+from taichi_ants.envs.formats import ObservationFormat
+from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, StepLimit, Worlds
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
 from taichi_ants.task import Task
 from taichi_ants.task.constants import (
     EMPTY,
     EPISODE_STEPS,
     FOOD,
-    GIVE,
     N_ACTIONS,
-    N_STATES,
     OBSTACLE,
-    PICK_UP,
     QUEEN,
 )
-from taichi_ants.task.events import Event, Reason
-from taichi_ants.task.states import state_from_index
 from taichi_ants.worlds import World, text_map
 
-if TYPE_CHECKING:
-    from taichi_ants.engines.records import Snapshot
-    from taichi_ants.rendering import Scene
-
 DELIVERIES = ("terminates", "truncates", "continues")
-RENDER_MODES = ("rgb_array", "ansi")
+METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "ansi"], "render_fps": 10}
 _GROUNDS = {
     EMPTY: text_map.EMPTY,
     OBSTACLE: text_map.OBSTACLE,
@@ -55,86 +38,79 @@ _GROUNDS = {
 }
 # Of all environments together, with room for some more: 4 GiB.
 _MOST_CELLS = (1 << 30) - (1 << 24)
-
-
-def _action_masks() -> np.ndarray:
-    """What can succeed, by percept: int8 (128, 5)."""
-    masks = np.zeros((N_STATES, N_ACTIONS), np.int8)
-    for percept, mask in enumerate(masks):
-        state = state_from_index(percept)
-        mask[:PICK_UP] = [code % 2 == 0 for code in state.view]  # E, T and S can be entered
-        mask[GIVE if state.carries else PICK_UP] = 3 in state.view
-        if not mask.any():  # a dead end, which an ant leaves by turning
-            mask[:PICK_UP] = 1
-    return masks
-
-
-ACTION_MASKS = _action_masks()
 # Rows as single numbers of 8 bytes, which NumPy takes three times as fast.
 _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
 
 
-class _Ants:
-    """What both environments have: the ants, what they see, and what is said of them."""
+class LoneAnts(Ants):
+    """n ants, each in a world of its own; all of them do a step in one launch."""
 
     def __init__(
         self,
         n: int,
-        world: str | World | Sequence[World],
+        world: Worlds,
         task: Task | Mapping[str, Any] | None,
         delivery: str | None,
         evaporation: bool | None,
         max_steps: int,
         observation_format: ObservationFormat,
         render_mode: str | None,
+        max_episode_steps: int | None = None,
     ) -> None:
         task = Task.from_dict(task) if isinstance(task, Mapping) else task  # as JSON holds it
-        self.task = checks.checked_runs_task(task)
-        delivery = self.task.delivery if delivery is None else delivery
+        task = checks.checked_runs_task(task)
+        super().__init__(
+            *(world, n, task, max_steps, max_episode_steps, observation_format, evaporation),
+            *(render_mode, METADATA["render_modes"]),
+        )
+        delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
-        falls = self.task.evaporation_in_training
-        if evaporation is not None:
-            falls = checked_flag("evaporation", evaporation)
-        if render_mode is not None:
-            check_one_of("render_mode", render_mode, RENDER_MODES)
-        self.max_steps = max_steps = checks.checked_max_steps(max_steps, self.task)
-        self.shown = Shown(self.task.sees, observation_format)
-        worlds = worlds_of(world, n)
-        most = _MOST_CELLS // worlds[0].grid.size
+        most = _MOST_CELLS // self.worlds[0].grid.size
         if n > most:
             raise AntsError(f"num_envs is {n}; of this world there can be at most {most} at once.")
-        self.batched = BatchedEnvironments(worlds, self.task, n, max_steps, delivery, falls)
-        self._seeded, self._render_mode = False, render_mode
-        self._scene: Scene | None = None
+        self._text = render_mode == "ansi"
+        self.batched = BatchedEnvironments(
+            self.worlds, task, n, self.max_steps, delivery, self.evaporates
+        )
 
-    def seed(
-        self, seeds: Sequence[int | None], which: np.ndarray, chance: np.random.Generator
-    ) -> None:
-        """Seed those ants, of bool (n,), that are given a seed; by chance if none ever was."""
-        if not self._seeded and None in seeds:
-            first = int(chance.integers(2**62))
-            seeds = [first + i if seed is None else seed for i, seed in enumerate(seeds)]
+    def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
+        """Begin an episode of the ants `which`, bool (n,), those with a seed by their seed."""
         given = {i: one for i, one in enumerate(seeds) if which[i] and one is not None}
         if given:
             self.batched.seed(list(given.values()), np.array(list(given)))
-        self._seeded = True
+        self.batched.begin(which)
 
-    def observations(self) -> np.ndarray:
-        """What the ants see, (n, ...)."""
-        return self.shown.show(self.batched.arrays["states"])
+    def advance(
+        self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Let all ants act; see the base."""
+        begins = waiting if mode is AutoresetMode.NEXT_STEP else 0
+        self.batched.step(actions, begins, same_step=mode is AutoresetMode.SAME_STEP)
+        arrays = self.batched.arrays
+        ends = (arrays[name].astype(bool) for name in ("terminations", "truncations"))
+        return arrays["rewards_of"].copy(), *ends
 
-    def draw(self, number: int) -> Any:
-        """The world of an ant: uint8 (720, 1280, 3), or text; None without a render mode."""
-        if self._render_mode is None:
-            return None
+    def facts(self, last: bool = False) -> dict[str, np.ndarray]:
+        """The infos of all ants; see the base."""
+        arrays, when = self.batched.arrays, "final_" if last else ""
+        packed = _PACKED_MASKS.take(arrays[f"{when}percepts"], mode="clip")
+        return {
+            "state": arrays[f"{when}states"].astype(np.int64),
+            "action_mask": packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS],
+            "event": arrays["events"].astype(np.int64),
+            "reason": arrays["reasons"].astype(np.int64),
+        }
+
+    def draw(self, world: int) -> Any:
+        """The world of an ant: uint8 (720, 1280, 3), or text."""
         arrays, sees = self.batched.arrays, self.task.sees
-        now, state = self.batched.snapshot(number), int(arrays["states"][number])
+        now, state = self.batched.snapshot(world), int(arrays["states"][world])
         facts = (
-            ("step", str(arrays["steps"][number])),
-            ("reward", f"{arrays['rewards_of'][number]:g}"),
+            ("step", str(arrays["steps"][world])),
+            ("reward", f"{arrays['rewards_of'][world]:g}"),
             ("state", sees.name_of(state)),
         )
-        if self._render_mode == "ansi":
+        if self._text:
             return f"; {', '.join(map(' '.join, facts))}\n{_text_of(now)}"
         from taichi_ants import rendering
 
@@ -142,9 +118,6 @@ class _Ants:
             strongest = self.task.pheromone.level
             self._scene = rendering.Scene(now.grid, view=True, strongest=strongest)
         return self._scene.draw(now, rendering.Status(facts, state, observation=sees))
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_scene": None}  # it is drawn anew
 
 
 def _text_of(now: Snapshot) -> str:
@@ -162,11 +135,7 @@ def _text_of(now: Snapshot) -> str:
 class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     """One ant on a hexagonal grid looks for food and carries it to its queen.
 
-    ## Description
-    The ant stands on a cell and looks along one of six headings. It sees the three cells ahead:
-    left, forward and right. It picks up a food in view, finds its way back and gives the food to
-    the queen. With food it lays a trail, which it sees later without food. The rules are those of
-    "Ants and Reinforcement Learning Algorithms", see `docs/environments.md`.
+    The rules, those of "Ants and Reinforcement Learning Algorithms", are in `docs/environments.md`.
 
     ## Observation Space
     By `observation_format`, for a task whose observation has states of parts (p1, ..., pk), in the
@@ -183,43 +152,29 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     in view, 4 gives the food to the queen in view. A move that is blocked turns the ant all the
     same.
 
-    ## Rewards
-    As the task pays, by default 0 for a step onto an empty cell, 1 onto a cell that was seen as 2,
-    3 for a pick-up, 10 for a delivery, and -1 for an action that fails.
-
-    ## Starting State
-    The world as it was given, with the ant where the world lists it; else beside the queen, at a
-    place and with a heading that the seed decides.
-
-    ## Episode End
-    Terminated when the food is delivered ("terminates"); truncated then ("truncates"); or neither:
-    food grows back at once and the ant goes on ("continues"). Truncated after `max_steps` steps.
-
     ## Info
     - `state`: int64, the state's index.
     - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end for the moves, which
-      turn the ant.
+      turn the ant. `action_masks()` returns it as bool, for MaskablePPO of sb3-contrib.
     - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
     - `reason`: int64, why the action was blocked or failed, a `taichi_ants.envs.Reason`; NONE if
       it did not fail.
 
-    `action_masks()` returns the mask as bool, as MaskablePPO of sb3-contrib asks for it.
-
     ## Arguments
     world: Name of a registered world, path of a text map, its text, or a World.
-    task: The rules, a `taichi_ants.Task`, or its `as_dict()`; None is the paper's.
-    delivery: "terminates", "truncates" or "continues"; None is the task's, by default "terminates".
+    task: The rules, a `taichi_ants.Task`, or its `as_dict()`; None is the paper's. AntsError if it
+        has what only colonies have.
+    delivery: A delivery "terminates" or "truncates" the episode, or it "continues"; None is the
+        task's, by default "terminates".
     evaporation: Whether trails evaporate; None is as the task says of training, by default not.
     max_steps: Steps after which an episode is truncated.
     observation_format: "cells", "index" or "one_hot".
     render_mode: "rgb_array": `render` draws uint8 (720, 1280, 3). "ansi": it writes a text map of
         the world as it is, its heading for the ant.
-
-    Raises:
-        AntsError: An argument is not allowed, or the task has what only colonies have.
     """
 
-    metadata = {"render_modes": list(RENDER_MODES), "render_fps": 10}  # noqa: RUF012
+    metadata = METADATA
+    _ants: LoneAnts
 
     def __init__(
         self,
@@ -231,23 +186,23 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
     ) -> None:
-        self._ants = _Ants(
+        self._ants = LoneAnts(
             *(1, world, task, delivery, evaporation, max_steps, observation_format, render_mode)
         )
-        self.render_mode, self.max_steps = render_mode, self._ants.max_steps
-        self.observation_space = self._ants.shown.space
-        self.action_space = Discrete(N_ACTIONS)
-        self._all, self._over, self._begun = np.ones(1, bool), True, False
+        self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
+        self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
+        self._over, self._begun = True, False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Begin an episode. With a seed, which decides all chance, episodes repeat exactly."""
         super().reset(seed=seed)
-        self._ants.seed([seed], self._all, self.np_random)
-        self._ants.batched.begin(self._all)
+        if seed is None and not self._begun:
+            seed = int(self.np_random.integers(2**63))
+        self._ants.begin(np.ones(1, bool), [seed])
         self._over, self._begun = False, True
-        return self._ants.observations()[0], self._info()
+        return self._seen()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Do an action, 0 to 4.
@@ -258,18 +213,19 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         """
         if self._over:
             raise ResetNeeded("no episode is under way; call reset() before step().")
-        ants, arrays = self._ants, self._ants.batched.arrays
         if not self.action_space.contains(action):
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
-        ants.batched.step(action, begins=0)
+        self._ants.batched.step(action)
+        arrays = self._arrays
         terminated, truncated = bool(arrays["terminations"][0]), bool(arrays["truncations"][0])
         self._over = terminated or truncated
-        reward = float(arrays["rewards_of"][0])
-        return ants.observations()[0], reward, terminated, truncated, self._info()
+        observation, info = self._seen()
+        return observation, float(arrays["rewards_of"][0]), terminated, truncated, info
 
-    def _info(self) -> dict[str, Any]:
-        arrays = self._ants.batched.arrays
-        return {
+    def _seen(self) -> tuple[Any, dict[str, Any]]:
+        """The observation and the info."""
+        arrays = self._arrays
+        return self._ants.shown.show(arrays["states"])[0], {
             "state": np.int64(arrays["states"][0]),
             "action_mask": ACTION_MASKS[arrays["percepts"][0]].copy(),
             "event": np.int64(arrays["events"][0]),
@@ -277,52 +233,34 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         }
 
     def action_masks(self) -> np.ndarray:
-        """Return which actions can succeed now, bool (5,), as `info["action_mask"]` does.
-
-        Raises:
-            ResetNeeded: No episode has begun.
-        """
+        """Return which actions can succeed now, bool (5,), as `info["action_mask"]` does."""
         if not self._begun:
             raise ResetNeeded("no episode is under way; call reset() before action_masks().")
-        return ACTION_MASKS[self._ants.batched.arrays["percepts"][0]].astype(bool)
+        return ACTION_MASKS[self._arrays["percepts"][0]].astype(bool)
 
     def render(self) -> Any:
-        """A picture or a text map of the world as it is, see `render_mode`; None without one.
-
-        Raises:
-            ResetNeeded: No episode has begun.
-        """
+        """A picture or a text map of the world as it is, see `render_mode`; None without one."""
         if not self._begun:
             raise ResetNeeded("no episode is under way; call reset() before render().")
-        return self._ants.draw(0)
+        return None if self.render_mode is None else self._ants.draw(0)
 
 
-class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
+class HexForageVectorEnv(AntVectorEnv):
     """Many ants, each alone in a world of its own: all of them do a step in one launch.
 
-    Environment i is a `HexForageEnv` with seed `seed + i`, step by step. What it sees, is paid and
-    is told is described there; arrays have a leading axis of `num_envs`.
+    Environment i is a `HexForageEnv` with seed `seed + i`, step by step; arrays have a leading axis
+    of `num_envs`, and infos are as those of Gymnasium's own vector environments.
 
     ## Arguments
     num_envs: How many; each takes 4 bytes for each cell of its world.
     world: As of `HexForageEnv`, or a list of worlds of the same ranges: environment i lives in
         number i modulo their number.
-    autoreset_mode: What follows the end of an episode, `gymnasium.vector.AutoresetMode` or its
-        name. "NextStep": the next step begins an episode, whatever the action. "SameStep": the step
-        that ends one begins the next; `infos["final_obs"]` and `infos["final_info"]` tell how it
-        ended. "Disabled": the caller resets with `options={"reset_mask": ended}`.
+    autoreset_mode: A `gymnasium.vector.AutoresetMode` or its name; the default is "NextStep".
     max_episode_steps: Another step limit, as `gymnasium.make` has; the lower one counts.
     All others: as of `HexForageEnv`; `render` draws all worlds.
-
-    ## Info
-    `infos` has an array for each name, and one of the same name with an underscore that tells which
-    environments it is of, as Gymnasium's own vector environments have.
-
-    Raises:
-        AntsError: An argument is not allowed, or the task has what only colonies have.
     """
 
-    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 10}  # noqa: RUF012
+    metadata = METADATA
 
     def __init__(
         self,
@@ -337,125 +275,9 @@ class HexForageVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         max_episode_steps: int | None = None,
     ) -> None:
-        max_steps = lower_limit(max_steps, max_episode_steps)
-        self.num_envs = n = checked_whole("num_envs", num_envs)
-        self.autoreset_mode = checked_autoreset(autoreset_mode)
-        self._ants = _Ants(
-            *(n, world, task, delivery, evaporation, max_steps, observation_format, render_mode)
+        n = checked_whole("num_envs", num_envs)
+        ants = LoneAnts(
+            *(n, world, task, delivery, evaporation, max_steps, observation_format, render_mode),
+            max_episode_steps,
         )
-        self.render_mode, self.max_steps = render_mode, self._ants.max_steps
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.single_observation_space = self._ants.shown.space
-        self.observation_space = batch_space(self.single_observation_space, n)
-        self.single_action_space = Discrete(N_ACTIONS)
-        self.action_space = MultiDiscrete(np.full(n, N_ACTIONS))
-        self._over: np.ndarray | None = None  # whose episode is over, bool (n,); None: none began
-        self._all = np.ones(n, bool)
-
-    def reset(
-        self,
-        *,
-        seed: int | Sequence[int | None] | None = None,
-        options: dict[str, Any] | None = None,
-    ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin an episode in all environments, or in some.
-
-        Args:
-            seed: Of the first environment, the others have the next ones; or one for each, None to
-                go on with its stream. Seeds decide all chance: episodes repeat exactly.
-            options: "reset_mask", bool (num_envs,): where to begin; the other episodes go on.
-
-        Raises:
-            TypeError, ValueError: Seeds or mask have not this form.
-            ResetNeeded: There is a mask, but there are no other episodes to go on with.
-        """
-        which = checked_reset_mask(options, self.num_envs)
-        if self._over is None and not which.all():
-            raise ResetNeeded("no episode is under way; call reset() without a reset_mask first.")
-        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
-        self._ants.seed(seeds_of(seed, self.num_envs), which, self.np_random)
-        self._ants.batched.begin(which)
-        self._over = np.zeros(self.num_envs, bool) if self._over is None else self._over & ~which
-        arrays = self._ants.batched.arrays
-        infos = _infos(arrays, arrays["states"], arrays["percepts"], which, ~self._all)
-        return self._ants.observations(), infos
-
-    def step(
-        self, actions: Any
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Do an action in each environment, int (num_envs,), 0 to 4.
-
-        Raises:
-            ResetNeeded: No episode has begun; or one has ended, and autoreset_mode is "Disabled".
-            InvalidAction: There are not as many actions, or one of them is none.
-        """
-        ants, arrays, mode = self._ants, self._ants.batched.arrays, self.autoreset_mode
-        if self._over is None:
-            raise ResetNeeded("no episode is under way; call reset() before step().")
-        if mode == AutoresetMode.DISABLED and self._over.any():
-            raise ResetNeeded(
-                f"the episode of environment {self._over.argmax()} has ended; call reset() with "
-                'options={"reset_mask": ...} before step().'
-            )
-        ants.batched.step(
-            checked_actions(actions, self.num_envs),
-            begins=self._over if mode == AutoresetMode.NEXT_STEP else 0,
-            same_step=mode == AutoresetMode.SAME_STEP,
-        )
-        # Copies: the next step writes into the arrays of this one.
-        terminations = arrays["terminations"].astype(bool)
-        truncations = arrays["truncations"].astype(bool)
-        ended, goes_on = terminations | truncations, self._all
-        if mode == AutoresetMode.SAME_STEP:
-            goes_on = ~ended
-        else:
-            self._over = ended
-        infos = _infos(arrays, arrays["states"], arrays["percepts"], self._all, goes_on)
-        if mode == AutoresetMode.SAME_STEP and ended.any():
-            states, percepts = arrays["final_states"], arrays["final_percepts"]
-            final = np.full(self.num_envs, None, dtype=object)
-            final[ended] = np.fromiter(ants.shown.show(states[ended]), dtype=object)
-            infos |= {"final_obs": final, "_final_obs": ended}
-            infos["final_info"] = _infos(arrays, states, percepts, ended, ended)
-            infos["_final_info"] = ended.copy()
-        rewards = arrays["rewards_of"].copy()
-        return ants.observations(), rewards, terminations, truncations, infos
-
-    def render(self) -> tuple[Any, ...] | None:
-        """A picture or a text map of each world as it is, see `render_mode`; None without one.
-
-        Raises:
-            ResetNeeded: No episode has begun.
-        """
-        if self.render_mode is None:
-            return None
-        if self._over is None:
-            raise ResetNeeded("no episode is under way; call reset() before render().")
-        return tuple(self._ants.draw(number) for number in range(self.num_envs))
-
-
-def _infos(
-    arrays: Mapping[str, np.ndarray],
-    states: np.ndarray,
-    percepts: np.ndarray,
-    which: np.ndarray,
-    done: np.ndarray,
-) -> dict[str, Any]:
-    """The infos of some environments, `which` bool (n,); zeros for the others.
-
-    The results of actions are told where `done`, bool (n,), is True.
-    """
-    packed = _PACKED_MASKS.take(percepts, mode="clip")
-    masks = packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS]
-    if not which.all():
-        states, masks = np.where(which, states, 0), masks * which[:, None]
-    events, reasons = arrays["events"].astype(np.int64), arrays["reasons"].astype(np.int64)
-    if not done.all():
-        events[~done], reasons[~done] = Event.NONE, Reason.NONE
-    infos = {
-        "state": states.astype(np.int64),
-        "action_mask": masks,
-        "event": events,
-        "reason": reasons,
-    }
-    return infos | {f"_{name}": which.copy() for name in infos}
+        super().__init__(ants, n, n, autoreset_mode, render_mode)

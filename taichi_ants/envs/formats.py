@@ -1,16 +1,20 @@
-"""How environments show an ant what it sees: as cells, as the number of a state, or one-hot."""
+"""Formats in which ants see their states: cells, index or one-hot; policies of them as tables."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
 from gymnasium import spaces
 
-from taichi_ants.errors import AntsError, check_one_of
-from taichi_ants.task import Observation
+from taichi_ants.errors import AntsError, check_one_of, shown
+from taichi_ants.learners.policies import finite
+from taichi_ants.task import Observation, observations
+from taichi_ants.task.constants import N_ACTIONS
 
 ObservationFormat = Literal["cells", "index", "one_hot"]
 FORMATS: tuple[str, ...] = get_args(ObservationFormat)
@@ -27,9 +31,6 @@ class Shown:
         space: The space of one ant. "cells": MultiDiscrete (k,), int64: the k parts of a state.
             "index": Discrete, the state itself. "one_hot": Box (sum of the sizes of all parts,),
             float32: a 1 for each part, at its value, as `gymnasium.spaces.flatten` of "cells".
-
-    Raises:
-        AntsError: There is no such format, or one_hot would take too much memory.
     """
 
     def __init__(self, observation: Observation, form: ObservationFormat) -> None:
@@ -77,3 +78,49 @@ class Shown:
             shown = np.stack([shown[..., a:b].argmax(-1) for a, b in pairwise(begins)], axis=-1)
         digits = tuple(np.moveaxis(shown.astype(np.int64), -1, 0))
         return np.ravel_multi_index(digits, self.observation.parts)
+
+
+def tabulate(
+    function: Callable[[np.ndarray], Any],
+    observation: str = "paper",
+    observation_format: ObservationFormat = "one_hot",
+) -> npt.NDArray[np.float32]:
+    """The table of a policy that is a function of what an ant sees.
+
+    The function is called once, with all states. The table acts greedily: of a policy with
+    probabilities it keeps the most probable action.
+
+        table = tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
+
+    Args:
+        function: Takes all states as an environment shows them, (n_states, ...) of the dtype of its
+            observation space. Returns action values, logits or probabilities, real (n_states, 5);
+            or the action in each state, integers (n_states,).
+        observation: Name of the registered observation.
+        observation_format: The environment's: "cells", "index" or "one_hot".
+
+    Returns:
+        Action values, float32 (n_states, 5). Of actions: 1 for the action, 0 for the others.
+    """
+    if not callable(function):
+        raise AntsError(f"function is {shown(function)}; it must be a function of what is seen.")
+    seen = Shown(observations.get(observation), observation_format).table
+    n_states, returned = len(seen), function(seen)
+    try:
+        given = np.asarray(returned)
+    except (TypeError, ValueError, RuntimeError) as error:  # what NumPy and torch raise
+        raise AntsError(
+            f"function returned {shown(returned)}, which is no array ({shown(str(error))}); return "
+            "one array, without what else a library gives, and detached from gradients."
+        ) from error
+    if given.shape == (n_states,) and given.dtype.kind in "iu":
+        if given.min() < 0 or given.max() >= N_ACTIONS:
+            wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
+            raise AntsError(f"function returned the action {wrong}; it must be 0, 1, 2, 3 or 4.")
+        return np.eye(N_ACTIONS, dtype=np.float32)[given]
+    if given.shape != (n_states, N_ACTIONS) or given.dtype.kind not in "fiu":
+        raise AntsError(
+            f"function returned an array of shape {given.shape} and type {given.dtype}; it must be "
+            f"real numbers of ({n_states}, {N_ACTIONS}), or actions, integers of ({n_states},)."
+        )
+    return finite("function returned", given)

@@ -1,4 +1,7 @@
-"""Data sets as those of Minari, which other libraries read; needs the extra `minari`."""
+"""Data sets as those of Minari, which other libraries read; needs the extra `minari`.
+
+AntsError if there is no such data set, it is not of such ants, or its name is taken or not allowed.
+"""
 
 from __future__ import annotations
 
@@ -49,9 +52,6 @@ def to_minari(
         observation_format: How states are shown: "cells", "index" or "one_hot", as in the
             environments. Which run and ant it was, the tick, and with which probability the action
             was taken are infos.
-
-    Raises:
-        AntsError: There is such a data set already, the name is none, or Minari is not installed.
     """
     expect("data", data, Dataset)
     minari = _minari()
@@ -120,9 +120,6 @@ def from_minari(
         dataset: The data set, or its name.
         world: Where the ants were, if `to_minari` did not write it.
         task: The rules that they had, likewise; None: the paper's.
-
-    Raises:
-        AntsError: There is no such data set, it is not of such ants, or Minari is not installed.
     """
     minari = _minari()
     try:

@@ -34,9 +34,6 @@ class SB3VecEnv(VecEnv):
     Attributes:
         envs: The environments, with autoreset_mode "SameStep".
         infos: What they said in the last step, or at the reset, in Gymnasium's form.
-
-    Raises:
-        AntsError: The environments begin their next episode at another time.
     """
 
     def __init__(self, envs: VectorEnv) -> None:
@@ -87,15 +84,11 @@ class SB3VecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         owner = self if attr_name == "action_masks" else self.envs
-        return [getattr(owner, attr_name)] * len(self._numbers(indices))
+        return [getattr(owner, attr_name)] * len([*self._get_indices(indices)])
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of `envs`.
-
-        Raises:
-            AntsError: It is meant for some environments only.
-        """
-        if set(self._numbers(indices)) != set(range(self.num_envs)):
+        """Set an attribute of `envs`; AntsError if it is meant for some environments only."""
+        if set(self._get_indices(indices)) != set(range(self.num_envs)):
             raise AntsError(
                 f"indices is {shown(indices)}; the environments are one object and share their "
                 "attributes, so leave it out."
@@ -105,22 +98,14 @@ class SB3VecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """What `action_masks` gives for each environment.
-
-        Raises:
-            AntsError: It is another method.
-        """
+        """The result of `action_masks`, the only method, for each environment."""
         if method_name != "action_masks":
             raise AntsError(
                 f"method_name is {shown(method_name)}; the environments are one object and have "
                 "only action_masks each, so call other methods of `envs` itself."
             )
-        return list(self.action_masks()[self._numbers(indices)])
+        return list(self.action_masks()[[*self._get_indices(indices)]])
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
         """False for each: single environments have no wrappers."""
-        return [False] * len(self._numbers(indices))
-
-    def _numbers(self, indices: Any) -> list[int]:
-        """The environments that SB3 names: all by None, one by its number, or several."""
-        return list(self._get_indices(indices))
+        return [False] * len([*self._get_indices(indices)])

@@ -1,6 +1,7 @@
-"""Files: written whole or not at all, and read with limits. Errors name the file.
+"""Files: written whole or not at all, and read with limits.
 
-`files.archives` writes arrays with the facts about them (.npz), `files.results` folders of results.
+All functions raise an AntsError that names the file if it cannot be written or read. `archives` has
+arrays with the facts about them (.npz), `results` folders of results.
 """
 
 from __future__ import annotations
@@ -39,10 +40,8 @@ _ABANDONED = 3600.0  # seconds after which an unfinished file is that of a proce
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
     """Write a file so that readers see the old content or all of the new one, never a part.
 
-    An existing file is replaced, a symbolic link followed; `writer` is called with a binary file.
-
-    Raises:
-        AntsError: The file cannot be written. Other exceptions of the writer pass through.
+    An existing file is replaced, a symbolic link followed; `writer` is called with a binary file,
+    and its own exceptions pass through.
     """
     with writing(path):
         target = _target_of(path)
@@ -84,9 +83,7 @@ def check_writable_file(path: PathLike) -> Path:
     """Check before long work that `write_atomically` can write a file; return its path.
 
     Nothing is written. The folder may be missing if it can be made, unless the path is a link.
-
-    Raises:
-        AntsError: The path is that of a folder, a device or a pipe, or it cannot be written.
+    Folders, devices and pipes are refused.
     """
     with writing(path):
         target = _target_of(path)
@@ -98,13 +95,8 @@ def check_writable_file(path: PathLike) -> Path:
 
 
 def write_text(path: PathLike, text: str) -> None:
-    """Write text as UTF-8, line ends unchanged; raises as `write_atomically` does."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: PathLike, content: bytes) -> None:
-    """Write a file; raises as `write_atomically` does."""
-    write_atomically(path, lambda file: file.write(content))
+    """Write text as UTF-8, line ends unchanged."""
+    write_atomically(path, lambda file: file.write(text.encode("utf-8")))
 
 
 def to_json(value: Any, indent: int | None = None) -> str:
@@ -124,10 +116,7 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     """Write rows, numbers and text by column, as comma-separated values with a header.
 
     Rows are read one by one. Floats read back exactly; None, NaN and missing keys are empty fields.
-
-    Raises:
-        AntsError: As `write_atomically`.
-        ValueError: A row has a key that is not a column.
+    ValueError if a row has a key that is not a column.
     """
 
     def write(file: BinaryIO) -> None:
@@ -146,9 +135,6 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
     """Open a regular file of at most `most` bytes to read from.
 
     Pipes and devices are refused: a pipe could wait forever, and a device has no end.
-
-    Raises:
-        AntsError: The file is not such a file, or cannot be read, now or later.
     """
     expect("path", path, str, os.PathLike)
     try:
@@ -170,11 +156,7 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
 
 
 def read_text(path: PathLike, most: int = 1 << 26) -> str:
-    """Return the text of a UTF-8 file, with line feeds as line ends.
-
-    Raises:
-        AntsError: The file cannot be read, has more than `most` bytes, or is not text.
-    """
+    """Return the text of a UTF-8 file of at most `most` bytes, with line feeds as line ends."""
     with opened(path, most) as file:
         content = file.read(os.fstat(file.fileno()).st_size)
     try:
@@ -184,11 +166,7 @@ def read_text(path: PathLike, most: int = 1 << 26) -> str:
 
 
 def read_csv(path: PathLike) -> list[dict[str, Any]]:
-    """Return the rows of a file of `write_csv`: numbers as float, empty fields as None.
-
-    Raises:
-        AntsError: The file cannot be read, or is not a table.
-    """
+    """Return the rows of a file of `write_csv`: numbers as float, empty fields as None."""
     try:
         header, *lines = csv.reader(io.StringIO(read_text(path, 1 << 30)))
         rows = [zip(header, line, strict=True) for line in lines if line]
@@ -208,31 +186,19 @@ def smallest(array: np.ndarray) -> np.ndarray:
 def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Path:
     """Make a folder if it is missing, check that files can be written to it, and return its path.
 
-    Args:
-        path: The folder.
-        chosen: The folder that the message names instead: the one above it that a user chose.
-
-    Raises:
-        AntsError: The folder cannot be created or written to.
+    The message names `chosen` instead: the folder above it that a user chose.
     """
-    try:
-        folder = Path(path)
+    folder = Path(path)
+    with writing(chosen or path):
+        if "\0" in str(path):
+            raise OSError("it contains a null character")
         folder.mkdir(parents=True, exist_ok=True)
         _try_to_write(folder)
-    except (OSError, ValueError) as error:
-        raise AntsError(
-            f"cannot write to the folder {named(chosen or path)}: {_reason(error)}; choose another "
-            "folder."
-        ) from error
     return folder
 
 
 def check_room(folder: PathLike, needed: int) -> None:
-    """Check before long work that the disk of a folder has `needed` bytes free.
-
-    Raises:
-        AntsError: It has fewer.
-    """
+    """Check before long work that the disk of a folder has `needed` bytes free."""
     with writing(folder):
         free = shutil.disk_usage(folder).free
     if needed > free:
@@ -257,7 +223,7 @@ def _target_of(path: PathLike) -> Path:
     """Return the regular file that a path names, links followed; it need not exist."""
     expect("path", path, str, os.PathLike)
     if "\0" in os.fspath(path):
-        raise AntsError(f"{named(path)} contains a null character; name a file to write to.")
+        raise OSError("it contains a null character")
     target = Path(os.path.realpath(path))
     # Replacing a device, a pipe or a folder would destroy it or fail.
     if str(path).endswith(os.sep) or (target.exists() and not target.is_file()):

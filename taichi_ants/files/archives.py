@@ -27,9 +27,7 @@ Arrays = dict[str, np.ndarray]
 def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: bool = True) -> None:
     """Write named arrays and their checksum; equal arrays give equal bytes.
 
-    Raises:
-        AntsError: The file cannot be written.
-        TypeError: An array holds Python objects.
+    TypeError if an array holds Python objects.
     """
     content = {name: np.asarray(array) for name, array in arrays.items()}
     content[_CHECKSUM] = np.array(_checksum(content))
@@ -52,13 +50,8 @@ def read(
 ) -> Arrays:
     """Read all arrays of an .npz file, without executing anything that it holds.
 
-    Args:
-        path: The file, or its name in messages if its bytes are given as `content`.
-        most: The largest size of the file and of its arrays, in bytes.
-        foreign: Whether to read a file without a checksum, too.
-
-    Raises:
-        AntsError: The file is missing, unreadable, too large, damaged, or not an .npz of arrays.
+    Its bytes can be given as `content`, then `path` is its name in messages. File and arrays may
+    have `most` bytes each. If it is `foreign`, it needs no checksum.
     """
     source = files.opened(path, most) if content is None else nullcontext(io.BytesIO(content))
     name = files.named(path)
@@ -138,7 +131,7 @@ class Kind:
         arrays: Mapping[str, np.ndarray],
         compress: bool = True,
     ) -> None:
-        """Write a file; raises as `archives.write` does."""
+        """Write a file."""
         text = files.to_json({"kind": self.name, "version": self.version, **facts})
         write(path, {**arrays, "facts": np.array(text.encode())}, compress)
 
@@ -146,11 +139,7 @@ class Kind:
     def reading(
         self, path: files.PathLike, content: bytes | None = None
     ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
-        """Read a file, and build an object from its arrays and facts, as `building` does.
-
-        Raises:
-            AntsError: The file cannot be read, see `read`, or is of another kind or version.
-        """
+        """Read a file of this kind and version, and build an object from it, as `building` does."""
         arrays = read(path, content, self.most, self.foreign)
         try:
             text = arrays.pop("facts").item()

@@ -45,8 +45,7 @@ class ResultFolder:
     def is_finished(self) -> bool:
         """Return whether the folder holds finished results of these settings.
 
-        Raises:
-            AntsError: It holds something else than these, or the work on them.
+        AntsError if it holds anything else than these, or the work on them.
         """
         for place, what in ((self._unfinished, "unfinished work"), (self.path, "results")):
             if not (place / MANIFEST).exists():
@@ -69,11 +68,7 @@ class ResultFolder:
         return False
 
     def check(self, may_lack: str | None = None) -> None:
-        """Check that no file of finished results is altered, or missing except `may_lack`.
-
-        Raises:
-            AntsError: A file is missing or altered.
-        """
+        """Check that no file of finished results is altered, or missing except `may_lack`."""
         for name, checksum in self._listed().items():
             path = self.path / name
             if name == may_lack and not path.exists():
@@ -90,10 +85,8 @@ class ResultFolder:
 
         With `replace` the work starts over, whatever the folder holds; old results stay until the
         new ones are complete. Two processes can do the same work at once: blocks appear whole,
-        each process has its own folder for results, and if that is removed, it ends with an error.
-
-        Raises:
-            AntsError: The folder cannot be written, or another process has finished the work.
+        each process has its own folder for results. AntsError if the folder cannot be written, or
+        another process has finished the work.
         """
         self._listed()  # if the manifest is damaged, this raises before the work
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
@@ -191,11 +184,7 @@ class ResultFolder:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return the contents of the manifest in a folder.
-
-    Raises:
-        AntsError: The manifest is damaged.
-    """
+    """Return the contents of the manifest in a folder; AntsError if it is damaged."""
     try:
         manifest = json.loads(files.read_text(folder / MANIFEST))
         if manifest.pop("checksum") != _checksum_of_manifest(manifest):

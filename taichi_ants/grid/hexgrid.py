@@ -111,7 +111,9 @@ class AxialGrid:
     def offsets(self) -> np.ndarray:
         """int32 (6,), read-only: what a step at each heading adds to a flat index."""
         steps = axial(HEADING_STEPS)
-        return _frozen((steps[:, 0] + steps[:, 1] * self.width).astype(np.int32))
+        offsets = (steps[:, 0] + steps[:, 1] * self.width).astype(np.int32)
+        offsets.setflags(write=False)
+        return offsets
 
     @cached_property
     def exists(self) -> np.ndarray:
@@ -125,7 +127,8 @@ class AxialGrid:
         inside &= difference > -y
         inside &= (q > -z) & (q < x)
         inside &= (r > -z) & (r < y)
-        return _frozen(inside.reshape(-1))
+        inside.setflags(write=False)
+        return inside.reshape(-1)
 
     def axes(self) -> tuple[np.ndarray, np.ndarray]:
         """The array's axes in two dimensions: q as int32 (1, width), r as int32 (height, 1)."""
@@ -155,6 +158,16 @@ class AxialGrid:
         low = np.minimum(np.minimum(q, r), np.int32(0))
         return np.stack([q - low, r - low, -low], axis=-1)
 
+    def distances(self, cell: tuple[int, int, int]) -> np.ndarray:
+        """int32 (size,): steps to `cell` from every place of the array, void ones too."""
+        cell_q, cell_r = axial(cell).astype(np.int32)
+        q, r = self.axes()
+        q, r = q - cell_q, r - cell_r
+        # The coordinates of the difference are (q, r, 0) up to a shift.
+        high = np.maximum(np.maximum(q, r), np.int32(0))
+        high -= np.minimum(np.minimum(q, r), np.int32(0))
+        return high.reshape(-1)
+
     def number(self, cells: object) -> np.ndarray:
         """The places, int64 (...), of cells (..., 3) in the lexicographic order of the world."""
         normal = normal_form(cells)
@@ -163,8 +176,3 @@ class AxialGrid:
         # x = 0 leaves y and z free. Each x > 0 has first y = 0 with any z, then z = 0 with y > 0.
         first = y_range * z_range + (x - 1) * (y_range + z_range - 1)
         return np.where(x == 0, y * z_range + z, first + np.where(y == 0, z, z_range + y - 1))
-
-
-def _frozen(array: np.ndarray) -> np.ndarray:
-    array.setflags(write=False)
-    return array

@@ -54,10 +54,9 @@ def stream_state(seed: int | np.ndarray, purpose: int, number: int | np.ndarray)
 
 
 class Stream:
-    """A random stream with its state, for drawing worlds on the host."""
+    """The random stream of (seed, purpose, number), for drawing worlds on the host."""
 
     def __init__(self, seed: int, purpose: int, number: int = 0) -> None:
-        """Starts the stream of (seed, purpose, number), see `stream_state`."""
         self.state = int(stream_state(seed, purpose, number))
 
     def bits(self, size: int) -> np.ndarray:

@@ -1,7 +1,6 @@
 """The learners: one file each, and policies that need no learning."""
 
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 from taichi_ants.learners.learner import Learner, Memory, td_learner
 from taichi_ants.learners.registry import get, label, names, register, settle
 from taichi_ants.settings import Is

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,12 +26,8 @@ class TrainingConfig(Settings, path="training"):
     as it is. An `initial_q` above what can be reached ("optimistic") makes ants try all actions.
     `hyperparameters` are the learner's own, (name, number) pairs by name; given as a mapping, or as
     keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that are left out have
-    default values, see `taichi_ants.learners.get(name).hyperparameters()`.
-
-    Raises:
-        AntsError: A value is outside its range. Training checks whether the learner exists and has
-            these hyperparameters, so that you can write configurations before you register a
-            learner.
+    default values, see `taichi_ants.learners.get(name).hyperparameters()`. Training, not this
+    class, checks whether there is such a learner with these hyperparameters.
     """
 
     learner: Annotated[str, Is("name of a learner")]
@@ -92,7 +88,7 @@ class TrainingConfig(Settings, path="training"):
 
     @property
     def least_learning_rate(self) -> float:
-        """The same for the learning rate."""
+        """The learning rate at which decay ends."""
         return min(self.min_learning_rate, self.learning_rate)
 
     def _changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
@@ -122,10 +118,23 @@ class TrainingConfig(Settings, path="training"):
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
 
 
-def share_of_one(value: Any) -> bool:
-    """Whether a value is a number from 0 to 1; booleans, text and arrays are none."""
-    number = isinstance(value, Real) and not isinstance(value, bool)
-    return number and bool(0 <= value <= 1)
+@dataclass(frozen=True)
+class Hyperparameters(Settings, path="training"):
+    """Base of the hyperparameters of a learner; as such, none.
+
+    Each field is declared as `Annotated[int, Is(...)]` or `Annotated[float, Is(...)]`, for kernels
+    i32 and f32.
+    """
+
+    def __post_init__(self) -> None:
+        kinds = {one.name: one.kind for one in declared(type(self))}
+        for one in fields(self):
+            if kinds.get(one.name) not in (int, float):
+                raise AntsError(
+                    f"the field {one.name} has the type {one.type}; declare it as "
+                    "Annotated[int, Is(...)] or Annotated[float, Is(...)]."
+                )
+        self.check()
 
 
 def update_weights(alpha: float, most: int) -> np.ndarray:

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taichi_ants.errors import AntsError, checked_whole, shown
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 
 
 @dataclass(frozen=True)
@@ -85,14 +84,11 @@ def td_learner(
             the value of the state-action pair that is updated, the reward, the discount (0 where
             the step terminated), the vector of the five action values of the next state, the next
             action and the current epsilon; all f32 but next_action (i32), which is 0 where the step
-            terminated, and may be looked at only if it is drawn.
-
-    Raises:
-        AntsError: The TD error is not a `ti.func` of six arguments, or looks at a next action that
-            is not drawn. What it computes is tried when it is first used.
+            terminated, and may be looked at only if it is drawn. The result is checked when the
+            learner is first used.
     """
     check_td_error(name, td_error, draws_next_action)
-    from taichi_ants.learners.td_errors import learn_by  # Taichi starts to be imported
+    from taichi_ants.learners.memory import learn_by  # Taichi starts to be imported
 
     return Learner(
         name,

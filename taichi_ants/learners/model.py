@@ -10,7 +10,7 @@ from typing import Annotated
 
 import taichi as ti
 
-from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.memory import values_of
 from taichi_ants.settings import Is

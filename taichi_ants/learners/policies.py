@@ -27,8 +27,8 @@ _KIND = Kind("policy", 2, "save_policy", most=1 << 26, foreign=True)
 class Policy(NamedTuple):
     """The contents of a policy file.
 
-    Action values, float32 (n_states, 5); the name of the registered observation whose states index
-    the rows; and what made the policy.
+    Action values, float32 (n_states, 5), whose rows are the states of the registered observation of
+    that name; and what made the policy.
     """
 
     q_values: ActionValues
@@ -104,7 +104,7 @@ FOLLOWED = tuple(RULES)
 
 
 def trail_follower(observation: str = "paper") -> ActionValues:
-    """Return a policy that is written by hand, a table of the `RULES`, float32 (n_states, 5).
+    """Return a hand-written policy, a table of the `RULES`, float32 (n_states, 5).
 
     Without food, an ant picks up the food that it sees, follows a trail, and otherwise walks
     straight over open ground and turns at random beside anything that blocks it. With food, it
@@ -112,9 +112,7 @@ def trail_follower(observation: str = "paper") -> ActionValues:
     otherwise walks at random until a nearer cell comes into view. An ant without food that sees an
     ant with food on a stronger trail (P) waits to be pushed along that trail. In queues, it does so
     only by moving against that ant, and it waits behind an ant that is further up the trail (p).
-
-    Raises:
-        AntsError: There is no rule for the observation; `FOLLOWED` lists those that have one.
+    Only the observations in `FOLLOWED` have rules.
     """
     check_one_of("observation", observation, FOLLOWED)
     name_of, q_values = observations.get(observation).name_of, random_policy(observation)
@@ -155,9 +153,6 @@ def save_policy(
         q_values: Action values of shape (n_states, 5), finite as float32.
         metadata: What made the policy (configuration, seed, world ...), as JSON can hold it.
         observation: Name of the registered observation whose states index the rows.
-
-    Raises:
-        AntsError: An argument is not allowed, or the file cannot be written.
     """
     table = _checked(q_values, observation)
     if not isinstance(metadata, Mapping):
@@ -204,13 +199,17 @@ def checked_values(q_values: Any, task: Task) -> np.ndarray:
             f"q_values has shape {values.shape}; for the observation {task.observation!r} it must "
             f"end in {shape}."
         )
-    # A float64 beyond the range of float32 becomes infinite, which the next check reports.
-    with np.errstate(over="ignore"):
+    return finite("q_values is", values)
+
+
+def finite(what: str, values: np.ndarray) -> np.ndarray:
+    """Action values (..., 5) as float32; AntsError, which starts with `what`, unless finite."""
+    with np.errstate(over="ignore"):  # a float64 that float32 cannot hold becomes infinite
         tables = values.astype(np.float32, copy=False)
     if not np.isfinite(tables).all():
         *_, state, action = where = np.argwhere(~np.isfinite(tables))[0]
         raise AntsError(
-            f"q_values is {tables[tuple(where)]} for state {state} and action {action}; it must "
-            "be finite."
+            f"{what} {tables[tuple(where)]} for state {state} and action {action}; numbers must be "
+            "finite, so give an action that shall never be taken a low one."
         )
     return tables

@@ -11,8 +11,7 @@ from dataclasses import asdict, replace
 from importlib import import_module
 
 from taichi_ants.errors import AntsError, check_new_name, expect, shown, unusable
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 from taichi_ants.learners.learner import Learner, Memory, check_arguments, check_td_error
 from taichi_ants.settings import declared, not_a_setting
 

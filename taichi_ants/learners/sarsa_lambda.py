@@ -5,7 +5,7 @@ from typing import Annotated
 
 import taichi as ti
 
-from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of
 from taichi_ants.settings import Is

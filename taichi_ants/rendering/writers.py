@@ -132,7 +132,7 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
 def write(target: Path, content: bytes) -> None:
     """Write a file into a folder that is made if it is missing."""
     files.check_writable_folder(target.parent)
-    files.write_bytes(target, content)
+    files.write_atomically(target, lambda file: file.write(content))
 
 
 @contextmanager

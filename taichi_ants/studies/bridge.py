@@ -19,7 +19,6 @@ from taichi_ants.task import Life, Task, foraging, queueing
 from taichi_ants.task.constants import EMPTY, OBSTACLE
 from taichi_ants.worlds import double_bridge
 from taichi_ants.worlds.double_bridge import ROOM_RADIUS, branch_cells, junction_cells
-from taichi_ants.worlds.geometry import distances
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
@@ -126,7 +125,7 @@ def _zones(bridge: dict[str, Any]) -> np.ndarray:
     grid, junctions = double_bridge(**bridge).grid, junction_cells(**bridge)
     zone = np.full(grid.size, _QUEEN_ROOM)
     pile = junctions[1] + junctions[0]
-    zone[distances(grid, tuple(pile.tolist())) <= ROOM_RADIUS + 1] = _FOOD_ROOM
+    zone[grid.distances(tuple(pile.tolist())) <= ROOM_RADIUS + 1] = _FOOD_ROOM
     for number, cells in zip((_SHORT, _LONG), branch_cells(**bridge), strict=True):
         zone[grid.index(cells)] = number
     return zone

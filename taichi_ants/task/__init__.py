@@ -1,11 +1,9 @@
 """The rules of the game: what an ant perceives, may do and is paid for."""
 
-from taichi_ants.task.life import Life
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
-from taichi_ants.task.task import Task, foraging, paper, queueing
-from taichi_ants.task.traffic import Traffic
+from taichi_ants.task.task import Life, Task, Traffic, foraging, paper, queueing
 
 __all__ = [
     "Life",

@@ -36,9 +36,6 @@ class Pheromone(Settings, path="task.pheromone"):
     without food sees as T, of the trails of at least 1 on the empty cells in view, "half": those of
     at least half the strongest; "strongest": the strongest ones; "strongest_under_carriers": the
     same, but a trail on the cell of an ant with food counts for the strongest too.
-
-    Raises:
-        AntsError: A value is outside its range, or would change nothing.
     """
 
     evaporation: Annotated[Evaporation, Is("how trails evaporate")] = "linear"

@@ -9,10 +9,9 @@ example "foraging E T O" or "carrying S E O".
 from __future__ import annotations
 
 from collections.abc import Callable
-from numbers import Integral
 from typing import NamedTuple
 
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import checked_whole
 from taichi_ants.task.constants import N_STATES, SEES_GOAL, SEES_LURE
 
 # Indexed by `carries`, then by code.
@@ -36,20 +35,12 @@ class State(NamedTuple):
 
 def state_from_index(index: int) -> State:
     """The state of an index 64 * carries + 16 * left + 4 * forward + right, 0..127."""
-    if not isinstance(index, Integral) or not 0 <= index < N_STATES:
-        raise AntsError(
-            f"the state index is {shown(index)}; it must be a whole number from 0 to "
-            f"{N_STATES - 1}."
-        )
-    index = int(index)
+    index = checked_whole("the state index", index, 0, N_STATES - 1)
     return State(bool(index >> 6), (index >> 4) & 3, (index >> 2) & 3, index & 3)
 
 
 def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int], str]:
-    """A function that names states, such as "foraging E T O", of n cells in view.
-
-    The letters of the codes are given for an ant without and with food.
-    """
+    """A function that names states of n cells in view by the letters of their codes."""
 
     def name_of(row: int) -> str:
         row, codes = checked_whole("a state", row, 0, 2 * len(foraging) ** n_cells - 1), []
@@ -66,8 +57,7 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
 state_name = name_of_codes(3, *CELL_LETTERS)
 
 
-def _can_occur(state: State) -> bool:
-    """Whether the rules can produce a state, see section 1.5 of the paper."""
+def _can_occur(state: State) -> bool:  # see section 1.5 of the paper
     queens, nearer = state.view.count(SEES_GOAL), state.view.count(SEES_LURE)
     if not state.carries:
         return True

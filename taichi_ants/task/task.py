@@ -1,4 +1,4 @@
-"""The rules of the game."""
+"""The rules of the game: who may enter a cell, what comes and goes, and all rules together."""
 
 from __future__ import annotations
 
@@ -6,16 +6,82 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Literal, get_args
 
+from taichi_ants.errors import AntsError
 from taichi_ants.settings import Is, Settings
 from taichi_ants.task import observations
-from taichi_ants.task.life import Life
+from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
-from taichi_ants.task.traffic import Traffic
 
 Delivery = Literal["terminates", "truncates"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
+Ticks = Annotated[int | None, Is(unit="ticks", least=1, most=MAX_STEPS)]
+
+
+@dataclass(frozen=True)
+class Traffic(Settings, path="task.traffic"):
+    """The ants that may enter a cell on which another ant stands; none by default, as in the paper.
+
+    Where some may, every ant that tries to move claims the cell ahead of it, unless a rock, food,
+    the queen or the end of the world is there. Of several claims to a cell the one with the
+    smallest hash wins, see `docs/colony.md`. With `swap`, an ant with food that wins a cell changes
+    places with the ant on it, if that ant has no food, does not move itself, and does not pick up a
+    food in view; the ant that is pushed is paid as for a move onto an empty cell. With `follow`, a
+    queue moves as one; a ring of ants that want each other's cells stays where it is.
+    """
+
+    swap: Annotated[bool, Is("let ants with food change places with ants without")] = False
+    follow: Annotated[bool, Is("let ants enter a cell that its ant leaves in the same tick")] = (
+        False
+    )
+    carriers_first: Annotated[bool, Is("let ants with food win a cell against ants without")] = (
+        False
+    )
+    grant: Annotated[
+        bool, Is("pay a pushed ant for the move that it wanted, if it got it", only=("swap", True))
+    ] = False
+
+    def __post_init__(self) -> None:
+        self.check()
+        if self.carriers_first and not self.shared:
+            raise AntsError(
+                "`task.traffic.carriers_first` is True; leave it out unless `swap` or `follow` is "
+                "True."
+            )
+
+    @classmethod
+    def named(cls) -> Mapping[str, Traffic]:
+        """Values that have names: "blocking", "right_of_way" and "following"."""
+        return {
+            "blocking": cls(),
+            "right_of_way": cls(swap=True),
+            "following": cls(swap=True, follow=True, carriers_first=True, grant=True),
+        }
+
+    @property
+    def shared(self) -> bool:
+        """Whether any ant may enter a cell on which another one stands."""
+        return self.swap or self.follow
+
+
+@dataclass(frozen=True)
+class Life(Settings, path="task.life"):
+    """The ants and food that come and go; by default none do. Colonies only.
+
+    None means that ants do not die, food does not grow back, or food stays. With `regrowth` 0, food
+    grows back in the same tick.
+    """
+
+    births: Annotated[bool, Is("turn each food item that the queen is given into an ant")] = False
+    lifespan: Annotated[Ticks, Is("age at which an ant dies")] = None
+    regrowth: Annotated[Ticks, Is("time until food grows back where it was taken", least=0)] = None
+    wander: Annotated[Ticks, Is("interval at which each pile of food moves by one cell")] = None
+
+    @property
+    def changes(self) -> bool:
+        """Whether anything comes or goes."""
+        return self != Life()
 
 
 @dataclass(frozen=True, repr=False)
@@ -26,9 +92,6 @@ class Task(Settings, path="task"):
     kernels read. `traffic` may be one of the names of `Traffic.named`. A delivery that "terminates"
     is a terminal state, so its target is the reward alone; the update of one that "truncates"
     bootstraps from what the ant then sees. An episode of one ant ends in both.
-
-    Raises:
-        AntsError: A value is not allowed; the message names it.
     """
 
     observation: Annotated[str, Is("what an ant sees", choices=observations.names)] = "paper"

@@ -20,7 +20,6 @@ import numpy as np
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid, normal_form
 from taichi_ants.settings import Is, checked
-from taichi_ants.worlds import geometry
 from taichi_ants.worlds.world import World
 
 ROOM_RADIUS = 5  # of the rooms around queen and food: room for 90 ants beside the queen
@@ -55,14 +54,12 @@ def double_bridge(
     * short - 3 - aside. With `aside` 0 the first cells of both branches are as far from the queen
     as the food's junction; with more, that of the short branch is nearer to her, that of the long
     one is not.
-
-    Raises:
-        AntsError: A length is not whole or not allowed, or mirrored is not True or False.
     """
     grid = AxialGrid(bridge_ranges(short, long, mirrored, aside))
-    queen, pile, corridors = _walked(short, long, mirrored, aside)
-    to_pile = geometry.distances(grid, pile)
-    walled = np.minimum(geometry.distances(grid, queen), to_pile) > ROOM_RADIUS
+    queen = (0, 0, 0)
+    pile, corridors = _walked(short, long, mirrored, aside)
+    to_pile = grid.distances(pile)
+    walled = np.minimum(grid.distances(queen), to_pile) > ROOM_RADIUS
     walled[grid.index(corridors)] = False
     return World(
         grid.ranges,
@@ -77,7 +74,7 @@ def bridge_ranges(
     short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> tuple[int, int, int]:
     """Return the ranges of the world, before it is built; arguments and errors as the world's."""
-    _, pile, corridors = _walked(short, long, mirrored, aside)
+    pile, corridors = _walked(short, long, mirrored, aside)
     # A cell of rock around all that can be walked. A bridge and its mirror image have equal ranges.
     x, *others = (np.maximum(corridors.max(axis=0), np.array(pile) + ROOM_RADIUS) + 2).tolist()
     return x, max(others), max(others)
@@ -85,12 +82,12 @@ def bridge_ranges(
 
 def _walked(
     short: int, long: int, mirrored: bool, aside: int
-) -> tuple[tuple[int, int, int], tuple[int, int, int], np.ndarray]:
-    """The queen's cell, the middle of the pile, and the cells (n, 3) of branches and junctions."""
+) -> tuple[tuple[int, int, int], np.ndarray]:
+    """The middle of the pile, and the cells (n, 3) of branches and junctions."""
     junctions = junction_cells(short, long, mirrored, aside)
     corridors = np.concatenate([*branch_cells(short, long, mirrored, aside), junctions])
     x, y, z = (junctions[1] + junctions[0]).tolist()
-    return (0, 0, 0), (x, y, z), corridors
+    return (x, y, z), corridors
 
 
 @checked

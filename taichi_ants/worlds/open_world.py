@@ -48,11 +48,8 @@ def open_world(
     range n, in the order of the ranges; they replace rocks. Everything within distance 3 of the
     queen is free. Where too few cells are free for the share of single foods, all of these have
     food. Ranges of None are drawn from 10 to 100. No trail, no listed ants; the same seed gives the
-    same world.
-
-    Raises:
-        AntsError: An argument is not allowed; the shares are above 0.9 together; or no food could
-            be reached from the queen in 100 worlds drawn.
+    same world. AntsError if the shares are above 0.9 together, or no food could be reached from the
+    queen in 100 worlds drawn.
     """
     seed = whole("seed", seed)
     if rock_share + food_share > MAX_SHARE:

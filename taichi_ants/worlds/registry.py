@@ -9,15 +9,35 @@ from typing import Any
 
 from taichi_ants.errors import AntsError, expect, shown, whole
 from taichi_ants.settings import Setting, declared, not_a_setting
+from taichi_ants.worlds.double_bridge import double_bridge
+from taichi_ants.worlds.open_world import far_piles, open_world
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
 
 Builder = Callable[..., World]
 
-_BUILDERS: dict[str, Builder] = {}
+
+def paper() -> World:
+    """The paper's world: 271 cells, one food, and a trail along the x axis from end to end."""
+    return World(
+        ranges=(10, 10, 10),
+        queen=(0, 9, 9),
+        foods=[(9, 0, 0)],
+        trails=[((i, 0, 0), 25) for i in range(-8, 9)],
+        ants=[((0, 8, 8), 0)],
+    )
 
 
-def register(name: str, builder: Builder, *, drawn: bool = True) -> None:
+BUILT_IN: dict[str, Builder] = {
+    "paper": paper,
+    "open": open_world,
+    "far_piles": far_piles,
+    "double_bridge": double_bridge,
+}
+_BUILDERS = dict(BUILT_IN)
+
+
+def register(name: str, builder: Builder) -> None:
     """Give a world a name, by which `build` and the command lines find it.
 
     The builder is called with settings of the world by name and returns a `World`. Its arguments
@@ -27,7 +47,7 @@ def register(name: str, builder: Builder, *, drawn: bool = True) -> None:
     """
     if not isinstance(name, str) or not name.strip():
         raise AntsError(f"the world name {shown(name)} is not allowed; it must be text.")
-    if name in _BUILDERS and getattr(_BUILDERS[name], "__module__", "").startswith("taichi_ants."):
+    if name in BUILT_IN:
         raise AntsError(
             f"{name!r} is the name of a built-in world, which cannot be replaced; choose another "
             "name."
@@ -88,10 +108,9 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
     if builder is None:
         if os.path.exists(name_or_path):
             return load_map(name_or_path)
-        known = ", ".join(names())
         raise AntsError(
             f"there is no world named {shown(os.fspath(name_or_path))} and no such file; choose "
-            f"one of {known}, or give the path of a map file."
+            f"one of {', '.join(names())}, or give the path of a map file."
         )
     try:
         world = builder(**given, **({"seed": seed} if is_drawn(name_or_path) else {}))

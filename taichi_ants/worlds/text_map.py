@@ -47,10 +47,7 @@ def from_text(text: str, source: str = "the map") -> World:
     """The world drawn in `text`, in the form that the module's docstring describes.
 
     The ranges are those of the smallest world that holds the drawn cells; cells of it that are not
-    drawn become obstacles. Messages call the text `source`.
-
-    Raises:
-        AntsError: The map is damaged; names line, column, what stands there and what is allowed.
+    drawn become obstacles. AntsError, which calls the text `source`, if the map is damaged.
     """
     if not isinstance(text, str):
         raise AntsError(f"{source} is {type(text).__name__}; it must be text.")
@@ -114,11 +111,10 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
             continue
         row += 1
         for column, mark in enumerate(line):
-            if mark == " ":
-                continue
-            drawn.append(_Drawn(mark, number, row, column))
-            if mark not in _CELLS:
-                raise AntsError(f"{drawn[-1].found(source)}; allowed are {_ALLOWED}.")
+            if mark != " ":
+                drawn.append(_Drawn(mark, number, row, column))
+                if mark not in _CELLS:
+                    raise AntsError(f"{drawn[-1].found(source)}; allowed are {_ALLOWED}.")
     if not drawn:
         raise AntsError(f"{source} draws no cell; draw cells with {_ALLOWED}.")
     queens = [one for one in drawn if one.mark == QUEEN]

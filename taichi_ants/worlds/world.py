@@ -5,15 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from taichi_ants.errors import AntsError, check_one_of, shown, whole
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.grid.randomness import choose, stream_state
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.worlds import geometry, starts, validation
+from taichi_ants.worlds import validation
 
+Start = Literal["nest", "spread"]
+STARTS: tuple[str, ...] = get_args(Start)
+# Which cells of a 3 x 3 window (rows r, columns q) are neighbours on the hexagonal grid.
+_NEIGHBOURS = np.array([[1, 1, 0], [1, 1, 1], [0, 1, 1]])
 _PARTS = ("foods", "obstacles", "trails", "ants")
 
 
@@ -92,21 +99,30 @@ class World:
 
     def distances(self) -> np.ndarray:
         """int32 (grid.size,): steps from each cell to the queen, obstacles ignored; 0 outside."""
-        return geometry.distances(self.grid, self.queen) * self.grid.exists
+        return self.grid.distances(self.queen) * self.grid.exists
 
     def closer(self) -> np.ndarray:
         """uint8 (grid.size,): bit h is set if the neighbour at heading h is nearer to the queen."""
-        here = geometry.distances(self.grid, self.queen)
+        here = self.grid.distances(self.queen)
         bits = np.zeros(self.grid.size, dtype=np.uint8)
         for heading, offset in enumerate(self.grid.offsets.tolist()):
             there = np.roll(here, -offset)
             bits |= (there < here).astype(np.uint8) << np.uint8(heading)
         return bits * self.grid.exists
 
+    def walkable(self, starts: np.ndarray) -> np.ndarray:
+        """bool (grid.size,): empty cells that can be reached from an empty one of `starts`."""
+        # Importing scipy.ndimage takes longer than all else here, and most worlds never need it.
+        from scipy.ndimage import label
+
+        ground = self.ground().reshape(self.grid.height, self.grid.width)
+        regions = label(ground == EMPTY, structure=_NEIGHBOURS)[0].reshape(-1)
+        home = regions[starts]
+        return np.isin(regions, home[home > 0])
+
     def reachable_foods(self) -> np.ndarray:
         """bool (F,): whether an ant can walk from beside the queen to beside a food."""
-        beside_queen = self.grid.index(self.queen) + self.grid.offsets
-        found = geometry.walkable(self.grid, self.ground(), beside_queen)
+        found = self.walkable(self.grid.index(self.queen) + self.grid.offsets)
         return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
 
     def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
@@ -116,11 +132,56 @@ class World:
             seed: Any whole number; decides cells (ties of distance), and headings of placed ants.
             n: Number of ants, at least 1. If fewer than the listed ants, the first of these.
             where: "nest": on the free cells nearest to the queen. "spread": on any free cells.
-
-        Raises:
-            AntsError: An argument is not allowed, or too few cells are free.
         """
-        return starts.place(self, seed, n, where)
+        seed, n = whole("seed", seed), whole("n", n)
+        if n < 1:
+            raise AntsError(f"n is {shown(n)}; there must be at least 1 ant.")
+        check_one_of("where", where, STARTS)
+        cells, headings = self.grid.index(self.ants[:n, :3]), self.ants[:n, 3]
+        if len(cells) < n:
+            placed = self._free_cells(seed, n - len(cells), cells, where)
+            words = stream_state(seed, STREAM_START_HEADING, np.arange(len(cells), n))
+            headings = np.concatenate([headings, choose(words >> np.uint64(32), N_HEADINGS)])
+            cells = np.concatenate([cells, placed])
+        return cells.astype(np.int32), headings.astype(np.int32)
+
+    def first_starts(self, seeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`start` of one ant in the nest by each seed, uint64 (n,)."""
+        if len(self.ants) or not len(seeds):
+            listed = self.grid.index(self.ants[:1, :3]), self.ants[:1, 3]
+            cells, headings = (np.broadcast_to(one, len(seeds)) for one in listed)
+            return cells.astype(np.int32), headings.astype(np.int32)
+        free = np.flatnonzero(self.ground() == EMPTY)
+        if not len(free):
+            self.start(0)  # says that there is no room
+        distance = self.distances()[free]
+        nearest = free[distance == distance.min()]
+        numbers = self.grid.number(self.grid.cells(nearest))
+        words = stream_state(seeds[:, None], STREAM_START_CELL, numbers[None, :])
+        headings = choose(stream_state(seeds, STREAM_START_HEADING, 0) >> np.uint64(32), N_HEADINGS)
+        return nearest[words.argmin(axis=1)].astype(np.int32), headings.astype(np.int32)
+
+    def _free_cells(self, seed: int, n: int, taken: np.ndarray, where: str) -> np.ndarray:
+        """The first n free cells by their distance to the queen ("nest" only), then by a hash."""
+        free = self.ground() == EMPTY
+        free[taken] = False
+        index = np.flatnonzero(free)
+        if n > len(index):
+            raise AntsError(
+                f"{shown(n + len(taken))} ants are asked for; this world has room for "
+                f"{len(index) + len(taken)}, so ask for fewer ants or choose a larger world."
+            )
+        if where == "nest":
+            distance = self.distances()[index]
+            # Only the cells up to the distance at which n are complete need a hash and an order.
+            last = np.searchsorted(np.cumsum(np.bincount(distance)), n)
+            index, distance = index[distance <= last], distance[distance <= last]
+        words = stream_state(seed, STREAM_START_CELL, self.grid.number(self.grid.cells(index)))
+        if where == "nest":
+            return index[np.lexsort((words, distance))[:n]]
+        # The cells of the n smallest words are a sample without replacement.
+        first = np.argpartition(words, n - 1)[:n]
+        return index[first[np.argsort(words[first])]]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the world as names and lists of numbers, for files; `from_dict` reads it."""

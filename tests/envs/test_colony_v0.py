@@ -197,7 +197,7 @@ def test_steps_in_the_wrong_order_and_wrong_actions(capsys):
 def test_a_missing_pettingzoo_is_named(tmp_path):
     code = (
         "import sys; sys.modules['pettingzoo'] = None\n"
-        "import taichi_ants.envs.colony_vector\n"
+        "import taichi_ants.envs.colony\n"
         "from taichi_ants.envs import colony_v0"
     )
     done = subprocess.run(

@@ -16,8 +16,8 @@ from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 from taichi_ants import AntsError, Task, worlds
 from taichi_ants.envs import Event
+from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
-from taichi_ants.envs.colony_vector import HexColonyVectorEnv
 from taichi_ants.task import Life
 from taichi_ants.task.constants import GIVE
 from taichi_ants.task.task import foraging
@@ -166,7 +166,7 @@ def test_single_worlds_begin_anew_while_others_go_on():
             assert_same(told[k][:ANTS], other[k])
         before = other[0]
     assert np.array_equal(told[3], ~mask)
-    with pytest.raises(ResetNeeded, match=r"^the episode of world 0 has ended; "):
+    with pytest.raises(ResetNeeded, match=r"^the episode of environment 0 has ended; "):
         env.step(actions)
     env.reset(options={"reset_mask": ~mask})
     for _ in range(9):
@@ -219,7 +219,7 @@ def test_an_ant_that_delivers_is_terminated_and_goes_on():
 def test_what_users_register_and_wrap():
     """Made by Gymnasium without a warning; its wrappers read infos and episodes."""
     gymnasium.register(
-        "tests/Colony-v0", vector_entry_point="taichi_ants.envs.colony_vector:HexColonyVectorEnv"
+        "tests/Colony-v0", vector_entry_point="taichi_ants.envs.colony:HexColonyVectorEnv"
     )
     env = gymnasium.make_vec("tests/Colony-v0", num_envs=64, max_steps=5)
     assert (env.num_envs, env.metadata["autoreset_mode"]) == (64, SAME)

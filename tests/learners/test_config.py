@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from taichi_ants import AntsError, TrainingConfig, learners
-from taichi_ants.learners.config import share_of_one
+from taichi_ants.checks import checked_share
 
 GOOD = {
     **{"learner": "dyna_q", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3},
@@ -136,9 +136,10 @@ def test_configurations_cannot_be_changed():
 
 @pytest.mark.parametrize("value", NO_SHARES)
 def test_no_share_of_one(value):
-    assert not share_of_one(value)
+    with pytest.raises(AntsError, match="must be a number between 0 and 1"):
+        checked_share("epsilon", value)
 
 
 @pytest.mark.parametrize("value", [0, 1, 0.5, np.float32(0.25), np.int64(1), Fraction(1, 3)])
 def test_share_of_one(value):
-    assert share_of_one(value)
+    assert checked_share("epsilon", value) == float(value)

@@ -16,8 +16,8 @@ from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
 from taichi_ants.task import Task, foraging, observations, queueing
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
+from taichi_ants.worlds import paper
 from taichi_ants.worlds.open_world import open_world
-from taichi_ants.worlds.paper import paper
 
 
 def best_actions(q_values: np.ndarray, name: str, observation: str = "paper") -> set[int]:

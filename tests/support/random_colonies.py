@@ -13,7 +13,7 @@ from taichi_ants.engines.colony.colony import SHARINGS
 from taichi_ants.task import Life, Pheromone, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY, GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds import World
-from taichi_ants.worlds.starts import STARTS
+from taichi_ants.worlds.world import STARTS
 
 LEARNERS = ("q_learning", "sarsa", "expected_sarsa", "dyna_q")  # ants can share their tables
 

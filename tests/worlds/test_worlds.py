@@ -15,7 +15,7 @@ from taichi_ants.grid.randomness import stream_state
 from taichi_ants.reference.ants import starts
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds import World
-from taichi_ants.worlds.starts import STARTS as WHERE
+from taichi_ants.worlds.world import STARTS as WHERE
 
 ARRAYS = ("foods", "obstacles", "trails", "ants")
 

@@ -20,7 +20,6 @@ from taichi_ants.analysis.bounds.surroundings import Surroundings, in_view, look
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
-from taichi_ants.worlds.geometry import walkable
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
@@ -70,7 +69,7 @@ class EpisodeBounds:
         cells, headings = world.start(seed=0)
         cell = int(np.searchsorted(around.cells, cells[0]))
         self._start = int(headings[0]) * len(around.cells) + cell
-        reached = walkable(world.grid, world.ground(), cells)[around.cells]
+        reached = world.walkable(cells)[around.cells]
         self._build(around, around.food & reached, task.rewards)
 
     def _build(self, around: Surroundings, food: np.ndarray, paid: Rewards) -> None:

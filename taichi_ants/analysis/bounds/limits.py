@@ -25,7 +25,6 @@ from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.worlds.geometry import walkable
 from taichi_ants.worlds.world import World
 
 
@@ -50,7 +49,7 @@ def limits_of(world: World, task: Task | None = None) -> Limits:
     """The limits of a world under the traffic of a task; None is the paper's."""
     task = Task() if task is None else task
     around = world.grid.index(world.queen) + world.grid.offsets
-    cells = walkable(world.grid, world.ground(), around)[around]
+    cells = world.walkable(around)[around]
     ticks = 2 if task.traffic.shared or task.turns_at_queen else 3
     return Limits(shortest_cycle(world, task), 1000 * int(cells.sum()) / ticks)
 

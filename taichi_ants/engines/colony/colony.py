@@ -16,8 +16,7 @@ from taichi_ants.learners import get as get_learner
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
-from taichi_ants.worlds.starts import Start
-from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import Start, World
 
 Progress = Callable[[float], None]
 Sharing = Literal["shared", "independent", "frozen"]

@@ -31,7 +31,6 @@ from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.worlds import geometry
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
@@ -235,7 +234,7 @@ class Interventions:
         colony, grid = self.colony, self.colony.grid
         words = stream_state(colony.seeds[0], STREAM_START_CELL, grid.number(grid.cells(cells)))
         queen = grid.cells(colony.arrays["worlds"][WorldRow.QUEEN_CELL, 0])
-        far = geometry.distances(grid, tuple(queen.tolist()))[cells]
+        far = grid.distances(tuple(queen.tolist()))[cells]
         return cells[np.lexsort((words, far * (colony.start == "nest")))]
 
     def set_task(self, task: Task) -> None:

@@ -19,12 +19,11 @@ from taichi_ants.engines.colony import learning, life, steps, trail
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
 from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.learners.learner import Learner
-from taichi_ants.learners.memory import read_rates
-from taichi_ants.learners.td_errors import guarded
+from taichi_ants.learners.memory import guarded, read_rates
+from taichi_ants.task import Traffic
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.conflicts import STANDS
-from taichi_ants.task.traffic import Traffic
 
 ANTS, CELLS, WORLD = "ants", "cells", "world"
 

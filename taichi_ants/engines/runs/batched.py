@@ -16,7 +16,6 @@ from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.task import Task
-from taichi_ants.worlds.starts import first_starts
 from taichi_ants.worlds.world import World
 
 _PER_CHUNK = 256  # ants that one thread steps together
@@ -82,7 +81,7 @@ class BatchedEnvironments:
         self.arrays["random_states"][which] = stream_state(words, STREAM_ANT, 0)
         for number, world in enumerate(self.worlds):
             here = self.arrays["worlds"][which] == number
-            cells, headings = first_starts(world, words[here])
+            cells, headings = world.first_starts(words[here])
             self.arrays["start_cells"][which[here]] = cells
             self.arrays["start_headings"][which[here]] = headings
 

@@ -23,7 +23,6 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Learner
 from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.worlds.starts import first_starts
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
@@ -157,7 +156,7 @@ class Launcher:
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
         self._runs, self._arguments = runs, Arguments()
-        self._cells, self._headings = first_starts(world, words_of(runs.seeds))
+        self._cells, self._headings = world.first_starts(words_of(runs.seeds))
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"

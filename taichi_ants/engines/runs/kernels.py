@@ -24,7 +24,7 @@ from taichi_ants.engines.layout import (
 )
 from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, percept_of, restore, state_seen
-from taichi_ants.learners.hyperparameters import Hyperparameters
+from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
 from taichi_ants.task.constants import ROW

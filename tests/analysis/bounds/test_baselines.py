@@ -16,7 +16,7 @@ from taichi_ants.analysis.bounds.baselines import (
 )
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Rewards, Task
-from taichi_ants.worlds.paper import paper
+from taichi_ants.worlds import paper
 from taichi_ants.worlds.world import World
 
 

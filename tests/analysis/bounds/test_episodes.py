@@ -15,7 +15,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Pheromone, Rewards, Task
-from taichi_ants.worlds.paper import paper
+from taichi_ants.worlds import paper
 from taichi_ants.worlds.world import World
 
 

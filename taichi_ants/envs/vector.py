@@ -1,0 +1,315 @@
+"""The part that all environments share: arguments, and the protocol of Gymnasium's vector ones."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.error import InvalidAction, ResetNeeded
+from gymnasium.spaces import Discrete
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from taichi_ants import checks
+from taichi_ants.envs.formats import ObservationFormat, Shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, count, shown
+from taichi_ants.task import Task
+from taichi_ants.task.constants import GIVE, N_ACTIONS, N_STATES, PICK_UP
+from taichi_ants.task.states import state_from_index
+from taichi_ants.worlds import World, build, from_text
+
+if TYPE_CHECKING:
+    from taichi_ants.rendering import Scene
+
+Worlds = str | World | Sequence[str | World]
+
+
+def _action_masks() -> np.ndarray:
+    masks = np.zeros((N_STATES, N_ACTIONS), np.int8)
+    for percept, mask in enumerate(masks):
+        state = state_from_index(percept)
+        mask[:PICK_UP] = [code % 2 == 0 for code in state.view]  # E, T and S can be entered
+        mask[GIVE if state.carries else PICK_UP] = 3 in state.view
+        if not mask.any():  # a dead end, which an ant leaves by turning
+            mask[:PICK_UP] = 1
+    return masks
+
+
+ACTION_MASKS = _action_masks()  # what can succeed, by percept: int8 (128, 5)
+
+
+class Ants(ABC):
+    """The ants of an environment, in one or more worlds; AntsError if an argument is not allowed.
+
+    Attributes:
+        task: The rules.
+        worlds: All of the same ranges; world number w is number w modulo their number.
+        evaporates: Whether trails evaporate.
+        max_steps: The step limit of an episode.
+        shown: How states are shown.
+    """
+
+    def __init__(
+        self,
+        world: Worlds,
+        n_worlds: int,
+        task: Task,
+        max_steps: int,
+        max_episode_steps: int | None,
+        observation_format: ObservationFormat,
+        evaporation: bool | None,
+        render_mode: str | None,
+        render_modes: Sequence[str],
+    ) -> None:
+        self.task, self.worlds = task, _worlds_of(world, n_worlds)
+        self.evaporates = task.evaporation_in_training
+        if evaporation is not None:
+            self.evaporates = checked_flag("evaporation", evaporation)
+        if render_mode is not None:
+            check_one_of("render_mode", render_mode, render_modes)
+        self.max_steps = checks.checked_max_steps(max_steps, task)
+        if max_episode_steps is not None:
+            limit = checked_whole("max_episode_steps", max_episode_steps)
+            self.max_steps = min(self.max_steps, limit)
+        self.shown = Shown(task.sees, observation_format)
+        self._scene: Scene | None = None
+
+    @abstractmethod
+    def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
+        """Begin an episode in the worlds `which`, bool (W,), those with a seed by their seed."""
+
+    @abstractmethod
+    def advance(
+        self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Let all ants act, (n,); `waiting`, bool (W,), are worlds whose episode is over.
+
+        Returns copies: rewards float64, terminations and truncations bool, (n,).
+        """
+
+    @abstractmethod
+    def facts(self, last: bool = False) -> dict[str, np.ndarray]:
+        """The infos of all ants, (n, ...), now or, if `last`, before `advance` began an episode."""
+
+    @abstractmethod
+    def draw(self, world: int) -> Any:
+        """A picture of a world."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_scene": None}  # it is drawn anew
+
+
+def _worlds_of(world: Any, most: int) -> tuple[World, ...]:
+    given = [world] if isinstance(world, (str, World)) else world
+    if not isinstance(given, (list, tuple)) or not given:
+        raise AntsError(
+            f"world is {shown(world)}; give the name of a world, a World, or a list of them."
+        )
+    if len(given) > most:
+        raise AntsError(f"world lists {count(len(given), 'world')}; there is room for {most}.")
+    several = tuple(
+        checks.checked_world(
+            one if not isinstance(one, str) else from_text(one) if "\n" in one else build(one)
+        )
+        for one in given
+    )
+    ranges = {one.ranges for one in several}
+    if len(ranges) > 1:
+        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+    return several
+
+
+class StepLimit:
+    """Base of environments whose `spec.max_episode_steps` is their own step limit.
+
+    Gymnasium leaves it out of the spec of an environment that it does not wrap in a `TimeLimit`.
+    """
+
+    _ants: Ants
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """The specification of an environment that Gymnasium has made, else None."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, given: EnvSpec | None) -> None:
+        self._spec = given and replace(given, max_episode_steps=self.max_steps)
+
+    @property
+    def max_steps(self) -> int:
+        """The step limit of an episode."""
+        return self._ants.max_steps
+
+
+class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
+    """Base of the vector environments.
+
+    With n worlds of k ants, environment number w * k + i is ant number i of world number w. Infos
+    are arrays with an entry for each environment and, for each name, `_name`, bool (num_envs,): the
+    environments that the entries are of.
+    """
+
+    def __init__(
+        self,
+        ants: Ants,
+        n_worlds: int,
+        num_envs: int,
+        autoreset_mode: str | AutoresetMode,
+        render_mode: str | None,
+    ) -> None:
+        self._ants, self._n_worlds, self.num_envs = ants, n_worlds, num_envs
+        given = getattr(autoreset_mode, "value", autoreset_mode)
+        check_one_of("autoreset_mode", given, [one.value for one in AutoresetMode])
+        self.autoreset_mode, self.render_mode = AutoresetMode(given), render_mode
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.single_observation_space = ants.shown.space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.single_action_space = Discrete(N_ACTIONS)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._over: np.ndarray | None = None  # worlds whose episode is over; None: none has begun
+        self._all = np.ones(num_envs, bool)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Begin an episode in all worlds, or in some; return observations and infos.
+
+        Args:
+            seed: Of world number w, `seed + w`; or one for each world, None where it goes on. A
+                seed decides all chance: episodes repeat exactly. None: the random numbers of each
+                world go on; in the first reset seeds are drawn.
+            options: "reset_mask", bool (num_envs,): which environments to reset, whole worlds.
+
+        Raises:
+            TypeError, ValueError: Seeds or mask have not this form.
+            ResetNeeded: There is a mask, but there are no other episodes to go on with.
+        """
+        mask = self._mask(options)
+        which = mask.reshape(self._n_worlds, -1)[:, 0]
+        super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
+        seeds = seeds_of(seed, self._n_worlds)
+        if self._over is None:
+            drawn = self.np_random.integers(2**63, size=self._n_worlds).tolist()
+            seeds = [a if b is None else b for a, b in zip(drawn, seeds, strict=True)]
+        self._ants.begin(which, seeds)
+        self._over = np.zeros_like(which) if self._over is None else self._over & ~which
+        facts = self._ants.facts()
+        return self._ants.shown.show(facts["state"]), self._infos(facts, mask)
+
+    def _mask(self, options: dict[str, Any] | None) -> np.ndarray:
+        """The environments to reset, bool (num_envs,)."""
+        if not isinstance(options, (dict, type(None))):
+            raise TypeError(f"options is {shown(options)}; it must be a dict or None.")
+        mask, n = (options or {}).get("reset_mask"), self.num_envs
+        if mask is None:
+            return self._all
+        if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
+            raise TypeError(f"reset_mask is {shown(mask)}; it must be a NumPy array of bool.")
+        if mask.shape != (n,) or not mask.any():
+            raise ValueError(
+                f"reset_mask is {shown(mask)}; it must have shape ({n},) and hold a True."
+            )
+        by_world = mask.reshape(self._n_worlds, -1)
+        if (by_world.any(axis=1) != by_world.all(axis=1)).any():
+            raise ValueError("reset_mask names some ants of a world alone; name all or none of it.")
+        if self._over is None and not mask.all():
+            raise ResetNeeded("no episode is under way; call reset() without a reset_mask first.")
+        return mask
+
+    def step(
+        self, actions: Any
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Let all ants act, integers 0 to 4, (num_envs,).
+
+        Returns:
+            Observations; rewards, float64; terminated and truncated, bool (num_envs,); infos.
+
+        Raises:
+            ResetNeeded: No episode has begun; or one has ended, and autoreset_mode is "Disabled".
+            InvalidAction: There are not as many actions, or one of them is none.
+        """
+        if self._over is None:
+            raise ResetNeeded("no episode is under way; call reset() before step().")
+        ants, mode = self._ants, self.autoreset_mode
+        if mode is AutoresetMode.DISABLED and self._over.any():
+            number = self._over.argmax() * (self.num_envs // self._n_worlds)
+            raise ResetNeeded(
+                f"the episode of environment {number} has ended; call reset() with "
+                'options={"reset_mask": ...} before step().'
+            )
+        given = _checked_actions(actions, self.num_envs)
+        rewards, terminated, truncated = ants.advance(given, mode, self._over)
+        over, final = terminated | truncated, {}
+        facts = ants.facts()
+        if mode is not AutoresetMode.SAME_STEP:
+            self._over = over.reshape(self._n_worlds, -1)[:, 0]
+        elif over.any():
+            last = ants.facts(last=True)
+            seen = np.full(self.num_envs, None, dtype=object)
+            seen[over] = np.fromiter(ants.shown.show(last["state"][over]), dtype=object)
+            final = {"final_obs": seen, "_final_obs": over}
+            final |= {"final_info": self._infos(last, over), "_final_info": over.copy()}
+            results = {"event", "reason"} & facts.keys()
+            facts |= {name: np.where(over, 0, facts[name]) for name in results}  # NONE
+        infos = self._infos(facts, self._all) | final
+        return ants.shown.show(facts["state"]), rewards, terminated, truncated, infos
+
+    def _infos(self, facts: dict[str, np.ndarray], have: np.ndarray) -> dict[str, Any]:
+        """The infos of the environments that `have` them, bool (num_envs,); 0 for the others."""
+        infos: dict[str, Any] = dict(facts)
+        if not have.all():
+            infos = {
+                k: one * (have if one.ndim == 1 else have[:, None]) for k, one in facts.items()
+            }
+        return infos | {f"_{name}": have.copy() for name in facts}
+
+    def render(self) -> tuple[Any, ...] | None:
+        """A picture or a text map of each world, see `render_mode`; None without one."""
+        if self.render_mode is None:
+            return None
+        if self._over is None:
+            raise ResetNeeded("no episode is under way; call reset() before render().")
+        return tuple(map(self._ants.draw, range(self._n_worlds)))
+
+
+def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
+    """The seed of each of n worlds, None for those that go on, as Gymnasium counts them."""
+    if seed is None:
+        return [None] * n
+    if isinstance(seed, (int, np.integer)):
+        return range(int(seed), int(seed) + n)
+    if not isinstance(seed, (list, tuple, np.ndarray)) or np.shape(seed)[:1] != (n,):
+        raise ValueError(f"seed is {shown(seed)}; give a whole number, or a list of {n}.")
+    for one in seed:
+        if one is None:
+            continue
+        if not isinstance(one, (int, np.integer)):
+            raise ValueError(f"a seed is {shown(one)}; it must be a whole number from 0 on.")
+        seeding.np_random(int(one))  # says what Gymnasium says of negative ones
+    return [None if one is None else int(one) for one in seed]
+
+
+def _checked_actions(actions: Any, n: int) -> np.ndarray:
+    try:
+        given = np.asarray(actions)
+    except ValueError:  # lists of several lengths
+        given = np.empty(0)
+    if given.shape != (n,) or given.dtype.kind not in "iu":
+        raise InvalidAction(
+            f"the actions are {shown(actions)}; they must be an array of an integer type and of "
+            f"shape ({n},)."
+        )
+    if given.min() < 0 or given.max() >= N_ACTIONS:
+        wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
+        raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
+    return given
