@@ -211,7 +211,7 @@ def measured(
 def write_tables(folder: Path, results: Results) -> None:
     """Write all tables and the report."""
     from taichi_ants import files
-    from taichi_ants.analysis.paper.audit import claims_markdown, claims_rows
+    from taichi_ants.analysis.paper.claims import claims_markdown, claims_rows
     from taichi_ants.analysis.paper.report import report, table2_markdown
     from taichi_ants.files.results import REPORT
 
@@ -243,7 +243,7 @@ def write_policies(
     """
     from taichi_ants import files, save_policy
     from taichi_ants.analysis.behaviour import BEHAVIOURS
-    from taichi_ants.analysis.paper.best_of import example_name, examples
+    from taichi_ants.analysis.paper.summary import example_name, examples
     from taichi_ants.report.players import played
 
     animates = not (settings.no_figures or settings.quick)
@@ -303,7 +303,7 @@ def comparison_of(
 ) -> Comparison:
     """Return the comparison of arrays from `measured`, with its curves if they are among them."""
     from taichi_ants.analysis.paper.comparison import Comparison, Row
-    from taichi_ants.analysis.paper.curves import CURVES
+    from taichi_ants.analysis.paper.figures import CURVES
     from taichi_ants.analysis.paper.measures import MEASURES
 
     first = study.points[0]
@@ -326,8 +326,8 @@ def with_curves(
     study: Study[RunPoint], blocks: Path, comparison: Comparison
 ) -> tuple[Comparison, dict[tuple[int, int], np.ndarray]]:
     """Read curves and the examples' tables, by row and place of the seed, from finished blocks."""
-    from taichi_ants.analysis.paper.best_of import examples
-    from taichi_ants.analysis.paper.curves import curve_row, learning_curves
+    from taichi_ants.analysis.paper.figures import curve_row, curves_of
+    from taichi_ants.analysis.paper.summary import examples
 
     shown, tables = examples(comparison), {}
     rows = [row for row, _ in shown] + [curve_row(comparison, *one) for one in comparison.learners]
@@ -338,7 +338,7 @@ def with_curves(
                 tables[row, run] = outcome["q_values"][run].copy()
             yield row, outcome
 
-    return replace(comparison, curves=learning_curves(comparison, outcomes())), tables
+    return replace(comparison, curves=curves_of(comparison, outcomes())), tables
 
 
 def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:

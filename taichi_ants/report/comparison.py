@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from taichi_ants.analysis.paper.audit import headlines
+from taichi_ants.analysis.paper import report
+from taichi_ants.analysis.paper.claims import headlines
 from taichi_ants.analysis.paper.published import (
     GREEDY_RETURN,
     GREEDY_STEPS,
@@ -12,7 +13,7 @@ from taichi_ants.analysis.paper.published import (
     Q_LEARNING,
     TABLE_2,
 )
-from taichi_ants.analysis.paper.report import Results, all_tables, behaviour_table
+from taichi_ants.analysis.paper.report import Results
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
 from taichi_ants.report.page import Statement, Statements, fill, judged
@@ -24,11 +25,8 @@ def comparison_page(
 ) -> str:
     """Return the page as HTML; `facts` say how it was done, `files` what lies beside it."""
     comparison = results.comparison
-    first, *others = all_tables(comparison, results.lines, results.behaviours, results.baselines)
-    # The notes explain the first four tables, of which one is shown at once.
-    notes = next(one for one in others if not one.rows)
-    behaviours = behaviour_table(results.lines, results.behaviours)
-    more = [one for one in others if one not in (notes, behaviours)]
+    first, *others, notes = report.figure_tables(results.lines, comparison)
+    greedy, baselines = report.greedy_table(results.lines), report.baseline_table(results.baselines)
     returns = sorted((row.reward for one, row in TABLE_2.items() if one != Q_LEARNING))
     seeds = count(len(comparison.seeds), "seed")
     return fill(
@@ -50,8 +48,8 @@ def comparison_page(
         claims=_claims(results),
         first_table=first,
         table_notes=notes,
-        more_tables=more,
-        behaviours=behaviours,
+        more_tables=[*others, greedy, baselines],
+        behaviours=report.behaviour_table(results.lines, results.behaviours),
         **seen._asdict(),
         sheet_words=seen.sheet.words if seen.sheet else "",
         facts=facts,
@@ -63,15 +61,11 @@ def _claims(results: Results) -> Statements:
     """The claims, with a column of verdicts for each delivery setting."""
     lines = []
     for claim, findings in results.audit.items():
-        unit, estimator = claim.quantity.unit, claim.estimator
         told = [
-            judged(f"delivery {setting}", one, one.contrast.label, unit)
+            judged(f"delivery {setting}", one, one.contrast.label, claim.quantity.unit)
             for setting, one in findings.items()
         ]
-        facts = {
-            "Tested on": claim.tested_on,
-            "Asked": f"{estimator} {claim.criterion.words} {unit}",
-        }
+        facts = {"Tested on": claim.tested_on, "Asked": claim.asked}
         verdicts = [one.verdict for one in findings.values()]
         lines.append(Statement(claim.statement, claim.section, verdicts, facts, told))
     settings = map(sentence, results.comparison.delivery_settings)

@@ -14,9 +14,9 @@ from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, co
 from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.colony.study import JOINT, RULES, WORLD_KINDS
 from taichi_ants.analysis.drawings import Drawing, drawings
-from taichi_ants.analysis.paper.best_of import example_name, examples
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.figures import draw_all
+from taichi_ants.analysis.paper.summary import example_name, examples
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import count

@@ -11,7 +11,7 @@ from finished_pages import FACTS, comparison_html, results
 from pages import addresses, tables
 from synthetic_comparison import build, subset, unchanged
 
-from taichi_ants.analysis.paper.audit import HEADLINES, claims_rows
+from taichi_ants.analysis.paper.claims import HEADLINES, claims_rows
 from taichi_ants.analysis.paper.comparison import Variant
 from taichi_ants.analysis.paper.report import Results
 from taichi_ants.analysis.tables import number

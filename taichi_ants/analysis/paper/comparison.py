@@ -85,7 +85,7 @@ class Comparison:
         policy_returns: What the ant earned in the episode that told so, integer (rows, seeds).
         episodes, rollouts: Training episodes and greedy rollouts of a run.
         max_steps: Limit of an episode in steps.
-        curves: Learning curves of the learners, see `curves.learning_curves`.
+        curves: Learning curves of the learners, see `figures.curves_of`.
         task: The rules of all rows, except the delivery.
         world: Name of the world; only in `PAPER_WORLD` ours can be held against the paper.
     """

@@ -1,17 +1,28 @@
-"""Summaries of configurations: over all seeds, and over those whose policies do the same."""
+"""Summaries of configurations, the one that stands for each learner, and the luck of the best.
+
+The paper trains each configuration once, and reports for each algorithm the best of 16 by return
+(its table 2). `best_of` repeats that with every seed: how far would the figures have varied by
+luck?
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
-from taichi_ants.analysis.paper.comparison import Comparison, Row
+from taichi_ants.analysis.paper.comparison import Comparison, Row, Variant
 from taichi_ants.analysis.paper.measures import MEASURES
+from taichi_ants.analysis.paper.published import TABLE_2, PaperRow
+from taichi_ants.analysis.statistics import RANDOM_SEED, interquartile_mean
 from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of
 
+DRAWS = 20_000
+# What is reported of a run. The paper has one figure of steps, we have two readings of it.
+FIGURES = ("return_last50", "steps_all", "steps_last50", "deliveries_last50")
 _GREEDY = ("greedy_return", "greedy_steps", "greedy_deliveries")
 _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", *_GREEDY)
 
@@ -42,53 +53,190 @@ class Summary(NamedTuple):
         }
 
 
+def summarise(comparison: Comparison) -> list[Summary]:
+    """Return a summary of each configuration, in their order."""
+    values = {name: comparison.measures[name] for name in _MEASURES}
+    estimates = centres_of(values, [name for name in values if MEASURES[name].uses_iqm])
+    rows = zip(comparison.rows, estimates, comparison.behaviours, strict=True)
+    seeds = len(comparison.seeds)
+    return [Summary(row, seeds, found, counts(done)) for row, found, done in rows]
+
+
 class BehaviourMeans(NamedTuple):
     """The runs of a configuration with one behaviour, a row of behaviours.csv.
 
-    Means: of the last 50 training episodes, of the episode that told the behaviour, of rollouts.
+    Means are of the last 50 training episodes, of the episode that told the behaviour
+    ("policy_return"), and of the rollouts.
     """
 
     row: Row
     behaviour: int
     runs: int
-    return_last50_mean: float
-    policy_return_mean: float
-    greedy_return_mean: float
-    greedy_steps_mean: float
-    greedy_deliveries_mean: float
+    means: Mapping[str, float]
 
     def columns(self) -> dict[str, Any]:
         """Return the columns of behaviours.csv."""
-        names = self._fields[2:]
-        numbers = dict(zip(names, self[2:], strict=True))
-        return {**self.row.columns(), "behaviour": BEHAVIOURS[self.behaviour], **numbers}
-
-
-def summarise(comparison: Comparison) -> list[Summary]:
-    """Return a summary of each configuration, in their order."""
-    values = {name: comparison.measures[name] for name in _MEASURES}
-    estimates = centres_of(values, [name for name in values if MEASURES[name].uses_iqm])
-    done = map(counts, comparison.behaviours)
-    seeds = len(comparison.seeds)
-    return [
-        Summary(row, seeds, found, runs)
-        for row, found, runs in zip(comparison.rows, estimates, done, strict=True)
-    ]
+        done = {"behaviour": BEHAVIOURS[self.behaviour], "runs": self.runs}
+        means = {f"{name}_mean": mean for name, mean in self.means.items()}
+        return {**self.row.columns(), **done, **means}
 
 
 def summarise_behaviours(comparison: Comparison) -> list[BehaviourMeans]:
     """Return means for each configuration and behaviour that occurs in it."""
-    figures = [
-        comparison.measures["return_last50"],
-        comparison.policy_returns,
-        *(comparison.measures[name] for name in _GREEDY),
+    values = {
+        "return_last50": comparison.measures["return_last50"],
+        "policy_return": comparison.policy_returns,
+        **{name: comparison.measures[name] for name in _GREEDY},
+    }
+    return [
+        BehaviourMeans(
+            *(row, code, runs),
+            {name: float(array[place][done == code].mean()) for name, array in values.items()},
+        )
+        for place, (row, done) in enumerate(
+            zip(comparison.rows, comparison.behaviours, strict=True)
+        )
+        for code, runs in counts(done).items()
     ]
+
+
+def paper_row(comparison: Comparison, variant: Variant) -> PaperRow | None:
+    """The paper's table 2 for a learner; None where it has none, and in other worlds."""
+    return TABLE_2.get(variant) if comparison.in_paper_world else None
+
+
+def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> int:
+    """The row that stands for a learner: the paper's configuration.
+
+    Where there is none, its best one by the interquartile mean of the return, which a run that is
+    far off does not decide. It is chosen and reported on the same seeds, which flatters it.
+    """
+    paper = paper_row(comparison, variant)
+    same = comparison.position(delivery, variant, paper.point) if paper else None
+    if same is not None:
+        return same
+    positions = comparison.positions(delivery, variant)
+    returns = interquartile_mean(comparison.measures["return_last50"][positions])
+    return positions[int(returns.argmax())]
+
+
+def best_of(
+    comparison: Comparison, delivery: str, variant: Variant, draws: int = DRAWS
+) -> dict[str, np.ndarray]:
+    """The winner's `FIGURES`, float64 (draws,) each: each configuration runs once, on any seed."""
+    rows = np.array(comparison.positions(delivery, variant))
+    random = np.random.default_rng(RANDOM_SEED)
+    seeds = random.integers(0, len(comparison.seeds), size=(draws, len(rows)))
+    winner = comparison.measures["return_last50"][rows, seeds].argmax(axis=1)
+    won = rows[winner], seeds[np.arange(draws), winner]
+    return {name: comparison.measures[name][won] for name in FIGURES}
+
+
+class BestRun(NamedTuple):
+    """A figure of the best run of all configurations, had each been trained once.
+
+    Over repetitions with other seeds: median, range from 2.5 % to 97.5 %, and the percentage below
+    the paper's figure, nan without one.
+    """
+
+    median: float
+    low: float
+    high: float
+    paper_percentile: float
+
+    @classmethod
+    def of(cls, values: np.ndarray, paper: float = math.nan) -> BestRun:
+        """Return it from the values of repetitions; those that equal the paper's count by half."""
+        low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
+        below = float(50 * ((values < paper).mean() + (values <= paper).mean()))
+        return cls(median, low, high, math.nan if math.isnan(paper) else below)
+
+
+class Line(NamedTuple):
+    """A learner in one delivery setting, a row of table2.csv.
+
+    Attributes:
+        summary: The configuration that stands for it, see `shown_position`.
+        paper: The paper's row; None for a learner that it does not have, and in other worlds.
+        best_run_of: From how many configurations the best run is chosen.
+        best_run: By the names of `FIGURES`.
+    """
+
+    summary: Summary
+    paper: PaperRow | None
+    best_run_of: int
+    best_run: Mapping[str, BestRun]
+
+    @property
+    def delivery(self) -> str:
+        """The delivery setting."""
+        return self.summary.row.delivery
+
+    @property
+    def paper_configuration(self) -> bool:
+        """Whether the configuration is the paper's."""
+        return self.paper is not None and self.paper.point == self.summary.row.point
+
+    @property
+    def label(self) -> str:
+        """The learner, with * if its configuration is not the paper's, + if its runs differ."""
+        star = "" if self.paper_configuration else " *"
+        return self.summary.row.variant.label + star + (" +" if self.summary.mixed else "")
+
+    def of_paper(self, measure: str) -> float:
+        """Return the paper's figure of a measure, nan if it has none."""
+        return self.paper.figure(measure) if self.paper else math.nan
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of table2.csv."""
+        return {
+            **self.summary.columns(),
+            "paper_configuration": self.paper_configuration,
+            **{f"paper_{name}": self.of_paper(name) for name in ("return", "steps", "deliveries")},
+            "best_run_of": self.best_run_of,
+            **{
+                f"best_run_{name}_{field}": value
+                for name, best in self.best_run.items()
+                for field, value in best._asdict().items()
+            },
+        }
+
+
+def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DRAWS) -> list[Line]:
+    """Return a line for each delivery setting and learner, from `summarise`."""
     lines = []
-    for row, behaviours, *values in zip(
-        comparison.rows, comparison.behaviours, *figures, strict=True
-    ):
-        for code, runs in counts(behaviours).items():
-            alike = np.flatnonzero(behaviours == code)
-            means = (float(array[alike].mean()) for array in values)
-            lines.append(BehaviourMeans(row, code, runs, *means))
+    for learner in comparison.learners:
+        paper = paper_row(comparison, learner[1])
+        best = {
+            name: BestRun.of(values, paper.figure(name) if paper else math.nan)
+            for name, values in best_of(comparison, *learner, draws).items()
+        }
+        shown = summaries[shown_position(comparison, *learner)]
+        lines.append(Line(shown, paper, len(comparison.positions(*learner)), best))
     return lines
+
+
+def examples(comparison: Comparison) -> list[tuple[int, int]]:
+    """Return runs to look at, as row and place of the seed: one of each behaviour of each learner.
+
+    They are of the configuration that stands for the learner, else of the one in which the
+    behaviour is most frequent; of the runs that behave alike, the one of median return.
+    """
+    codes = comparison.behaviours
+    shown = [shown_position(comparison, *learner) for learner in comparison.learners]
+    kinds = [(row, code) for row in shown for code in counts(codes[row])]
+    others = counts(codes).keys() - {code for _, code in kinds}
+    kinds += [(int((codes == code).sum(axis=1).argmax()), code) for code in sorted(others)]
+    chosen = []
+    for row, code in kinds:
+        runs = np.flatnonzero(codes[row] == code)
+        order = np.argsort(comparison.measures["return_last50"][row, runs], kind="stable")
+        chosen.append((row, int(runs[order[(len(runs) - 1) // 2]])))
+    return chosen
+
+
+def example_name(comparison: Comparison, row: int, run: int) -> str:
+    """The name of the files of an example: its delivery setting, learner and behaviour."""
+    delivery, variant, _ = comparison.rows[row]
+    own = "".join(f"_{part}" for part in variant.short)
+    return f"{delivery}_{variant.learner}{own}_{NAMES[comparison.behaviours[row, run]]}"
