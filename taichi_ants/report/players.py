@@ -16,7 +16,7 @@ from taichi_ants.analysis.colony.study import JOINT, RULES, WORLD_KINDS
 from taichi_ants.analysis.drawings import Drawing, drawings
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.figures import draw_all
-from taichi_ants.analysis.paper.summary import example_name, examples
+from taichi_ants.analysis.paper.table2 import example_name, examples
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import count
@@ -30,6 +30,8 @@ from taichi_ants.viewer import record_colony, record_episode
 
 STEPS = 80  # of an episode, at most; a delivery takes 34, to and fro on the trail 38
 TICKS, MOST_ANTS = 240, 1000  # of a colony: how long, and how many ants are shown at most
+
+Begin = Callable[..., Callable[[], Any]]  # begins a call, and returns what waits for it
 
 
 class Seen(NamedTuple):
@@ -56,21 +58,18 @@ def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
     return Episode.play(point.world, q_values, seed=seed, max_steps=steps, task=task)
 
 
-def draw_all_for_page(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
-    """The figures. A figure that has been saved as a file is laid out a little otherwise."""
-    return drawings(draw_all(comparison, baselines))
-
-
 def what_is_seen(
     policies: Path,
     study: Study[RunPoint],
     comparison: Comparison,
-    begin: Callable[..., Callable[[], Any]] = partial,
-) -> Callable[[], tuple[list[Player], Picture | None]]:
-    """Return what waits for a recording of each behaviour and the sheet of a policy that delivers.
+    baselines: Sequence[Baseline],
+    play: Begin = partial,
+    draw: Begin = partial,
+) -> Callable[[], Seen]:
+    """Return what waits for the figures, a recording of each behaviour and the sheet of a policy.
 
     Examples whose policies are not in the folder are left out. Ants are followed here, where the
-    kernel for that is compiled; `begin` is for drawing, as `WorkerProcess.begin`.
+    kernel for that is compiled; `play` and `draw` begin the rest, as `WorkerProcess.begin`.
     """
     first: dict[int, tuple[int, int]] = {}
     for row, run in examples(comparison):
@@ -86,23 +85,23 @@ def what_is_seen(
         )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Here: {whose}."
-        episode = played(point, policy.q_values, seed)
-        recorded.append(begin(player, episode, BEHAVIOURS[code], words))
+        recording = play(record_episode, played(point, policy.q_values, seed), BEHAVIOURS[code])
+        recorded.append((sentence(BEHAVIOURS[code]), words, recording))
         if code == DELIVERS:
             title = f"{variant.label}: what it does"
-            words = f"What an ant has learned: {whose}"
-            sheets.append(begin(sheet, point.task, policy.q_values, title, words))
-    return lambda: ([one() for one in recorded], next((one() for one in sheets), None))
+            sheet = play(policy_sheet, policy.q_values, title, task=point.task)
+            sheets.append((f"What an ant has learned: {whose}", sheet))
+    drawn = draw(drawings_of, comparison, baselines)
+    return lambda: Seen(
+        drawn(),
+        [Player(title, words, one()) for title, words, one in recorded],
+        next((Picture(words, one()) for words, one in sheets), None),
+    )
 
 
-def player(episode: Episode, behaviour: str, words: str) -> Player:
-    """A recording of what a policy does."""
-    return Player(sentence(behaviour), words, record_episode(episode, behaviour))
-
-
-def sheet(task: Task, q_values: np.ndarray, title: str, words: str) -> Picture:
-    """What a policy does in each state."""
-    return Picture(words, policy_sheet(q_values, title, task=task))
+def drawings_of(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
+    """The figures. A figure that has been saved as a file is laid out a little otherwise."""
+    return drawings(draw_all(comparison, baselines))
 
 
 def at_work(policies: Path, conditions: Plan, seeds: Sequence[int], arch: str) -> list[Player]:

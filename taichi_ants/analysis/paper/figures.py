@@ -13,7 +13,7 @@ from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import FIGURE_1
-from taichi_ants.analysis.paper.summary import shown_position
+from taichi_ants.analysis.paper.table2 import shown_position
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import BLUE, COLOURS, INK, ORANGE, WINE
 from taichi_ants.errors import count

@@ -12,7 +12,7 @@ from taichi_ants.analysis.paper.claims import Audit, assess, headlines, tallies
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.measures import WINDOW
 from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS
-from taichi_ants.analysis.paper.summary import (
+from taichi_ants.analysis.paper.table2 import (
     FIGURES,
     BehaviourMeans,
     Line,

@@ -33,7 +33,7 @@ from taichi_ants.analysis.paper.figures import (
     return_against_deliveries,
 )
 from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA, VARIANTS
-from taichi_ants.analysis.paper.summary import shown_position
+from taichi_ants.analysis.paper.table2 import shown_position
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import COLOURS, save_all
 

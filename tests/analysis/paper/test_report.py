@@ -22,7 +22,7 @@ from taichi_ants.analysis.paper.report import (
     heading,
     report,
 )
-from taichi_ants.analysis.paper.summary import (
+from taichi_ants.analysis.paper.table2 import (
     shown_position,
     summarise,
     summarise_behaviours,

@@ -20,7 +20,7 @@ from taichi_ants.analysis.paper.published import (
     VARIANTS,
 )
 from taichi_ants.analysis.paper.report import table2_markdown
-from taichi_ants.analysis.paper.summary import (
+from taichi_ants.analysis.paper.table2 import (
     BestRun,
     Line,
     best_of,
