@@ -33,9 +33,7 @@ from taichi_ants.worlds.world import World
 class Limits:
     """The limits of one world; inf or 0 where nothing can be delivered.
 
-    Attributes:
-        cycle: Ticks from one delivery to the next of one ant, in the long run.
-        queen: Foods that can be given, per 1000 ticks.
+    `cycle` are ticks from one delivery of an ant to its next, `queen` foods per 1000 ticks.
     """
 
     cycle: float
@@ -48,7 +46,7 @@ class Limits:
 
 def limits_of(world: World, task: Task | None = None) -> Limits:
     """The limits of a world under the traffic of a task; None is the paper's."""
-    task = Task() if task is None else task
+    task = task or Task()
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = walkable(world.grid, world.ground(), around)[around]
     ticks = 2 if task.traffic.shared or task.turns_at_queen else 3
@@ -92,10 +90,7 @@ def shortest_cycle(world: World, task: Task) -> float:
 
 
 def _pushes(around: Surroundings) -> list[np.ndarray]:
-    """From each state those onto each neighbour that can be empty, with each heading it may take.
-
-    Edges int64 (2, n) each.
-    """
+    """From each state onto each neighbour that can be empty, turned or not; int64 (2, n) each."""
     n = len(around.cells)
     edges = []
     for neighbours, empty in zip(around.neighbours, around.empty, strict=True):
@@ -108,11 +103,7 @@ def _pushes(around: Surroundings) -> list[np.ndarray]:
 
 
 def least_mean_cycle(lengths: np.ndarray) -> float:
-    """The least mean length of an edge over all cycles of a complete graph.
-
-    Args:
-        lengths: Float (n, n), from each node to each; inf where there is no edge.
-    """
+    """The least mean length of an edge over all cycles of a graph, from float (n, n) or inf."""
     mean, walks = np.inf, lengths  # the shortest walks of k edges, from each node to each
     for k in range(1, len(lengths) + 1):
         mean = min(mean, float(walks.diagonal().min()) / k)
