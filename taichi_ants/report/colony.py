@@ -11,7 +11,7 @@ from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.tables import sentence
 from taichi_ants.errors import count
-from taichi_ants.report.page import Player, Statement, Statements, fill, judged
+from taichi_ants.report.page import Player, Shown, Statement, Statements, fill
 
 
 def colony_page(
@@ -52,7 +52,7 @@ def _statements(findings: Judged) -> Statements:
     for (world_kind, series), by_sizes in findings.items():
         unit = MEASURES[series.measure]
         told = [
-            judged(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
+            Shown(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
             for (n, less), one in by_sizes.items()
         ]
         facts = {"Question": series.question, "Difference in": unit}

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from taichi_ants.analysis.paper import report
+from taichi_ants.analysis.paper import published, report
 from taichi_ants.analysis.paper.claims import headlines
-from taichi_ants.analysis.paper.published import (
-    GREEDY_RETURN,
-    GREEDY_STEPS,
-    GRID,
-    Q_LEARNING,
-    TABLE_2,
-)
 from taichi_ants.analysis.paper.report import Results
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
-from taichi_ants.report.page import Statement, Statements, fill, judged
+from taichi_ants.report.page import Shown, Statement, Statements, fill
 from taichi_ants.report.players import Seen
 
 
@@ -27,20 +20,15 @@ def comparison_page(
     comparison = results.comparison
     first, *others, notes = report.figure_tables(results.lines, comparison)
     greedy, baselines = report.greedy_table(results.lines), report.baseline_table(results.baselines)
-    returns = sorted((row.reward for one, row in TABLE_2.items() if one != Q_LEARNING))
-    seeds = count(len(comparison.seeds), "seed")
+    seeds = len(comparison.seeds)
     return fill(
         "comparison.html",
         title="Which learner makes the better ant?",
-        byline=f"{seeds}, {count(len(comparison.rows), 'configuration')}, "
+        byline=f"{count(seeds, 'seed')}, {count(len(comparison.rows), 'configuration')}, "
         f"{thousands(comparison.behaviours.size * comparison.episodes)} episodes of training, "
         f"world: {comparison.world}",
-        seeds=f"{len(comparison.seeds)} runs" if len(comparison.seeds) > 1 else "a run",
-        configurations=len(GRID),
-        best=("Q-learning", TABLE_2[Q_LEARNING].reward),
-        others=(returns[0], returns[-1]),
-        greedy_return=f"{GREEDY_RETURN:g}",
-        greedy_steps=[f"{one:g}" for one in GREEDY_STEPS],
+        seeds=f"{seeds} runs" if seeds > 1 else "a run",
+        paper=published,
         deliveries=comparison.delivery_settings,
         world=comparison.world,
         in_paper_world=comparison.in_paper_world,
@@ -51,7 +39,6 @@ def comparison_page(
         more_tables=[*others, greedy, baselines],
         behaviours=report.behaviour_table(results.lines, results.behaviours),
         **seen._asdict(),
-        sheet_words=seen.sheet.words if seen.sheet else "",
         facts=facts,
         files=files,
     )
@@ -62,7 +49,7 @@ def _claims(results: Results) -> Statements:
     lines = []
     for claim, findings in results.audit.items():
         told = [
-            judged(f"delivery {setting}", one, one.contrast.label, claim.quantity.unit)
+            Shown(f"delivery {setting}", one, one.contrast.label, claim.quantity.unit)
             for setting, one in findings.items()
         ]
         facts = {"Tested on": claim.tested_on, "Asked": claim.asked}

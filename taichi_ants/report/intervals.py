@@ -11,7 +11,7 @@ from taichi_ants.analysis.tables import figure
 from taichi_ants.errors import count
 
 WIDTH, _MIDDLE, _NUMBERS, _LINE = 340.0, 15.0, 39.0, 15.0
-_SIDE = 26.0  # room for the numbers at the ends
+_SIDE = 26.0  # room for a number
 _LETTERS = 58  # of a line that is as wide as the drawing
 
 
@@ -52,25 +52,16 @@ def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
         *(f'<path class="edge" d="M{at(one)} {_MIDDLE - 9}v18"/>' for one in ends),
         f'<path class="span" d="M{low} {_MIDDLE}H{high}"/>',
         f'<circle cx="{at(finding.effect)}" cy="{_MIDDLE}" r="4.5"/>',
-        *(text(_signed(one), at(one), _NUMBERS) for one in _apart(ends, at)),
     ]
-    height = _NUMBERS
-    for line in wrap(axis, _LETTERS):
-        height += _LINE
-        parts.append(text(line, WIDTH / 2, height))
-    height += 5.0
+    labelled: list[float] = []
+    for one in sorted(ends, key=lambda one: (one != 0, one)):
+        if all(abs(at(one) - at(other)) > _SIDE for other in labelled):
+            labelled.append(one)
+            signed = figure(one).replace("-", "\N{MINUS SIGN}")
+            parts.append(text(signed, at(one), _NUMBERS))
+    lines = wrap(axis, _LETTERS)
+    below = enumerate(lines, start=1)
+    parts += [text(line, WIDTH / 2, _NUMBERS + _LINE * number) for number, line in below]
+    height = _NUMBERS + _LINE * len(lines) + 5.0
     size = f'viewBox="0 0 {WIDTH:g} {height:g}" width="{WIDTH:g}" height="{height:g}"'
     return f'<svg class="interval" {size} aria-hidden="true">{"".join(parts)}</svg>'
-
-
-def _signed(value: float) -> str:
-    return figure(value).replace("-", "\N{MINUS SIGN}")
-
-
-def _apart(values: list[float], at) -> list[float]:  # type: ignore[no-untyped-def]
-    """Those whose labels do not lie on each other."""
-    kept: list[float] = []
-    for value in sorted(values, key=lambda one: (one != 0, one)):
-        if all(abs(at(value) - at(other)) > 26 for other in kept):
-            kept.append(value)
-    return kept

@@ -7,7 +7,6 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 _PLAYING = ("history.js", "stage.js", "timeline.js")
 
 
-@cache
 def _text(name: str) -> str:
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
@@ -36,14 +34,9 @@ def _text(name: str) -> str:
 def _templates() -> Environment:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    return Environment(
-        loader=FunctionLoader(_text),
-        autoescape=True,
-        finalize=signed,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    how: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    loader = FunctionLoader(_text)
+    return Environment(loader=loader, finalize=signed, undefined=StrictUndefined, **how)
 
 
 def signed(text: Any) -> Any:
@@ -99,26 +92,30 @@ class Picture(NamedTuple):
         return self.image.shape[1], self.image.shape[0]
 
 
-class Judged(NamedTuple):
-    """A verdict in one setting: effect and interval in words, and as a picture (SVG)."""
+class Shown(NamedTuple):
+    """A finding in one setting, as a page shows it; `label` and `unit` are those of its effect."""
 
     setting: str
-    verdict: Verdict
-    words: str
-    drawing: str
+    finding: Finding
+    label: str
+    unit: str = ""
 
+    @property
+    def words(self) -> str:
+        """The effect and its interval, also by the mean if that has another verdict."""
+        words, by_mean = _measured(self.finding, self.label, self.unit), self.finding.by_mean
+        if by_mean and by_mean.verdict is not self.finding.verdict:
+            told = _measured(by_mean, by_mean.contrast.label, self.unit)  # of another, maybe
+            words += f"; by the mean {by_mean.verdict.value}: {told}"
+        return words
 
-def judged(setting: str, finding: Finding, label: str, unit: str = "") -> Judged:
-    """Return a finding as a page shows it; `label` and `unit` are those of its effect."""
-    words, by_mean = _measured(finding, label, unit), finding.by_mean
-    if by_mean and by_mean.verdict is not finding.verdict:  # it may rest on another contrast
-        told = _measured(by_mean, by_mean.contrast.label, unit)
-        words += f"; by the mean {by_mean.verdict.value}: {told}"
-    return Judged(setting, finding.verdict, words, interval_drawing(finding, label, unit))
+    @property
+    def drawing(self) -> str:
+        """The interval as a picture (SVG)."""
+        return interval_drawing(*self[1:])
 
 
 def _measured(finding: Finding, label: str, unit: str) -> str:
-    """The effect and its interval in words, after its label."""
     if finding.verdict is Verdict.NOT_TESTED:
         return label
     digits = 1 if finding.contrast.uses_iqm or abs(finding.effect) >= 10 else 2
@@ -128,8 +125,7 @@ def _measured(finding: Finding, label: str, unit: str) -> str:
     return f"{label}: {f'{effect} {unit}'.rstrip()}, {ends}"
 
 
-@dataclass(frozen=True)
-class Statement:
+class Statement(NamedTuple):
     """A line of the table that can be sorted and filtered.
 
     `place` is the second column: of the paper, or of the world. There is a verdict for each column
@@ -139,8 +135,15 @@ class Statement:
     text: str
     place: str
     verdicts: Sequence[Verdict]
-    facts: Mapping[str, str] = field(default_factory=dict)
-    judged: Sequence[Judged] = ()
+    facts: Mapping[str, str]
+    shown: Sequence[Shown]
+
+
+# In the order in which a reader wants them.
+KINDS = (
+    *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
+    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED, Verdict.TOO_FEW),
+)
 
 
 class Statements(NamedTuple):
@@ -152,9 +155,8 @@ class Statements(NamedTuple):
 
     @property
     def kinds(self) -> list[Verdict]:
-        """The verdicts that occur, in the order in which a reader wants them."""
-        given = {one for line in self.lines for one in line.verdicts}
-        return [one for one in KINDS if one in given]
+        """The verdicts that occur, in the order of `KINDS`."""
+        return [kind for kind in KINDS if any(kind in line.verdicts for line in self.lines)]
 
     @property
     def tallies(self) -> list[tuple[str, list[tuple[Verdict, int]]]]:
@@ -164,13 +166,6 @@ class Statements(NamedTuple):
             (header, [(one, column.count(one)) for one in self.kinds if one in column])
             for header, column in zip(self.headers[2:], columns, strict=True)
         ]
-
-
-# In the order in which a reader wants them.
-KINDS = (
-    *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
-    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED, Verdict.TOO_FEW),
-)
 
 
 def setting_facts(settings: Mapping[str, Any]) -> dict[str, str]:
@@ -190,7 +185,6 @@ def setting_facts(settings: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _plain(value: Any) -> str:
-    """A value as readers write it."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -198,13 +192,14 @@ def _plain(value: Any) -> str:
 
 def made_facts(made: Mapping[str, Any]) -> dict[str, str]:
     """What made the results, from a manifest, in words."""
-    finished = made["finished"].replace("T", " ").replace("+00:00", " UTC")
-    facts = {"Command": made["command"], "Finished": finished}
-    if made.get("commit"):
-        facts["Commit"] = made["commit"]
     packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items())
-    facts["Versions"] = f"Python {made['python']}, {packages}"
     cpus = f"{made['cpus']} processors" if made["cpus"] != 1 else "one processor"
-    facts["Machine"] = f"{made['platform']}, {cpus}"
-    facts["Time"] = f"{made['seconds']:.0f} seconds"
-    return facts
+    facts = {
+        "Command": made["command"],
+        "Finished": made["finished"].replace("T", " ").replace("+00:00", " UTC"),
+        "Commit": made["commit"],
+        "Versions": f"Python {made['python']}, {packages}",
+        "Machine": f"{made['platform']}, {cpus}",
+        "Time": f"{made['seconds']:.0f} seconds",
+    }
+    return {name: words for name, words in facts.items() if words}

@@ -41,8 +41,8 @@ TABLE_2: dict[Variant, PaperRow] = {
 # the only ones that occur twice in its table 2.
 FIGURE_1 = GridPoint(0.01, 0.9, 0.3, 0.995)
 
-GREEDY_RETURN = 45.0
-GREEDY_STEPS = (34.0, 36.0)
+GREEDY_RETURN = 45
+GREEDY_STEPS = (34, 36)
 
 # The paper's grid: each factor with its two values, in the order of `GridPoint`.
 FACTORS: dict[str, tuple[float, float]] = {

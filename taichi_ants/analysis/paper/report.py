@@ -220,7 +220,7 @@ def greedy_table(lines: Sequence[Line]) -> Table:
         both = (text for one in (gains, steps) for text in (_mean(one), number(one.iqm)))
         rows.append([line.label, line.delivery, *both, number(food.mean, 2)])
     low, high = GREEDY_STEPS
-    note = f"The paper, in its world: about {GREEDY_RETURN:g} reward in {low:g} to {high:g} steps."
+    note = f"The paper, in its world: about {GREEDY_RETURN} reward in {low} to {high} steps."
     return Table("Greedy evaluation, configurations as above", headers, rows, [note], 2)
 
 
