@@ -25,9 +25,8 @@ class PaperRow(NamedTuple):
     deliveries: float  # per episode
 
     def figure(self, measure: str) -> float:
-        """What is to be held against a measure of ours."""
-        by_word = {"return": self.reward, "steps": self.steps, "deliveries": self.deliveries}
-        return by_word[measure.partition("_")[0]]
+        """The figure for a measure of ours, by its first word."""
+        return getattr(self, measure.partition("_")[0].replace("return", "reward"))
 
 
 TABLE_2: dict[Variant, PaperRow] = {
