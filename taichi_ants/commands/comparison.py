@@ -27,13 +27,7 @@ from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
 from taichi_ants.engines.runs.training import evaluate
 from taichi_ants.files import archives
 from taichi_ants.files.results import MANIFEST, REPORT
-from taichi_ants.rendering import (
-    PAUSE,
-    Episode,
-    colony_snapshots,
-    frames,
-    save_animation,
-)
+from taichi_ants.rendering import PAUSE, Episode, colony_snapshots, frames, save_animation
 from taichi_ants.rendering.snapshots import colony_of_rollout
 from taichi_ants.report.comparison import comparison_page
 from taichi_ants.report.page import made_facts, setting_facts
@@ -78,7 +72,8 @@ def do_comparison(
     draw = worker.begin if settings.quick else partial
     if shows:
         waits.insert(0, draw(draw_figures, comparison, baselines, ready / FIGURES))
-    seen = see(settings, ready, study, comparison, baselines, worker.begin, draw)
+    shown = comparison, baselines, worker.begin, draw
+    seen = what_is_seen(ready / POLICIES, study, *shown) if shows else Seen
     worker.finish()
     rows = [one._asdict() for one in baselines]
     files.write_csv(ready / BASELINES, rows, list(rows[0]))
@@ -226,19 +221,6 @@ def draw_figures(comparison: Comparison, baselines: Sequence[Baseline], folder: 
     style.save_all(draw_all(comparison, baselines), folder)
 
 
-def see(
-    settings: argparse.Namespace,
-    folder: Path,
-    study: Study[RunPoint],
-    comparison: Comparison,
-    *more: Any,
-) -> Callable[[], Seen]:
-    """Return what waits for the pictures of the page, of which there are none without figures."""
-    if settings.no_figures:
-        return Seen
-    return what_is_seen(folder / POLICIES, study, comparison, *more)
-
-
 def write_tables(folder: Path, results: Results) -> None:
     """Write all tables and the report."""
     comparison, lines, audit = results.comparison, results.lines, results.audit
@@ -266,14 +248,13 @@ def make_page(
     if found is None:
         comparison = comparison_of(settings, study, archives.read(folder / RUNS))
         baselines = [Baseline(**row) for row in files.read_csv(folder / BASELINES)]
-        seen = see(settings, folder, study, comparison, baselines)()
-        found = Results.of(comparison, baselines), seen
+        draws = not settings.no_figures
+        seen = what_is_seen(folder / POLICIES, study, comparison, baselines) if draws else Seen
+        found = Results.of(comparison, baselines), seen()
     return comparison_page(
         *found,
-        facts={
-            "World": found[0].comparison.world,
-            **setting_facts(study.settings()),
-            **made_facts(made),
-        },
+        facts={"World": world_name(settings, study)}
+        | setting_facts(study.settings())
+        | made_facts(made),
         files=[path.name for path in folder.iterdir()] + [MANIFEST],
     )
