@@ -29,9 +29,14 @@ from taichi_ants.files import archives
 from taichi_ants.files.results import MANIFEST, REPORT
 from taichi_ants.rendering import PAUSE, Episode, colony_snapshots, frames, save_animation
 from taichi_ants.rendering.snapshots import colony_of_rollout
-from taichi_ants.report.comparison import comparison_page
+from taichi_ants.report.comparison import (
+    Seen,
+    as_in_training,
+    comparison_page,
+    played,
+    what_is_seen,
+)
 from taichi_ants.report.page import made_facts, setting_facts
-from taichi_ants.report.players import Seen, as_in_training, played, what_is_seen
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.studies.command_line import given_settings, load_plugin, progress_bar
 from taichi_ants.studies.runner import RunPoint, Study

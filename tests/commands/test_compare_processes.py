@@ -140,7 +140,7 @@ def test_a_second_process_at_the_same_work_may_finish_it(kernels, tmp_path):
 REHEARSED = """
 import pathlib, numpy as np
 from taichi_ants.commands import compare, comparison
-from taichi_ants.report.players import played
+from taichi_ants.report.comparison import played
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import record_episode
 

@@ -15,9 +15,8 @@ from taichi_ants.analysis.paper.claims import HEADLINES, claims_rows
 from taichi_ants.analysis.paper.comparison import Variant
 from taichi_ants.analysis.paper.report import Results
 from taichi_ants.analysis.tables import number
-from taichi_ants.report.comparison import comparison_page
+from taichi_ants.report.comparison import Seen, comparison_page
 from taichi_ants.report.page import setting_facts, signed
-from taichi_ants.report.players import Seen
 
 BARE = {"seen": Seen(), "facts": {}, "files": []}
 

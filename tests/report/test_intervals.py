@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from taichi_ants.analysis.findings import Contrast, Criterion, Finding, Verdict, above
-from taichi_ants.report.intervals import WIDTH, interval_drawing
+from taichi_ants.report.page import WIDTH, interval_drawing
 
 
 def finding(criterion: Criterion, effect: float, low: float, high: float) -> Finding:

@@ -11,7 +11,7 @@ from typing import Any
 from taichi_ants.analysis.findings import Contrast, Criterion, Finding, Verdict, judge, weakest
 from taichi_ants.analysis.paper import quantities
 from taichi_ants.analysis.paper.comparison import Comparison
-from taichi_ants.analysis.paper.published import FACTORS, VARIANTS
+from taichi_ants.analysis.paper.published import VARIANTS
 from taichi_ants.analysis.paper.quantities import Quantity, grids_of
 from taichi_ants.analysis.tables import Block, Table, interval, markdown, number, sentence
 from taichi_ants.files import tomllib
@@ -54,22 +54,7 @@ class Claim:
 
 
 # Names in the file for arguments of quantities, besides measures.
-_NAMED: dict[str, Any] = {
-    **{one.label: one for one in VARIANTS},
-    "at table 2": quantities.AT_TABLE_2,
-    "at figure 1": quantities.AT_FIGURE_1,
-    "mean of all": quantities.MEAN_OF_ALL,
-    "least of all": quantities.LEAST_OF_ALL,
-    "best on held-out seeds": quantities.BEST,
-    "epsilon at table 2": quantities.EPSILON_AT_TABLE_2,
-    **{f"effect of {name}": quantities.effect_of(name) for name in FACTORS},
-    **{f"reversed effect of {name}": quantities.effect_of(name, sign=-1) for name in FACTORS},
-    **{
-        f"less exploration {e} {d}": quantities.less_exploration(e, d)
-        for e in (0, 1)
-        for d in (0, 1)
-    },
-}
+_NAMED: dict[str, Any] = {**{one.label: one for one in VARIANTS}, **quantities.READS}
 
 
 def _claims() -> tuple[Claim, ...]:

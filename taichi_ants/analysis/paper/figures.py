@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from taichi_ants.analysis.style import BLUE, COLOURS, INK, ORANGE, WINE
 from taichi_ants.errors import count
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 CURVES = {"returns": "Return", "steps": "Steps", "deliveries": "Deliveries"}
@@ -96,7 +95,10 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
                 axis.set_ylim(min(0.9, axis.get_ylim()[0]), 1.02)
         for column, setting in zip(axes.T, settings, strict=True):
             column[0].set_title(f"Delivery {setting}")
-            _shortest_delivery(column, baselines)
+            for row in baselines:
+                if row.baseline == "shortest delivery" and row.return_mean is not None:
+                    for axis, level in zip(column, (row.return_mean, row.steps_mean), strict=False):
+                        axis.axhline(level, color=INK, lw=0.9, ls=":", label=row.baseline)
             column[-1].set_xlabel("Episode")
             style.logarithmic(column[-1].xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
         words = (
@@ -127,9 +129,15 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
             for code in counts(comparison.behaviours):
                 runs = of_setting & (comparison.behaviours == code)
                 colour, marker = BEHAVIOUR_LOOKS[code]
-                look = {"color": colour, "markersize": 4, "alpha": 0.6}
-                axis.plot(deliveries[runs], returns[runs], marker, label=BEHAVIOURS[code], **look)
-            _baseline_marks(axis, baselines, setting)
+                faint: dict[str, Any] = {"color": colour, "markersize": 4, "alpha": 0.6}
+                axis.plot(deliveries[runs], returns[runs], marker, label=BEHAVIOURS[code], **faint)
+            # Hollow marks, larger than those of the data and above them. Optimal policies take
+            # delivery for the end; elsewhere they are no yardstick.
+            look: dict[str, Any] = {"color": INK, "markerfacecolor": "none", "markersize": 11}
+            for row, marker in zip(baselines, cycle("osD^vph")):
+                counts_here = setting == "terminates" or row.baseline != "optimal policy"
+                if row.return_mean is not None and counts_here:
+                    axis.plot(row.deliveries_mean, row.return_mean, marker, label=row.label, **look)
         axes[0].set_ylabel("Return (reward per episode, last 50)")
         style.frame(
             figure,
@@ -144,29 +152,9 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
     return figure
 
 
-def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
-    """All figures, by their names."""
-    return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}
-
-
 FIGURES = (learning_curves, return_against_deliveries)
 
 
-def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Baseline]) -> None:
-    """Dotted lines at the return and the length of the shortest delivery, where it is known."""
-    for row in baselines:
-        if row.baseline == "shortest delivery" and row.return_mean is not None:
-            for axis, name in zip(column, ("return_mean", "steps_mean"), strict=False):
-                axis.axhline(getattr(row, name), color=INK, lw=0.9, ls=":", label=row.baseline)
-
-
-def _baseline_marks(axis: Axes, baselines: Sequence[Baseline], setting: str) -> None:
-    """Hollow marks, larger than those of the data and above them."""
-    for row, marker in zip(baselines, cycle("osD^vph")):
-        # Optimal policies take delivery for the end; elsewhere they are no yardstick.
-        counts_here = setting == "terminates" or row.baseline != "optimal policy"
-        x, y = row.deliveries_mean, row.return_mean
-        if x is not None and y is not None and counts_here:
-            axis.plot(
-                *(x, y, marker), color=INK, markerfacecolor="none", markersize=11, label=row.label
-            )
+def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
+    """All figures, by their names."""
+    return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}

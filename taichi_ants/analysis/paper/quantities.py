@@ -80,20 +80,7 @@ def _epsilon_at_table_2(grids: Grids, measure: str, variant: Variant) -> np.ndar
     return high - low
 
 
-AT_TABLE_2 = Read(
-    "at the configuration of table 2",
-    lambda grids, measure, variant: _at(grids(measure, variant), TABLE_2[variant].point),
-)
-AT_FIGURE_1 = Read(
-    f"at {FIGURE_1.label}, our choice for figure 1", lambda grids, *of: _at(grids(*of), FIGURE_1)
-)
-MEAN_OF_ALL = Read(f"mean of {ALL}", lambda grids, *of: grids(*of).mean(axis=EVERY_CONFIGURATION))
-LEAST_OF_ALL = Read(f"least of {ALL}", lambda grids, *of: grids(*of).min(axis=EVERY_CONFIGURATION))
-BEST = Read("best on half of the seeds, measured on the others", _held_out)
-EPSILON_AT_TABLE_2 = Read("epsilon 0.5 minus 0.3, all else as in table 2", _epsilon_at_table_2)
-
-
-def effect_of(factor: str, sign: int = 1) -> Read:
+def _effect_of(factor: str, sign: int = 1) -> Read:
     """The effect of a hyperparameter: its upper minus its lower value, or the reverse."""
     lower, upper = FACTORS[factor][::sign]
     return Read(
@@ -102,7 +89,7 @@ def effect_of(factor: str, sign: int = 1) -> Read:
     )
 
 
-def less_exploration(epsilon: int, decay: int) -> Read:
+def _less_exploration(epsilon: int, decay: int) -> Read:
     """Epsilon 0.3 with decay 0.99 minus another combination, by the places of its two values."""
 
     def values(grids: Grids, *of: Any) -> np.ndarray:
@@ -111,6 +98,31 @@ def less_exploration(epsilon: int, decay: int) -> Read:
 
     other = f"{FACTORS['epsilon'][epsilon]:g} / {FACTORS['epsilon_decay'][decay]:g}"
     return Read(f"epsilon / decay 0.3 / 0.99 minus {other}, mean of 4 pairs", values)
+
+
+READS: dict[str, Read] = {  # by their names in `claims.toml`
+    "at table 2": Read(
+        "at the configuration of table 2",
+        lambda grids, measure, variant: _at(grids(measure, variant), TABLE_2[variant].point),
+    ),
+    "at figure 1": Read(
+        f"at {FIGURE_1.label}, our choice for figure 1",
+        lambda grids, *of: _at(grids(*of), FIGURE_1),
+    ),
+    "mean of all": Read(
+        f"mean of {ALL}", lambda grids, *of: grids(*of).mean(axis=EVERY_CONFIGURATION)
+    ),
+    "least of all": Read(
+        f"least of {ALL}", lambda grids, *of: grids(*of).min(axis=EVERY_CONFIGURATION)
+    ),
+    "best on held-out seeds": Read("best on half of the seeds, measured on the others", _held_out),
+    "epsilon at table 2": Read(
+        "epsilon 0.5 minus 0.3, all else as in table 2", _epsilon_at_table_2
+    ),
+    **{f"effect of {name}": _effect_of(name) for name in FACTORS},
+    **{f"reversed effect of {name}": _effect_of(name, sign=-1) for name in FACTORS},
+    **{f"less exploration {e} {d}": _less_exploration(e, d) for e in (0, 1) for d in (0, 1)},
+}
 
 
 @dataclass(frozen=True)
@@ -195,7 +207,7 @@ share_below = partial(share_above, sign=-1)
 
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
     """One measure minus another of each learner, mean over all configurations."""
-    words, mean = MEAN_OF_ALL
+    words, mean = READS["mean of all"]
     both = Read(
         f"minus {MEASURES[earlier].words}, {words}",
         lambda grids, _, variant: mean(grids, later, variant) - mean(grids, earlier, variant),
@@ -225,7 +237,7 @@ def stronger(measure: str, factor: str) -> Quantity:
     """The absolute effect of a hyperparameter minus that of each other one."""
 
     def effects(other: str) -> Effect:
-        reads = [effect_of(name).values for name in (factor, other)]
+        reads = [READS[f"effect of {name}"].values for name in (factor, other)]
         return lambda grids: np.stack([read(grids, measure, v) for read in reads for v in VARIANTS])
 
     others = [other for other in FACTORS if other != factor]
