@@ -88,7 +88,7 @@ class Contrast:
     """A number of each seed, and what its estimate over seeds shall fulfil.
 
     Attributes:
-        label: What is compared, for example "Q-learning minus SARSA".
+        label: Such as "Q-learning minus SARSA".
         values: Float64 (seeds,); (k, seeds) with `of_estimates`. nan where there are none.
         uses_iqm: Whether it rests on the interquartile mean (IQM) over seeds.
         possible: The range that the estimate cannot leave; its interval is cut off there.

@@ -21,30 +21,26 @@ from taichi_ants.files import tomllib
 class Claim:
     """An empirical claim of the paper, made precise.
 
-    Attributes:
-        id, section, statement: A unique name, the paper's section, its claim in our words.
-        criterion: What every effect of the quantity must fulfil. It decides how far a word such as
-            "about", "close" or "consistently" goes.
-        quantity: What is computed.
-        why: Why this criterion or quantity, where it is not plain.
+    Every effect of the quantity must fulfil the criterion, which decides how far a word such as
+    "about", "close" or "consistently" goes.
     """
 
     id: str
-    section: str
-    statement: str
+    section: str  # of the paper
+    statement: str  # in our words
     criterion: Criterion
     quantity: Quantity
-    why: str = ""
+    why: str = ""  # this criterion or quantity
 
     @property
     def tested_on(self) -> str:
-        """What is computed, and why so."""
+        """The quantity and the reason for it in words."""
         text = f"{self.quantity.words}: {'; '.join(self.quantity.effects)}"
         return f"{text}; {self.why}" if self.why else text
 
     @property
     def estimator(self) -> str:
-        """What of the seeds must fulfil the criterion."""
+        """The estimate over seeds that must fulfil the criterion."""
         return "interquartile mean" if self.quantity.uses_iqm else "mean"
 
     @property
@@ -86,8 +82,8 @@ Audit = dict[Claim, dict[str, Finding]]  # by claim and delivery setting
 def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
     """Return findings on the claims, each in all delivery settings, all judged together.
 
-    A claim is supported if all its contrasts are and contradicted if one is; the finding is that
-    on the weakest contrast. A claim is not tested where something of what it needs is missing.
+    A claim is supported if all its contrasts are and contradicted if one is: its finding is that on
+    the weakest contrast.
     """
     grids = {delivery: grids_of(comparison, delivery) for delivery in comparison.delivery_settings}
     contrasts = {
@@ -111,14 +107,11 @@ def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
 def claims_rows(audit: Audit) -> list[dict[str, Any]]:
     """The rows of claims.csv; numbers are nan if not tested, None if not read by mean."""
 
-    def numbers(finding: Finding | None, prefix: str = "") -> dict[str, Any]:
+    def numbers(one: Finding | None, prefix: str = "") -> dict[str, Any]:
         names = ("contrast", "effect", "ci_low", "ci_high", "verdict")
-        label = finding and finding.contrast.label
-        values = (
-            (label, finding.effect, finding.low, finding.high, finding.verdict.value)
-            if finding
-            else [None] * len(names)
-        )
+        values: tuple[Any, ...] = (None,) * len(names)
+        if one:
+            values = one.contrast.label, one.effect, one.low, one.high, one.verdict.value
         return {prefix + name: value for name, value in zip(names, values, strict=True)}
 
     return [

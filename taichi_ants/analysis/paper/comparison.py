@@ -79,12 +79,10 @@ class Comparison:
     Attributes:
         measures: `MEASURES` of each run by name, float64 (rows, seeds).
         behaviours: What each final policy does, places in `BEHAVIOURS`, integer (rows, seeds).
-        policy_returns: What the ant earned in the episode that told so, integer (rows, seeds).
-        episodes, rollouts: Training episodes and greedy rollouts of a run.
-        max_steps: Limit of an episode in steps.
+        policy_returns: Returns of the episodes that told the behaviours, integer (rows, seeds).
+        episodes, rollouts, max_steps: As of a `RunPoint`.
         curves: Learning curves of the learners, see `figures.curves_of`.
         task: The rules of all rows, except the delivery.
-        world: Name of the world.
     """
 
     rows: tuple[Row, ...]

@@ -129,11 +129,8 @@ READS: dict[str, Read] = {  # by their names in `claims.toml`
 class Quantity:
     """One or more numbers of each seed, in one unit, on which a claim is tested.
 
-    Attributes:
-        words: What is computed, without what is subtracted from what, from which configurations.
-        effects: What reads them, by label, such as "Q-learning minus SARSA".
-        possible: The range that the numbers cannot leave.
-        of_estimates: As of a `Contrast`; then `effects` read float64 (k, seeds).
+    `effects` read them, by label, such as "Q-learning minus SARSA"; float64 (k, seeds) each with
+    `of_estimates`, which like `possible` is that of a `Contrast`.
     """
 
     words: str
@@ -146,10 +143,9 @@ class Quantity:
     def uses_iqm(self) -> bool:
         """Whether it rests on the IQM over seeds.
 
-        Quantities in reward or steps do: the paper speaks of what a learner does, and there the
-        mean hangs on a run in hundreds that does something else. Shares, counts of deliveries and
-        correlations rest on the mean: they are bounded, so that no run can outweigh the others,
-        and an IQM would hide that a quarter of all runs fails.
+        Quantities in reward or steps do, because outliers, one run in hundreds, pull their mean.
+        Shares, counts of deliveries and correlations are bounded, so that no run can outweigh the
+        others, and an IQM would hide that a quarter of all runs fails.
         """
         return self.possible == UNBOUNDED
 

@@ -1,8 +1,7 @@
-"""Summaries of configurations, the one that stands for each learner, and the luck of the best.
+"""The paper's table 2 beside ours, and summaries of all configurations.
 
-The paper trains each configuration once, and reports for each algorithm the best of 16 by return
-(its table 2). `best_of` repeats that with every seed: how far would the figures have varied by
-luck?
+The paper trains each configuration once, and reports for each algorithm the best of 16 by return.
+`best_of` repeats that with other seeds, which shows how much of a figure is luck.
 """
 
 from __future__ import annotations
@@ -28,15 +27,12 @@ _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", 
 
 
 class Summary(NamedTuple):
-    """A configuration over all seeds, a row of summary.csv.
-
-    `estimates` are measures over seeds; `runs` the number of runs by place in `BEHAVIOURS`.
-    """
+    """A configuration over all seeds, a row of summary.csv."""
 
     row: Row
     seeds: int
     estimates: Mapping[str, Estimator]
-    runs: Mapping[int, int]
+    runs: Mapping[int, int]  # by place in `BEHAVIOURS`
 
     @property
     def mixed(self) -> bool:
@@ -63,41 +59,29 @@ def summarise(comparison: Comparison) -> list[Summary]:
 
 
 class BehaviourMeans(NamedTuple):
-    """The runs of a configuration with one behaviour, a row of behaviours.csv.
-
-    Means are of the last 50 training episodes, of the episode that told the behaviour
-    ("policy_return"), and of the rollouts.
-    """
+    """The runs of a configuration with one behaviour, a row of behaviours.csv."""
 
     row: Row
     behaviour: int
     runs: int
-    means: Mapping[str, float]
+    means: Mapping[str, float]  # "policy_return" is of the episode that told the behaviour
 
     def columns(self) -> dict[str, Any]:
         """Return the columns of behaviours.csv."""
         done = {"behaviour": BEHAVIOURS[self.behaviour], "runs": self.runs}
-        means = {f"{name}_mean": mean for name, mean in self.means.items()}
-        return {**self.row.columns(), **done, **means}
+        return self.row.columns() | done | {f"{name}_mean": x for name, x in self.means.items()}
 
 
 def summarise_behaviours(comparison: Comparison) -> list[BehaviourMeans]:
     """Return means for each configuration and behaviour that occurs in it."""
-    values = {
-        "return_last50": comparison.measures["return_last50"],
-        "policy_return": comparison.policy_returns,
-        **{name: comparison.measures[name] for name in _GREEDY},
-    }
-    return [
-        BehaviourMeans(
-            *(row, code, runs),
-            {name: float(array[place][done == code].mean()) for name, array in values.items()},
-        )
-        for place, (row, done) in enumerate(
-            zip(comparison.rows, comparison.behaviours, strict=True)
-        )
-        for code, runs in counts(done).items()
-    ]
+    names = ("return_last50", "policy_return", *_GREEDY)
+    values = {"policy_return": comparison.policy_returns, **comparison.measures}
+    found = []
+    for place, (row, done) in enumerate(zip(comparison.rows, comparison.behaviours, strict=True)):
+        for code, runs in counts(done).items():
+            means = {name: float(values[name][place, done == code].mean()) for name in names}
+            found.append(BehaviourMeans(row, code, runs, means))
+    return found
 
 
 def paper_row(comparison: Comparison, variant: Variant) -> PaperRow | None:
@@ -108,8 +92,8 @@ def paper_row(comparison: Comparison, variant: Variant) -> PaperRow | None:
 def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> int:
     """The row that stands for a learner: the paper's configuration.
 
-    Where there is none, its best one by the interquartile mean of the return, which a run that is
-    far off does not decide. It is chosen and reported on the same seeds, which flatters it.
+    Where there is none, its best one by the IQM of the return, which no outlier decides. It is
+    chosen and reported on the same seeds, which flatters it.
     """
     paper = paper_row(comparison, variant)
     same = comparison.position(delivery, variant, paper.point) if paper else None
@@ -135,8 +119,7 @@ def best_of(
 class BestRun(NamedTuple):
     """A figure of the best run of all configurations, had each been trained once.
 
-    Over repetitions with other seeds: median, range from 2.5 % to 97.5 %, and the percentage below
-    the paper's figure, nan without one.
+    The range is from 2.5 % to 97.5 % of repetitions with other seeds.
     """
 
     median: float
@@ -146,26 +129,19 @@ class BestRun(NamedTuple):
 
     @classmethod
     def of(cls, values: np.ndarray, paper: float = math.nan) -> BestRun:
-        """Return it from the values of repetitions; those that equal the paper's count by half."""
+        """Return it from the values of repetitions; ties with the paper's count by half."""
         low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
         below = float(50 * ((values < paper).mean() + (values <= paper).mean()))
         return cls(median, low, high, math.nan if math.isnan(paper) else below)
 
 
 class Line(NamedTuple):
-    """A learner in one delivery setting, a row of table2.csv.
+    """A learner in one delivery setting, a row of table2.csv."""
 
-    Attributes:
-        summary: The configuration that stands for it, see `shown_position`.
-        paper: The paper's row; None for a learner that it does not have, and in other worlds.
-        best_run_of: From how many configurations the best run is chosen.
-        best_run: By the names of `FIGURES`.
-    """
-
-    summary: Summary
-    paper: PaperRow | None
-    best_run_of: int
-    best_run: Mapping[str, BestRun]
+    summary: Summary  # of the configuration that stands for it, see `shown_position`
+    paper: PaperRow | None  # see `paper_row`
+    best_run_of: int  # configurations
+    best_run: Mapping[str, BestRun]  # by the names of `FIGURES`
 
     @property
     def delivery(self) -> str:
@@ -219,8 +195,8 @@ def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DR
 def examples(comparison: Comparison) -> list[tuple[int, int]]:
     """Return runs to look at, as row and place of the seed: one of each behaviour of each learner.
 
-    They are of the configuration that stands for the learner, else of the one in which the
-    behaviour is most frequent; of the runs that behave alike, the one of median return.
+    It is the run of median return, in the configuration that stands for the learner, else in the
+    one in which the behaviour is most frequent.
     """
     codes = comparison.behaviours
     shown = [shown_position(comparison, *learner) for learner in comparison.learners]
