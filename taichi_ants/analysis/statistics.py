@@ -38,9 +38,9 @@ _MOST_KEPT = 1 << 27  # weights, of a byte each
 
 @lru_cache(maxsize=2)
 def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> np.ndarray:
-    """How often each of n seeds occurs in each resample, uint8 (resamples, n), read-only.
+    """Return the counts of n seeds in each resample, uint8 (resamples, n), read-only.
 
-    With `iqm` how often each of n seeds *in ascending order of their values* occurs in the middle
+    With `iqm` these are counts of the seeds, *in ascending order of their values*, in the middle
     half of each resample. Sorting a resample keeps that order, so these hold for all rows.
     """
     counts = np.empty((resamples, n), np.uint8)
@@ -78,10 +78,10 @@ def interquartile_mean(values: np.ndarray) -> np.ndarray:
 
 
 def interquartile_values(values: np.ndarray) -> np.ndarray:
-    """Values whose mean over seeds is the interquartile mean, and whose spread is the spread of it.
+    """Values (rows, seeds) that have the interquartile mean as their mean, and its spread.
 
-    They are the winsorised values (what lies beyond the middle half is moved to its ends) around
-    the IQM, stretched by what the trimming takes away; float64 (rows, seeds), as the values.
+    They are the winsorised values (moved to the ends of the middle half) around the IQM, stretched
+    by what the trimming takes away.
     """
     values = np.asarray(values, float)
     ordered, cut = np.sort(values, axis=1), values.shape[1] // 4
@@ -165,9 +165,8 @@ def cautious_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The hull of both intervals, on which verdicts rest.
 
-    Where all n seeds agree there is no spread to estimate. That they agree by chance, although
-    half of all seeds would differ, has probability 2^(1-n) (the sign test). If this is not below
-    1 - level, the interval is unbounded.
+    That all n seeds agree by chance, although half of all seeds would differ, has probability
+    2^(1-n) (the sign test). If this is not below 1 - level, the interval is unbounded.
     """
     values = np.asarray(values, float)
     n = values.shape[1]

@@ -1,4 +1,4 @@
-"""What the command lines of the experiments share: arguments, errors, interruption, progress."""
+"""The common part of command lines: arguments, errors, interruption, progress."""
 
 from __future__ import annotations
 
@@ -131,10 +131,7 @@ WORLDS = (
 
 
 def add_settings(parser: Parser, base: Settings) -> None:
-    """Add an option for each setting of a class, named as in sweep files; `base` has the defaults.
-
-    Those of `parser.own_settings` are left out.
-    """
+    """Add an option for each setting but `parser.own_settings`; `base` has the defaults."""
     parser.usage = "%(prog)s [options]"  # there are too many to list them twice
     group = parser.add_argument_group(f"{base.path} settings")
     for one in declared(type(base)):
@@ -160,10 +157,7 @@ def _literal(text: str) -> Any:
 
 
 def given_settings(settings: argparse.Namespace) -> dict[str, Any]:
-    """Return what options have given, as mappings in mappings (`settings.nested`).
-
-    The names of the world and the task, `--world` and `--task`, are left out.
-    """
+    """Return the settings that options give, as mappings in mappings (`settings.nested`)."""
     return nested({path: value for path, value in vars(settings).items() if "." in path})
 
 
@@ -198,7 +192,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
 
 def load_plugin(path: str | None) -> None:
-    """Execute a Python file, if there is one, which registers learners, observations or worlds.
+    """Execute a Python file, if given, which registers learners, observations or worlds.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.

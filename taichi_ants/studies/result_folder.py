@@ -20,8 +20,7 @@ from taichi_ants.files.results import PAGE, REPORT, ResultFolder, checksum_of, r
 
 _PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
 Results = TypeVar("Results")
-# Returns the page, as HTML, from a folder of results, from the results of the work if it was done
-# just now, and from the manifest.
+# Makes HTML from a folder of results, the results of the work if just done, and the manifest.
 Pages = Callable[[Path, Results | None, Mapping[str, Any]], str]
 
 
@@ -38,11 +37,8 @@ def work_or_show(
         settings: The command's `out`, `force`, `no_figures`, `plugin` and `arch`.
         determines: All else that determines the results.
         work: Called with a folder for blocks and one for the results, among them the report.
-        leading: Settings from which others follow, see `ResultFolder`.
+        leading: As of a `ResultFolder`, whose errors are raised.
         page: Makes the page, also if that alone is missing.
-
-    Raises:
-        AntsError: The folder holds something else, cannot be written, or was altered.
     """
     plugin = checksum_of(Path(settings.plugin)) if settings.plugin else None
     facts = {**determines, "arch": settings.arch, "plugin": plugin}

@@ -1,13 +1,12 @@
-"""What no colony can exceed where food grows back at once, whatever it has learned.
+"""Limits of colonies where food grows back at once, whatever they have learned.
 
 Both hold in the long run, for ants that neither die nor are born, and food that stays in place.
 
-- Time: an ant needs a number of ticks from one delivery to the next, at least that of the shortest
-  cycle queen -> food -> queen over (cell, heading, carrying). Food that grows back in the tick in
-  which it is taken never leaves its cell free, so that the ground stays the same and this is a
-  shortest path. An ant that is blocked by another turns on the spot, so the limit lets ants do so
-  everywhere. Where ants with food have right of way, they may push the ant: the limit lets an ant
-  without food be pushed from every cell onto each neighbour, while it turns as it likes.
+- Time: the ticks of an ant from one delivery to the next are at least those of the shortest cycle
+  queen -> food -> queen over (cell, heading, carrying). Food that grows back at once never leaves
+  its cell free, so that the ground stays the same. An ant that is blocked by another turns on the
+  spot, so the limit lets ants do so everywhere. Where ants with food have right of way, it lets an
+  ant without food be pushed from every cell onto each neighbour, while it turns as it likes.
 - Queen: the ant that gives in tick t leaves in t + 1 at the earliest. If the next one can take its
   place in that tick, by pushing or by following it, it gives in t + 2; else it enters in t + 2 and
   gives in t + 3. An ant that stays needs as many ticks: give, pick up (which turns it round), turn

@@ -1,4 +1,4 @@
-"""What is computed from one run before any statistics: one number per configuration and seed.
+"""Measures of one run before any statistics: one number per configuration and seed.
 
 "last 50" means all episodes where a run has fewer. What speaks of the first 50 or the second 50
 episodes needs 100, so that early and late never share an episode.
@@ -34,15 +34,12 @@ Outcome = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Measure:
-    """A number of a run.
-
-    `compute` is outcome -> float64 (...); `episodes` the fewest training episodes.
-    """
+    """A number of a run."""
 
     words: str
     unit: str
-    compute: Callable[[Outcome], np.ndarray]
-    episodes: int = 1
+    compute: Callable[[Outcome], np.ndarray]  # float64 (...)
+    episodes: int = 1  # of training, at least
 
     @property
     def uses_iqm(self) -> bool:
@@ -71,15 +68,10 @@ def _mean(name: str, episodes: slice, runs: Outcome) -> np.ndarray:
 def _fluctuation(name: str, episodes: slice, runs: Outcome) -> np.ndarray:
     """Root mean square change from one episode to the next, over the square root of two.
 
-    Without a trend this is the standard deviation of independent episodes. Unlike that one, it
-    hardly depends on the slow rise of a learning curve.
+    For independent episodes this is their standard deviation; a slow trend hardly changes it.
     """
     changes = np.diff(runs[name][..., episodes].astype(float))
     return np.sqrt(np.einsum("...i,...i", changes, changes) / changes.shape[-1] / 2)
-
-
-def _shortest(runs: Outcome) -> np.ndarray:
-    return runs["steps"].min(axis=-1).astype(float)
 
 
 def _repeats(runs: Outcome) -> np.ndarray:
@@ -104,7 +96,10 @@ def _measures() -> Iterator[tuple[str, Measure]]:
         greedy = partial(_mean, f"greedy_{array}", slice(None))
         yield f"greedy_{name}", Measure(f"mean {words} of the greedy rollouts", unit, greedy)
     words = "length of the shortest training episode"
-    yield "shortest_episode", Measure(words, "steps", _shortest)
+    yield (
+        "shortest_episode",
+        Measure(words, "steps", lambda runs: runs["steps"].min(axis=-1).astype(float)),
+    )
     words = "whether the last 50 episodes return more than the first 50"
     yield "improved", Measure(words, _SHARE, _improved, 2 * WINDOW)
     words = "whether all greedy rollouts of a run are equal in return and length"
