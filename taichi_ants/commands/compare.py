@@ -136,19 +136,19 @@ def compare(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.worker_process import WorkerProcess
 
     def work(*folders: Path) -> Any:
-        from taichi_ants.commands.comparison import do_comparison
+        from taichi_ants.report.results import do_comparison
 
         return do_comparison(settings, study, worker, *folders)
 
     def page(*found: Any) -> str:
-        from taichi_ants.commands.comparison import make_page
+        from taichi_ants.report.results import make_page
 
         return make_page(settings, study, *found)
 
     # Who asks for one thread wants the other processors for something else.
     with WorkerProcess(not settings.no_figures and settings.threads != 1) as worker:
         if not (settings.out / MANIFEST).exists():
-            worker.begin(import_module, "taichi_ants.commands.comparison")  # this takes a while
+            worker.begin(import_module, "taichi_ants.report.results")  # this takes a while
         study = build_study(settings)
         work_or_show(settings, study.settings(), work, page=page)
 

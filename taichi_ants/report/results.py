@@ -1,4 +1,4 @@
-"""The work of `compare`: train, measure, follow the final policies, write and draw the results."""
+"""The results of `compare`: trained, measured, written, drawn, and shown as a page."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import files, runtime, save_policy, worlds
+from taichi_ants import files, runtime, worlds
 from taichi_ants.analysis import style
 from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
 from taichi_ants.analysis.bounds import baselines as bounds
@@ -27,6 +27,7 @@ from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
 from taichi_ants.engines.runs.training import evaluate
 from taichi_ants.files import archives
 from taichi_ants.files.results import MANIFEST, REPORT
+from taichi_ants.learners.policies import save_policy
 from taichi_ants.rendering import PAUSE, Episode, colony_snapshots, frames, save_animation
 from taichi_ants.rendering.snapshots import colony_of_rollout
 from taichi_ants.report.comparison import (
