@@ -57,7 +57,7 @@ def drawing(name: str, figure: Figure) -> Drawing:
 
 
 def drawings(figures: Mapping[str, Figure]) -> list[Drawing]:
-    """All of some figures, see `drawing`."""
+    """Return all figures as markup."""
     return [drawing(name, figure) for name, figure in figures.items()]
 
 
@@ -78,7 +78,12 @@ def _for_page(svg: str, title: str) -> str:
     svg = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", svg, flags=re.S)
     svg = re.sub(r' font-family: [^;"]*;', "", svg)
     svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
-    svg = re.sub(r' (?:d|x|y|transform)="[^"]*"', _short, svg)
+    # Places and paths in tenths of a point.
+    svg = re.sub(
+        r' (?:d|x|y|transform)="[^"]*"',
+        lambda found: re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.1f}", found[0]),
+        svg,
+    )
     svg = re.sub(r"(?:<use [^>]*/>\s*){2,}", _marks, svg)
     svg = re.sub(r"\s*\n\s*", "\n", svg)
     for colour, name in COLOURS.items():
@@ -87,11 +92,6 @@ def _for_page(svg: str, title: str) -> str:
     assert box is not None
     head = f'<svg viewBox="{box[1]}" role="img" aria-label="{html.escape(title)}"'
     return re.sub(r"<svg[^>]*", lambda _: head, svg, count=1)
-
-
-def _short(found: re.Match) -> str:
-    """A place or a path in tenths of a point."""
-    return re.sub(r"-?\d+\.\d{2,}", lambda number: f"{float(number[0]):.1f}", found[0])
 
 
 _USE = re.compile(r'href="([^"]*)" x="([^"]*)" y="([^"]*)"(?: style="([^"]*)")?')

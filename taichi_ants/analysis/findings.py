@@ -1,4 +1,4 @@
-"""Contrasts judged: what the seeds say of a difference, and how surely.
+"""Contrasts and their verdicts.
 
 Contrasts that are judged together get intervals at a level corrected for their number (Bonferroni):
 with a probability of at least 95 % all hold at once, however they depend on each other. Where a
@@ -30,10 +30,7 @@ UNBOUNDED = (-np.inf, np.inf)
 
 
 class Verdict(str, Enum):
-    """What the data say, the strongest objection first.
-
-    "Equivalent" is a finding: the difference is smaller than matters. "Undecided" is none.
-    """
+    """What the data say, the strongest objection first; "undecided" is not a finding."""
 
     NOT_TESTED = "not tested"
     TOO_FEW = "too few seeds"
@@ -49,12 +46,8 @@ class Criterion:
 
     A verdict is the region that holds the whole interval: the range (supported), the margin on
     either side of 0 (equivalent), or what is neither (contradicted). If the interval reaches into
-    two of them, the contrast is undecided.
-
-    Attributes:
-        low, high: The ends of the range. A difference must exceed `low`.
-        margin: The largest difference that is too small to matter, at most `low`; None if the
-            effect is not a difference.
+    two of them, the contrast is undecided. A difference must exceed `low`, which is at least its
+    `margin`; an effect that is not a difference has None.
     """
 
     low: float
@@ -85,19 +78,18 @@ class Criterion:
         return f"from {self.low:g} to {self.high:g}"
 
 
-def above(margin: float = 0.0, least: float | None = None, most: float = np.inf) -> Criterion:
-    """Return the criterion of a difference: above `least` (the margin if None), at most `most`."""
-    return Criterion(margin if least is None else least, most, margin)
+def above(margin: float = 0.0) -> Criterion:
+    """Return the criterion of a difference above its margin."""
+    return Criterion(margin, margin=margin)
 
 
 @dataclass(frozen=True, eq=False)
 class Contrast:
-    """A number of each seed, and what it shall fulfil.
+    """A number of each seed, and what its estimate over seeds shall fulfil.
 
     Attributes:
-        label: What is compared, for example "Q-learning minus SARSA".
+        label: Such as "Q-learning minus SARSA".
         values: Float64 (seeds,); (k, seeds) with `of_estimates`. nan where there are none.
-        criterion: The condition on the estimate over seeds.
         uses_iqm: Whether it rests on the interquartile mean (IQM) over seeds.
         possible: The range that the estimate cannot leave; its interval is cut off there.
         of_estimates: For a question about the estimates themselves (how unequal are 8 effects?), as
@@ -122,7 +114,7 @@ class Contrast:
         return not self.seeds or bool(np.isnan(self.values).any())
 
     def reading(self, uses_iqm: bool) -> tuple[np.ndarray, bool]:
-        """What is averaged over seeds, float64 (seeds,), and whether by interquartile mean."""
+        """Numbers to be averaged over seeds, float64 (seeds,), and whether by their IQM."""
         if self.of_estimates is None:
             return self.values, uses_iqm
         values = interquartile_values(self.values) if uses_iqm else self.values
@@ -133,8 +125,8 @@ class Contrast:
 class Finding:
     """The result of a contrast: verdict, estimate over seeds, and interval at `level`.
 
-    Numbers are nan where they are not tested, ends of the interval also for one seed. `by_mean` is
-    what the mean says of a contrast that rests on the IQM.
+    Numbers that are not tested are nan. `by_mean` is the finding by the mean on a contrast that
+    rests on the IQM.
     """
 
     contrast: Contrast

@@ -1,7 +1,7 @@
 """Estimates over seeds and their intervals: what they are for and cover is in docs/statistics.md.
 
-Two estimators: the mean says the average over runs, the interquartile mean (IQM) the average of
-the middle half (Agarwal et al. 2021). Each has two intervals:
+Two estimators, the mean and the interquartile mean (IQM), which is the mean of the middle half of
+the runs (Agarwal et al. 2021). Each has two intervals:
 
 - The bootstrap's. For the mean it is BCa with the expansion of Hesterberg (2015): the normal
   quantile z in the percentile levels is replaced by sqrt(n / (n - 1)) times the t quantile with
@@ -14,7 +14,7 @@ where the t interval goes on; where ties fill the middle half, the t interval is
 the bootstrap knows how near the tails are.
 
 The resampling weights of a number of seeds come from a fixed generator and serve all rows, so that
-results are reproducible. They are kept for the next rows, unless seeds are too many for that.
+results are reproducible.
 """
 
 from __future__ import annotations
@@ -38,9 +38,9 @@ _MOST_KEPT = 1 << 27  # weights, of a byte each
 
 @lru_cache(maxsize=2)
 def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> np.ndarray:
-    """How often each of n seeds occurs in each resample, uint8 (resamples, n), read-only.
+    """Return the counts of n seeds in each resample, uint8 (resamples, n), read-only.
 
-    With `iqm` how often each of n seeds *in ascending order of their values* occurs in the middle
+    With `iqm` these are counts of the seeds, *in ascending order of their values*, in the middle
     half of each resample. Sorting a resample keeps that order, so these hold for all rows.
     """
     counts = np.empty((resamples, n), np.uint8)
@@ -53,7 +53,7 @@ def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> 
 def _drawn(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]]:
     """The same in blocks: the number of the first resample of each, and its counts."""
     random = np.random.default_rng((RANDOM_SEED, n))
-    size = min(_BLOCK_DRAWS, _resamples_of_a_block(n))  # with any, the numbers are the same
+    size = min(_BLOCK_DRAWS, max(1, _BLOCK_WEIGHTS // n))  # with any, the numbers are the same
     for start in range(0, resamples, size):
         shape = min(size, resamples - start), n
         drawn = random.integers(0, n, size=shape)
@@ -66,15 +66,10 @@ def _drawn(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]
         yield start, drawn
 
 
-def _resamples_of_a_block(n: int) -> int:
-    return max(1, _BLOCK_WEIGHTS // n)
-
-
 def interquartile_mean(values: np.ndarray) -> np.ndarray:
     """Mean of (rows, seeds) over seeds without the lowest and the highest quarter, float64 (rows,).
 
-    A quarter of n seeds is rounded down, as in rliable; so of fewer than four seeds it is the mean.
-    Rows with a nan give nan.
+    A quarter of n seeds is rounded down, as in rliable. Rows with a nan give nan.
     """
     ordered = np.sort(np.asarray(values, float), axis=1)
     cut = ordered.shape[1] // 4
@@ -83,10 +78,10 @@ def interquartile_mean(values: np.ndarray) -> np.ndarray:
 
 
 def interquartile_values(values: np.ndarray) -> np.ndarray:
-    """Values whose mean over seeds is the interquartile mean, and whose spread is the spread of it.
+    """Values (rows, seeds) that have the interquartile mean as their mean, and its spread.
 
-    They are the winsorised values (what lies beyond the middle half is moved to its ends) around
-    the IQM, stretched by what the trimming takes away; float64 (rows, seeds), as the values.
+    They are the winsorised values (moved to the ends of the middle half) around the IQM, stretched
+    by what the trimming takes away.
     """
     values = np.asarray(values, float)
     ordered, cut = np.sort(values, axis=1), values.shape[1] // 4
@@ -123,27 +118,20 @@ def bootstrap_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Bootstrap interval of the mean over seeds (expanded BCa), or of the IQM (percentiles).
 
-    Args:
-        values: Float (rows, seeds); rows are treated separately, but with the same resamples.
-        level: Confidence level of each interval.
-
-    Returns:
-        Lower and upper ends, float64 (rows,) each. nan for fewer than two seeds and for rows
-        with a nan; a single point where all seeds agree.
+    Returns the ends for each row of values (rows, seeds), float64 (rows,) each: nan for fewer than
+    two seeds and for rows with a nan, a single point where all seeds agree.
     """
     values = _rows(values)
     rows, n = values.shape
     ends = np.full((rows, 2), np.nan)
-    if n > 1:
-        interval = _percentile if iqm else _bca
-        for start in range(0, rows, _BLOCK_ROWS):  # bounds the memory of the resampled means
-            block = slice(start, start + _BLOCK_ROWS)
-            ends[block] = interval(values[block], level, resamples)
+    interval = _percentile if iqm else _bca
+    for start in range(0, rows if n > 1 else 0, _BLOCK_ROWS):  # bounds the memory of the means
+        block = slice(start, start + _BLOCK_ROWS)
+        ends[block] = interval(values[block], level, resamples)
     return ends[:, 0], ends[:, 1]
 
 
 def _rows(values: np.ndarray) -> np.ndarray:
-    """Return the values as float64 (rows, seeds); raises AntsError without two axes."""
     rows = np.asarray(values, float)
     if rows.ndim != 2:
         raise AntsError(
@@ -177,9 +165,8 @@ def cautious_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The hull of both intervals, on which verdicts rest.
 
-    Where all n seeds agree there is no spread to estimate. That they agree by chance, although
-    half of all seeds would differ, has probability 2^(1-n) (the sign test). If this is not below
-    1 - level, the interval is unbounded.
+    That all n seeds agree by chance, although half of all seeds would differ, has probability
+    2^(1-n) (the sign test). If this is not below 1 - level, the interval is unbounded.
     """
     values = np.asarray(values, float)
     n = values.shape[1]
@@ -200,11 +187,10 @@ def all_equal(values: np.ndarray) -> np.ndarray:
 def jackknife_values(
     statistic: Callable[[np.ndarray], np.ndarray], values: np.ndarray
 ) -> np.ndarray:
-    """Pseudo-values of a statistic of means over seeds, one for each seed.
+    """Pseudo-values of a smooth function of means over seeds, one for each seed; nan of one seed.
 
-    Their mean is the statistic with its bias of order 1/n removed, and their spread is that of
-    the statistic; so they can be averaged over seeds like any other effect. It is a smooth function
-    of means, float (..., k) -> float (k,); of one seed the pseudo-value is nan.
+    Their mean is the statistic, float (..., k) -> float (k,), with its bias of order 1/n removed,
+    and their spread is that of the statistic; so they can be averaged like any other effect.
     """
     n = values.shape[-1]
     if n < 2:
@@ -214,7 +200,6 @@ def jackknife_values(
 
 
 def _bca(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
-    """Expanded BCa interval of the mean, float64 (rows, 2)."""
     from scipy.special import ndtr, ndtri, stdtrit
 
     n = values.shape[1]
@@ -244,7 +229,6 @@ def _bca(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
 
 
 def _percentile(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
-    """Percentile interval of the IQM, float64 (rows, 2)."""
     middle = interquartile_mean(values)[:, None]
     n = values.shape[1]
     draws = _resampled_means(np.sort(values, axis=1) - middle, resamples, iqm=True)
@@ -258,21 +242,16 @@ def _resampled_means(deviations: np.ndarray, resamples: int, iqm: bool = False) 
     """Float64 (rows, resamples), relative to each row's mean; with `iqm` of ascending rows."""
     n = deviations.shape[1]
     draws = np.empty((len(deviations), resamples))
-    for start, counts in _blocks_of_counts(n, resamples, iqm):
+    if n * resamples > _MOST_KEPT:
+        blocks = _drawn(n, resamples, iqm)
+    else:
+        kept, size = resampling_counts(n, resamples, iqm), max(1, _BLOCK_WEIGHTS // n)
+        blocks = ((start, kept[start : start + size]) for start in range(0, resamples, size))
+    for start, counts in blocks:
         some = slice(start, start + len(counts))
         np.matmul(deviations, counts.astype(float).T, out=draws[:, some])
     draws /= n
     return draws
-
-
-def _blocks_of_counts(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]]:
-    """As of `_drawn`; what is not too many to be kept is drawn once."""
-    if n * resamples > _MOST_KEPT:
-        yield from _drawn(n, resamples, iqm)
-    else:
-        counts, size = resampling_counts(n, resamples, iqm), _resamples_of_a_block(n)
-        for start in range(0, resamples, size):
-            yield start, counts[start : start + size]
 
 
 def _at_level(draws: np.ndarray, levels: np.ndarray) -> np.ndarray:

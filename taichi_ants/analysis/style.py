@@ -66,18 +66,15 @@ def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist
     """Title and legend above everything else, the caption below in lines of 120 characters."""
     widest = max(map(len, entries), default=0)
     columns = int(WIDTH / (0.6 + 0.068 * widest))  # inches at 9 points
+    bold = {"size": 12, "weight": "bold"}
+    look: dict[str, Any] = {
+        "ncols": max(1, min(columns, len(entries))),
+        "columnspacing": 1.6,
+        "borderpad": 0.2,
+    }
+    look |= {"loc": "outside upper left", "alignment": "left", "title_fontproperties": bold}
     # The title is the legend's: the layout engine would put a title of the figure on top of it.
-    figure.legend(
-        entries.values(),
-        entries.keys(),
-        loc="outside upper left",
-        ncols=max(1, min(columns, len(entries))),
-        columnspacing=1.6,
-        borderpad=0.2,
-        title=title,
-        title_fontproperties={"size": 12, "weight": "bold"},
-        alignment="left",
-    )
+    figure.legend(entries.values(), entries.keys(), title=title, **look)
     figure.supxlabel(caption, x=0.008, ha="left", fontsize=8, color=GREY)
 
 
@@ -101,7 +98,7 @@ def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
 
 
 def save_all(figures: Mapping[str, Figure], folder: str | Path) -> None:
-    """Write figures as PNG files with their names into a folder, which is made if needed.
+    """Write figures as PNG files into a folder, which is made if needed.
 
     Raises:
         AntsError: The folder or a file in it cannot be written.
@@ -112,8 +109,7 @@ def save_all(figures: Mapping[str, Figure], folder: str | Path) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Writes a PNG; raises AntsError where that cannot be done."""
+    """Write a PNG; raises AntsError if it cannot be written."""
+    how: dict[str, Any] = {"format": "png", "dpi": DPI, "facecolor": "white"}
     with styled():
-        write_atomically(
-            path, lambda file: figure.savefig(file, format="png", dpi=DPI, facecolor="white")
-        )
+        write_atomically(path, lambda file: figure.savefig(file, **how))

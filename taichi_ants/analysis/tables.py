@@ -56,9 +56,9 @@ def sentence(words: str) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text; headers and cells may have several lines, where they may break.
+    """A table of text, of which headers and cells may have several lines; notes follow it.
 
-    The first `text_columns` are aligned left, others, of numbers, right; notes stand below.
+    The first `text_columns` are aligned left, others, of numbers, right.
     """
 
     title: str
@@ -69,9 +69,8 @@ class Table:
 
     def markdown(self) -> str:
         """Title, table and notes as Markdown, each cell in one line."""
-        rule = [
-            "---" if place < self.text_columns else "---:" for place in range(len(self.columns))
-        ]
+        left = self.text_columns
+        rule = [*["---"] * left, *["---:"] * (len(self.columns) - left)]
         lines = [
             f"| {' | '.join(' '.join(cell.split()) for cell in cells)} |"
             for cells in (self.columns, rule, *self.rows)
@@ -98,19 +97,17 @@ def plain_text(blocks: Sequence[Block], width: int) -> str:
     text = io.StringIO()
     console = Console(file=text, width=width, highlight=False, markup=False, color_system=None)
     for block in blocks:
-        if isinstance(block, str):
-            console.print(block)
-        elif block.rows:
-            console.print(_drawn(block))
-        if isinstance(block, Table) and block.notes:
-            console.print("\n".join(block.notes))
-        if isinstance(block, str) or block.rows or block.notes:
+        table = Table("", (), (), [block]) if isinstance(block, str) else block
+        if table.rows:
+            console.print(_drawn(table))
+        if table.notes:
+            console.print("\n".join(table.notes))
+        if table.rows or table.notes:
             console.print()
     return "".join(f"{line.rstrip()}\n" for line in text.getvalue().rstrip().splitlines())
 
 
 def _drawn(table: Table) -> RichTable:
-    """A table for a terminal."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table as RichTable
 

@@ -191,9 +191,8 @@ def make_page(
     from taichi_ants.analysis.colony.tables import Results
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.files.results import MANIFEST
-    from taichi_ants.report.colony import colony_page
+    from taichi_ants.report.colony import at_work, colony_page
     from taichi_ants.report.page import made_facts, setting_facts
-    from taichi_ants.report.players import at_work
     from taichi_ants.studies.colony_study import POLICIES, SEEDS
 
     results = results or Results.read(files.read_csv(folder / SEEDS))

@@ -1,48 +1,123 @@
-"""The page that tells the paper's comparison."""
+"""The page of the paper's comparison, and the pictures on it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from taichi_ants.analysis.paper.audit import headlines
-from taichi_ants.analysis.paper.published import (
-    GREEDY_RETURN,
-    GREEDY_STEPS,
-    GRID,
-    Q_LEARNING,
-    TABLE_2,
-)
-from taichi_ants.analysis.paper.report import Results, all_tables, behaviour_table
+import numpy as np
+
+from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
+from taichi_ants.analysis.bounds.baselines import Baseline
+from taichi_ants.analysis.drawings import Drawing, drawings
+from taichi_ants.analysis.paper import published, report
+from taichi_ants.analysis.paper.claims import headlines
+from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.paper.figures import draw_all
+from taichi_ants.analysis.paper.report import Results
+from taichi_ants.analysis.paper.table2 import example_name, examples
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
-from taichi_ants.report.page import Statement, Statements, fill, judged
-from taichi_ants.report.players import Seen
+from taichi_ants.learners.policies import load_policy
+from taichi_ants.rendering import Episode, policy_sheet
+from taichi_ants.report.page import Picture, Player, Shown, Statement, Statements, fill
+from taichi_ants.studies.runner import RunPoint, Study
+from taichi_ants.task import Task
+from taichi_ants.viewer import record_episode
+
+STEPS = 80  # of an episode, at most; a delivery takes 34, to and fro on the trail 38
+
+Begin = Callable[..., Callable[[], Any]]  # begins a call, and returns what waits for it
+
+
+class Seen(NamedTuple):
+    """Figures, a recording of each behaviour, and the sheet of a policy that delivers, if any."""
+
+    drawings: Sequence[Drawing] = ()
+    players: Sequence[Player] = ()
+    sheet: Picture | None = None
+
+
+def as_in_training(task: Task) -> Task:
+    """The task with the evaporation of training in rollouts too."""
+    return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
+
+
+def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
+    """The beginning of the episode that told the behaviour of a policy.
+
+    It has evaporation as in training, not as in the greedy evaluation.
+    """
+    steps, task = min(point.max_steps, STEPS), as_in_training(point.task)
+    return Episode.play(point.world, q_values, seed=seed, max_steps=steps, task=task)
+
+
+def what_is_seen(
+    policies: Path,
+    study: Study[RunPoint],
+    comparison: Comparison,
+    baselines: Sequence[Baseline],
+    play: Begin = partial,
+    draw: Begin = partial,
+) -> Callable[[], Seen]:
+    """Return what waits for the figures, a recording of each behaviour and the sheet of a policy.
+
+    Examples whose policies are not in the folder are left out. Ants are followed here, where the
+    kernel for that is compiled; `play` and `draw` begin the rest, as `WorkerProcess.begin`.
+    """
+    first: dict[int, tuple[int, int, Path]] = {}
+    for row, run in examples(comparison):
+        path = policies / f"{example_name(comparison, row, run)}.npz"
+        if path.exists():
+            first.setdefault(int(comparison.behaviours[row, run]), (row, run, path))
+    done, recorded, sheets = counts(comparison.behaviours), [], []
+    for code, (row, run, path) in sorted(first.items()):
+        point, seed, (_, variant, grid) = study.points[row], study.seeds[run], comparison.rows[row]
+        policy = load_policy(path)
+        whose = (
+            f"{variant.label}, delivery {point.task.delivery}, seed {seed}, {grid.label} (learning "
+            "rate / discount / epsilon / decay)"
+        )
+        share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
+        words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Here: {whose}."
+        recording = play(record_episode, played(point, policy.q_values, seed), BEHAVIOURS[code])
+        recorded.append((sentence(BEHAVIOURS[code]), words, recording))
+        if code == DELIVERS:
+            title = f"{variant.label}: what it does"
+            sheet = play(policy_sheet, policy.q_values, title, task=point.task)
+            sheets.append((f"What an ant has learned: {whose}", sheet))
+    drawn = draw(drawings_of, comparison, baselines)
+    return lambda: Seen(
+        drawn(),
+        [Player(title, words, one()) for title, words, one in recorded],
+        next((Picture(words, one()) for words, one in sheets), None),
+    )
+
+
+def drawings_of(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
+    """The figures. A figure that has been saved as a file is laid out a little otherwise."""
+    return drawings(draw_all(comparison, baselines))
 
 
 def comparison_page(
     results: Results, seen: Seen, *, facts: Mapping[str, str], files: Sequence[str]
 ) -> str:
-    """Return the page as HTML; `facts` say how it was done, `files` what lies beside it."""
+    """Return the page as HTML, with `facts` on how it was done and links to `files` beside it."""
     comparison = results.comparison
-    first, *others = all_tables(comparison, results.lines, results.behaviours, results.baselines)
-    # The notes explain the first four tables, of which one is shown at once.
-    notes = next(one for one in others if not one.rows)
-    behaviours = behaviour_table(results.lines, results.behaviours)
-    more = [one for one in others if one not in (notes, behaviours)]
-    returns = sorted((row.reward for one, row in TABLE_2.items() if one != Q_LEARNING))
-    seeds = count(len(comparison.seeds), "seed")
+    first, *others, notes = report.figure_tables(results.lines, comparison)
+    greedy, baselines = report.greedy_table(results.lines), report.baseline_table(results.baselines)
+    seeds = len(comparison.seeds)
     return fill(
         "comparison.html",
         title="Which learner makes the better ant?",
-        byline=f"{seeds}, {count(len(comparison.rows), 'configuration')}, "
+        byline=f"{count(seeds, 'seed')}, {count(len(comparison.rows), 'configuration')}, "
         f"{thousands(comparison.behaviours.size * comparison.episodes)} episodes of training, "
         f"world: {comparison.world}",
-        seeds=f"{len(comparison.seeds)} runs" if len(comparison.seeds) > 1 else "a run",
-        configurations=len(GRID),
-        best=("Q-learning", TABLE_2[Q_LEARNING].reward),
-        others=(returns[0], returns[-1]),
-        greedy_return=f"{GREEDY_RETURN:g}",
-        greedy_steps=[f"{one:g}" for one in GREEDY_STEPS],
+        seeds=f"{seeds} runs" if seeds > 1 else "a run",
+        paper=published,
         deliveries=comparison.delivery_settings,
         world=comparison.world,
         in_paper_world=comparison.in_paper_world,
@@ -50,10 +125,9 @@ def comparison_page(
         claims=_claims(results),
         first_table=first,
         table_notes=notes,
-        more_tables=more,
-        behaviours=behaviours,
+        more_tables=[*others, greedy, baselines],
+        behaviours=report.behaviour_table(results.lines, results.behaviours),
         **seen._asdict(),
-        sheet_words=seen.sheet.words if seen.sheet else "",
         facts=facts,
         files=files,
     )
@@ -63,15 +137,11 @@ def _claims(results: Results) -> Statements:
     """The claims, with a column of verdicts for each delivery setting."""
     lines = []
     for claim, findings in results.audit.items():
-        unit, estimator = claim.quantity.unit, claim.estimator
         told = [
-            judged(f"delivery {setting}", one, one.contrast.label, unit)
+            Shown(f"delivery {setting}", one, one.contrast.label, claim.quantity.unit)
             for setting, one in findings.items()
         ]
-        facts = {
-            "Tested on": claim.tested_on,
-            "Asked": f"{estimator} {claim.criterion.words} {unit}",
-        }
+        facts = {"Tested on": claim.tested_on, "Asked": claim.asked}
         verdicts = [one.verdict for one in findings.values()]
         lines.append(Statement(claim.statement, claim.section, verdicts, facts, told))
     settings = map(sentence, results.comparison.delivery_settings)

@@ -7,16 +7,17 @@ import io
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cache
+from html import escape
 from importlib import resources
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from taichi_ants.analysis.findings import Finding, Verdict
-from taichi_ants.analysis.tables import number
-from taichi_ants.report.intervals import interval_drawing
+from taichi_ants.analysis.tables import figure, number
+from taichi_ants.errors import count
 from taichi_ants.viewer.page import content_policy, part
 from taichi_ants.viewer.recording import Recording
 
@@ -26,8 +27,12 @@ if TYPE_CHECKING:
 # Of the viewer: what a recording holds, the picture of the world, and what plays it.
 _PLAYING = ("history.js", "stage.js", "timeline.js")
 
+# Of drawings of intervals.
+WIDTH, _MIDDLE, _NUMBERS, _LINE = 340.0, 15.0, 39.0, 15.0
+_SIDE = 26.0  # room for a number
+_LETTERS = 58  # of a line that is as wide as the drawing
 
-@cache
+
 def _text(name: str) -> str:
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
@@ -36,14 +41,9 @@ def _text(name: str) -> str:
 def _templates() -> Environment:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
-    return Environment(
-        loader=FunctionLoader(_text),
-        autoescape=True,
-        finalize=signed,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    how: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    loader = FunctionLoader(_text)
+    return Environment(loader=loader, finalize=signed, undefined=StrictUndefined, **how)
 
 
 def signed(text: Any) -> Any:
@@ -99,26 +99,30 @@ class Picture(NamedTuple):
         return self.image.shape[1], self.image.shape[0]
 
 
-class Judged(NamedTuple):
-    """A verdict in one setting: effect and interval in words, and as a picture (SVG)."""
+class Shown(NamedTuple):
+    """A finding in one setting, as a page shows it; `label` and `unit` are those of its effect."""
 
     setting: str
-    verdict: Verdict
-    words: str
-    drawing: str
+    finding: Finding
+    label: str
+    unit: str = ""
 
+    @property
+    def words(self) -> str:
+        """The effect and its interval, also by the mean if that has another verdict."""
+        words, by_mean = _measured(self.finding, self.label, self.unit), self.finding.by_mean
+        if by_mean and by_mean.verdict is not self.finding.verdict:
+            told = _measured(by_mean, by_mean.contrast.label, self.unit)  # of another, maybe
+            words += f"; by the mean {by_mean.verdict.value}: {told}"
+        return words
 
-def judged(setting: str, finding: Finding, label: str, unit: str = "") -> Judged:
-    """Return a finding as a page shows it; `label` and `unit` are those of its effect."""
-    words, by_mean = _measured(finding, label, unit), finding.by_mean
-    if by_mean and by_mean.verdict is not finding.verdict:  # it may rest on another contrast
-        told = _measured(by_mean, by_mean.contrast.label, unit)
-        words += f"; by the mean {by_mean.verdict.value}: {told}"
-    return Judged(setting, finding.verdict, words, interval_drawing(finding, label, unit))
+    @property
+    def drawing(self) -> str:
+        """The interval as a picture (SVG)."""
+        return interval_drawing(*self[1:])
 
 
 def _measured(finding: Finding, label: str, unit: str) -> str:
-    """The effect and its interval in words, after its label."""
     if finding.verdict is Verdict.NOT_TESTED:
         return label
     digits = 1 if finding.contrast.uses_iqm or abs(finding.effect) >= 10 else 2
@@ -128,8 +132,59 @@ def _measured(finding: Finding, label: str, unit: str) -> str:
     return f"{label}: {f'{effect} {unit}'.rstrip()}, {ends}"
 
 
-@dataclass(frozen=True)
-class Statement:
+def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
+    """Return a finding as an SVG element, empty without numbers; `label` and `unit` name the axis.
+
+    The line is the interval, the dot the effect. One band is the range in which the criterion wants
+    the effect, another one the differences that are too small to matter: the regions by which
+    `Criterion.judge` decides.
+    """
+    if finding.verdict is Verdict.NOT_TESTED or not math.isfinite(finding.low + finding.high):
+        return ""
+    criterion, contrast = finding.contrast.criterion, finding.contrast
+    margin, wanted = criterion.margin, (criterion.low, criterion.high)
+    estimator = "IQM" if contrast.uses_iqm else "mean"
+    axis = f"{label}{f' ({unit})' if unit else ''}, {estimator} of {count(contrast.seeds, 'seed')}"
+    edges = [*wanted, *(() if margin is None else (-margin, margin))]
+    shown = [finding.low, finding.high, *filter(math.isfinite, edges)]
+    room = 0.06 * (max(shown) - min(shown)) or 1.0
+    left, right = min(shown) - room, max(shown) + room
+
+    def at(value: float) -> float:
+        share = (min(max(value, left), right) - left) / (right - left)
+        return round(_SIDE + share * (WIDTH - 2 * _SIDE), 1)
+
+    def band(low: float, high: float, kind: str) -> str:
+        size = f'x="{at(low)}" width="{at(high) - at(low):.1f}" y="{_MIDDLE - 9}" height="18"'
+        return f'<rect class="{kind}" {size}/>'
+
+    def text(words: str, x: float, y: float) -> str:
+        return f'<text x="{x:g}" y="{y:g}">{escape(words)}</text>'
+
+    low, high = at(finding.low), at(finding.high)
+    ends = sorted({one for one in edges if math.isfinite(one)})
+    parts = [
+        band(*wanted, "wanted"),
+        band(-margin, margin, "small") if margin else "",
+        *(f'<path class="edge" d="M{at(one)} {_MIDDLE - 9}v18"/>' for one in ends),
+        f'<path class="span" d="M{low} {_MIDDLE}H{high}"/>',
+        f'<circle cx="{at(finding.effect)}" cy="{_MIDDLE}" r="4.5"/>',
+    ]
+    labelled: list[float] = []
+    for one in sorted(ends, key=lambda one: (one != 0, one)):
+        if all(abs(at(one) - at(other)) > _SIDE for other in labelled):
+            labelled.append(one)
+            signed = figure(one).replace("-", "\N{MINUS SIGN}")
+            parts.append(text(signed, at(one), _NUMBERS))
+    lines = wrap(axis, _LETTERS)
+    below = enumerate(lines, start=1)
+    parts += [text(line, WIDTH / 2, _NUMBERS + _LINE * number) for number, line in below]
+    height = _NUMBERS + _LINE * len(lines) + 5.0
+    size = f'viewBox="0 0 {WIDTH:g} {height:g}" width="{WIDTH:g}" height="{height:g}"'
+    return f'<svg class="interval" {size} aria-hidden="true">{"".join(parts)}</svg>'
+
+
+class Statement(NamedTuple):
     """A line of the table that can be sorted and filtered.
 
     `place` is the second column: of the paper, or of the world. There is a verdict for each column
@@ -139,8 +194,15 @@ class Statement:
     text: str
     place: str
     verdicts: Sequence[Verdict]
-    facts: Mapping[str, str] = field(default_factory=dict)
-    judged: Sequence[Judged] = ()
+    facts: Mapping[str, str]
+    shown: Sequence[Shown]
+
+
+# In the order in which a reader wants them.
+KINDS = (
+    *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
+    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED, Verdict.TOO_FEW),
+)
 
 
 class Statements(NamedTuple):
@@ -152,9 +214,8 @@ class Statements(NamedTuple):
 
     @property
     def kinds(self) -> list[Verdict]:
-        """The verdicts that occur, in the order in which a reader wants them."""
-        given = {one for line in self.lines for one in line.verdicts}
-        return [one for one in KINDS if one in given]
+        """The verdicts that occur, in the order of `KINDS`."""
+        return [kind for kind in KINDS if any(kind in line.verdicts for line in self.lines)]
 
     @property
     def tallies(self) -> list[tuple[str, list[tuple[Verdict, int]]]]:
@@ -164,13 +225,6 @@ class Statements(NamedTuple):
             (header, [(one, column.count(one)) for one in self.kinds if one in column])
             for header, column in zip(self.headers[2:], columns, strict=True)
         ]
-
-
-# In the order in which a reader wants them.
-KINDS = (
-    *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
-    *(Verdict.CONTRADICTED, Verdict.NOT_TESTED, Verdict.TOO_FEW),
-)
 
 
 def setting_facts(settings: Mapping[str, Any]) -> dict[str, str]:
@@ -190,7 +244,6 @@ def setting_facts(settings: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _plain(value: Any) -> str:
-    """A value as readers write it."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -198,13 +251,14 @@ def _plain(value: Any) -> str:
 
 def made_facts(made: Mapping[str, Any]) -> dict[str, str]:
     """What made the results, from a manifest, in words."""
-    finished = made["finished"].replace("T", " ").replace("+00:00", " UTC")
-    facts = {"Command": made["command"], "Finished": finished}
-    if made.get("commit"):
-        facts["Commit"] = made["commit"]
     packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items())
-    facts["Versions"] = f"Python {made['python']}, {packages}"
     cpus = f"{made['cpus']} processors" if made["cpus"] != 1 else "one processor"
-    facts["Machine"] = f"{made['platform']}, {cpus}"
-    facts["Time"] = f"{made['seconds']:.0f} seconds"
-    return facts
+    facts = {
+        "Command": made["command"],
+        "Finished": made["finished"].replace("T", " ").replace("+00:00", " UTC"),
+        "Commit": made["commit"],
+        "Versions": f"Python {made['python']}, {packages}",
+        "Machine": f"{made['platform']}, {cpus}",
+        "Time": f"{made['seconds']:.0f} seconds",
+    }
+    return {name: words for name, words in facts.items() if words}

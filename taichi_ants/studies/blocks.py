@@ -20,10 +20,7 @@ _ABOUT = "about"
 def kept(path: Path, about: Any, make: Callable[[], Outcome]) -> Outcome:
     """Return the arrays of a block (.npz); make and keep them if they are missing or damaged.
 
-    `about` is all that determines them, as `files.to_json` knows it.
-
-    Raises:
-        AntsError: The file cannot be written.
+    `about` is all that determines them. Raises AntsError if the file cannot be written.
     """
     digest = hashlib.sha256(files.to_json(about).encode()).hexdigest()
     if path.exists():

@@ -1,4 +1,4 @@
-"""What the command lines of the experiments share: arguments, errors, interruption, progress."""
+"""The common part of command lines: arguments, errors, interruption, progress."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
-from taichi_ants.settings import Setting, Settings, declared, nested
+from taichi_ants.settings import Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 if TYPE_CHECKING:
@@ -43,8 +43,7 @@ class _OneOrList(argparse.Action):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence on standard error.
 
-    `about` is a module's docstring: its first line stands above the options, the rest below. It is
-    None under `python -OO`.
+    `about` is a module's docstring, None under `python -OO`: its first line is the description.
     """
 
     open_settings: tuple[str, ...] = ()  # such as "world", of which any --world.NAME is taken
@@ -82,7 +81,7 @@ class Parser(argparse.ArgumentParser):
             self.add_argument(flag, dest=path, type=_literal, nargs="*", action=_OneOrList)
 
     def error(self, message: str) -> NoReturn:
-        text = without_middle(_on_one_line(message)).removeprefix("argument ").rstrip(".")
+        text = without_middle(" ".join(message.splitlines())).removeprefix("argument ").rstrip(".")
         text = re.sub(r"invalid (whole )?\S+ value: (.*)", r"\2 is no \1number", text)
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
 
@@ -132,31 +131,21 @@ WORLDS = (
 
 
 def add_settings(parser: Parser, base: Settings) -> None:
-    """Add an option for each setting of a class, named as in sweep files; `base` has the defaults.
-
-    Those of `parser.own_settings` are left out.
-    """
+    """Add an option for each setting but `parser.own_settings`; `base` has the defaults."""
     parser.usage = "%(prog)s [options]"  # there are too many to list them twice
     group = parser.add_argument_group(f"{base.path} settings")
     for one in declared(type(base)):
         value = getattr(base, one.name)
         if one.path not in parser.own_settings and (one.has_names or not one.is_group):
-            group.add_argument(_flag(one.path), **_reading(one, value))
+            # The value is checked where it is used.
+            how: dict[str, Any] = {"metavar": {int: "N", float: "X"}.get(one.kind, "NAME")}
+            if one.kind is bool:
+                how = {"nargs": "?", "const": True, "metavar": "true|false"}
+            how |= {"dest": one.path, "type": _literal, "default": argparse.SUPPRESS}
+            about = one.about(value).replace("%", "%%")
+            group.add_argument(f"--{one.path.replace('_', '-')}", **how, help=about)
         if one.is_group:
             add_settings(parser, value)
-
-
-def _flag(path: str) -> str:
-    return f"--{path.replace('_', '-')}"
-
-
-def _reading(one: Setting, value: Any) -> dict[str, Any]:
-    """Arguments of `add_argument` for a setting, whose value is checked where it is used."""
-    about = one.about(value).replace("%", "%%")
-    how = {"dest": one.path, "type": _literal, "default": argparse.SUPPRESS, "help": about}
-    if one.kind is bool:
-        return how | {"nargs": "?", "const": True, "metavar": "true|false"}
-    return how | {"metavar": {int: "N", float: "X"}.get(one.kind, "NAME")}
 
 
 def _literal(text: str) -> Any:
@@ -168,10 +157,7 @@ def _literal(text: str) -> Any:
 
 
 def given_settings(settings: argparse.Namespace) -> dict[str, Any]:
-    """Return what options have given, as mappings in mappings (`settings.nested`).
-
-    The names of the world and the task, `--world` and `--task`, are left out.
-    """
+    """Return the settings that options give, as mappings in mappings (`settings.nested`)."""
     return nested({path: value for path, value in vars(settings).items() if "." in path})
 
 
@@ -206,7 +192,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
 
 def load_plugin(path: str | None) -> None:
-    """Execute a Python file, if there is one, which registers learners, observations or worlds.
+    """Execute a Python file, if given, which registers learners, observations or worlds.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.
@@ -223,7 +209,7 @@ def load_plugin(path: str | None) -> None:
     except AntsError:
         raise
     except (Exception, SystemExit) as error:
-        reason = f"{type(error).__name__}: {_on_one_line(str(error))}"
+        reason = " ".join(f"{type(error).__name__}: {error}".splitlines())
         raise AntsError(f"the plugin {path!r} failed with {reason}; mend the file.") from error
 
 
@@ -232,7 +218,7 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
     """Show a progress bar with the time left on standard error, if that is a terminal.
 
     Yields a function of the share of the work that is done, 0 to 1. It raises KeyboardInterrupt if
-    a signal to stop came, but a library has swallowed it; so does the beginning.
+    a library has swallowed a signal to stop; so does the beginning.
     """
     from rich.console import Console
     from rich.progress import Progress
@@ -250,12 +236,8 @@ def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
 
 
 def notice(text: str) -> None:
-    """Say something on one line of standard error."""
-    print(without_middle(_on_one_line(text), 2000), file=sys.stderr)
-
-
-def _on_one_line(text: str) -> str:
-    return " ".join(text.splitlines())
+    """Print a text on one line of standard error."""
+    print(without_middle(" ".join(text.splitlines()), 2000), file=sys.stderr)
 
 
 def _discard_output() -> None:

@@ -36,10 +36,8 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
     It prints the message of the interruption, or `message`. What the parent ignores, as nohup does,
     stays ignored.
     """
-    usual: dict[int, Any] = {
-        signal.SIGINT: signal.default_int_handler,
-        signal.SIGTERM: signal.SIG_DFL,
-    }
+    usual: dict[int, Any] = {signal.SIGINT: signal.default_int_handler}
+    usual[signal.SIGTERM] = signal.SIG_DFL
     watched = [number for number, handler in usual.items() if signal.getsignal(number) is handler]
     for number in watched:
         signal.signal(number, _note)

@@ -20,8 +20,7 @@ from taichi_ants.files.results import PAGE, REPORT, ResultFolder, checksum_of, r
 
 _PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
 Results = TypeVar("Results")
-# Returns the page, as HTML, from a folder of results, from the results of the work if it was done
-# just now, and from the manifest.
+# Makes HTML from a folder of results, the results of the work if just done, and the manifest.
 Pages = Callable[[Path, Results | None, Mapping[str, Any]], str]
 
 
@@ -38,11 +37,8 @@ def work_or_show(
         settings: The command's `out`, `force`, `no_figures`, `plugin` and `arch`.
         determines: All else that determines the results.
         work: Called with a folder for blocks and one for the results, among them the report.
-        leading: Settings from which others follow, see `ResultFolder`.
-        page: Makes the page of the results, which is made again if it is missing.
-
-    Raises:
-        AntsError: The folder holds something else, cannot be written, or was altered.
+        leading: As of a `ResultFolder`, whose errors are raised.
+        page: Makes the page, also if that alone is missing.
     """
     plugin = checksum_of(Path(settings.plugin)) if settings.plugin else None
     facts = {**determines, "arch": settings.arch, "plugin": plugin}
@@ -55,8 +51,7 @@ def work_or_show(
             results = work(blocks, ready)
             report = files.read_text(ready / REPORT)
             seconds = folder.seconds_before + time.perf_counter() - began
-            drawn = not settings.no_figures
-            made = {**provenance(sys.argv), "seconds": seconds, "figures": drawn}
+            made = provenance(sys.argv) | {"seconds": seconds, "figures": not settings.no_figures}
             if page:
                 files.write_text(ready / PAGE, page(ready, results, made))
             folder.publish(ready, made)
@@ -82,7 +77,7 @@ def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None
 
 
 def provenance(arguments: Sequence[str]) -> dict[str, Any]:
-    """What made results: command, versions, machine, time and commit."""
+    """Return the command, versions, machine, time and commit that make results."""
     return {
         "command": shlex.join(arguments),
         "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
@@ -100,10 +95,8 @@ def commit() -> str | None:
     if not (root / ".git").exists():
         return None
     command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"]
+    how: dict[str, Any] = {"stderr": subprocess.DEVNULL, "text": True, "timeout": 10}
     try:
-        done = subprocess.run(
-            command, cwd=root, capture_output=True, text=True, timeout=10, check=True
-        )
+        return subprocess.check_output(command, cwd=root, **how).strip()
     except (OSError, subprocess.SubprocessError):
         return None
-    return done.stdout.strip()

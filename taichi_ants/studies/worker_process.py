@@ -1,6 +1,6 @@
-"""A second process, which does calls while this one goes on: for what keeps Python itself busy.
+"""A second process for calls that keep Python itself busy, such as drawing.
 
-Drawing is such work; two threads of one process would only take turns at it.
+Two threads of one process would only take turns at it.
 """
 
 from __future__ import annotations
@@ -78,10 +78,10 @@ class WorkerProcess:
                 pipe.close()
 
     def _ask(self, call: Callable[[], Any]) -> tuple[bool, Any]:
-        """Whether the other process has done a call, and what that returns."""
+        """Whether the other process has done a call, and what it returns."""
         try:
             process: Any = self._process
-            pickle.dump(_packed(call), process.stdin)
+            pickle.dump(pickle.dumps(call, -1), process.stdin)  # whole, or not at all
             process.stdin.flush()
             return pickle.loads(pickle.load(process.stdout))
         except Exception:  # the call cannot be sent, or the process has ended
@@ -93,7 +93,12 @@ def serve() -> None:
     with suppress(EOFError, BrokenPipeError), os.fdopen(os.dup(1), "wb") as answers:
         os.dup2(2, 1)  # what is printed goes where errors go
         while True:  # until nobody asks any more
-            pickle.dump(_done(pickle.load(sys.stdin.buffer)), answers)
+            call = pickle.load(sys.stdin.buffer)
+            try:
+                answer = pickle.dumps((True, pickle.loads(call)()), -1)
+            except Exception:
+                answer = pickle.dumps((False, None))
+            pickle.dump(answer, answers)
             answers.flush()
 
 
@@ -105,15 +110,3 @@ def _started() -> subprocess.Popen[bytes]:
         stderr=subprocess.DEVNULL,  # what it has to say is said here
         start_new_session=True,  # Ctrl-C is for this process alone, which ends the other one
     )
-
-
-def _done(call: bytes) -> bytes:
-    """What comes of a call, as `_ask` wants it."""
-    try:
-        return _packed((True, pickle.loads(call)()))
-    except Exception:
-        return _packed((False, None))
-
-
-def _packed(value: Any) -> bytes:
-    return pickle.dumps(value, pickle.HIGHEST_PROTOCOL)

@@ -58,7 +58,7 @@ def test_a_directed_claim(low: float, high: float, verdict: Verdict) -> None:
     ],
 )
 def test_a_directed_claim_with_a_limit(low: float, high: float, verdict: Verdict) -> None:
-    assert above(1.0, most=10.0).judge(low, high) is verdict
+    assert Criterion(1.0, 10.0, 1.0).judge(low, high) is verdict
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_a_directed_claim_with_a_limit(low: float, high: float, verdict: Verdict
     ],
 )
 def test_a_directed_claim_of_a_large_difference(low: float, high: float, verdict: Verdict) -> None:
-    assert above(2.0, least=10.0).judge(low, high) is verdict
+    assert Criterion(10.0, margin=2.0).judge(low, high) is verdict
 
 
 @pytest.mark.parametrize(
@@ -96,8 +96,8 @@ def test_a_claim_of_a_range(low: float, high: float, verdict: Verdict) -> None:
 
 def test_criteria_say_what_they_are() -> None:
     assert above().words == "above 0, margin 0"
-    assert above(0.5, most=3).words == "above 0.5 and at most 3, margin 0.5"
-    assert above(2, least=10).words == "above 10, margin 2"
+    assert Criterion(0.5, 3, 0.5).words == "above 0.5 and at most 3, margin 0.5"
+    assert Criterion(10, margin=2).words == "above 10, margin 2"
     assert Criterion(2, 4).words == "from 2 to 4"
     assert Criterion(-np.inf, 4).words == "at most 4"
     assert Criterion(2, np.inf).words == "at least 2"

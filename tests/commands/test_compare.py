@@ -29,6 +29,7 @@ from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.commands import compare as commands
 from taichi_ants.files import archives
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation, text
+from taichi_ants.report import results
 from taichi_ants.studies import worker_process
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
@@ -332,7 +333,7 @@ def test_what_is_prepared_beside_can_be_done(draws):
     """Nobody is told if it fails there: then all is ready later."""
     settings = commands.parse_arguments(["--seeds", "1"])
     point = commands.build_study(settings).points[0]
-    commands.rehearse(point, None, {"threads": None, "arch": None}, draws)
+    results.rehearse(point, None, {"threads": None, "arch": None}, draws)
 
 
 def test_who_asks_for_one_thread_gets_one_process(compare, tmp_path, monkeypatch):

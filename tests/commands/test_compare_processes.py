@@ -139,13 +139,15 @@ def test_a_second_process_at_the_same_work_may_finish_it(kernels, tmp_path):
 
 REHEARSED = """
 import pathlib, numpy as np
+from taichi_ants.report import results
 from taichi_ants.commands import compare
-from taichi_ants.report.players import played, player
+from taichi_ants.report.comparison import played
 from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.viewer import record_episode
 
 point = compare.build_study(compare.parse_arguments(["--seeds", "1"])).points[0]
 episode = played(point, np.zeros((point.task.n_states, N_ACTIONS), np.float32), 0)
-compare.rehearse(point, None, {"threads": 1, "arch": None}, False)
+results.rehearse(point, None, {"threads": 1, "arch": None}, False)
 
 from taichi.lang.kernel_impl import Kernel
 materialize, late = Kernel.materialize, []
@@ -156,8 +158,8 @@ def noted(self, key=None, **how):
     return materialize(self, key, **how)
 
 Kernel.materialize = noted
-compare.render_policy(pathlib.Path("a.gif"), episode, "title")
-player(episode, "delivers", "words")
+results.render_policy(pathlib.Path("a.gif"), episode, "title")
+record_episode(episode, "delivers")
 print(late)
 """
 

@@ -6,7 +6,7 @@ import pytest
 from browser import started
 from finished_pages import colony_html, comparison_html, results
 
-from taichi_ants.analysis.paper.audit import claims_rows
+from taichi_ants.analysis.paper.claims import claims_rows
 
 pytestmark = pytest.mark.browser
 

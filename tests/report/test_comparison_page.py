@@ -11,13 +11,12 @@ from finished_pages import FACTS, comparison_html, results
 from pages import addresses, tables
 from synthetic_comparison import build, subset, unchanged
 
-from taichi_ants.analysis.paper.audit import HEADLINES, claims_rows
+from taichi_ants.analysis.paper.claims import HEADLINES, claims_rows
 from taichi_ants.analysis.paper.comparison import Variant
 from taichi_ants.analysis.paper.report import Results
 from taichi_ants.analysis.tables import number
-from taichi_ants.report.comparison import comparison_page
+from taichi_ants.report.comparison import Seen, comparison_page
 from taichi_ants.report.page import setting_facts, signed
-from taichi_ants.report.players import Seen
 
 BARE = {"seen": Seen(), "facts": {}, "files": []}
 

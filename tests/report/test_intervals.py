@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from taichi_ants.analysis.findings import Contrast, Criterion, Finding, Verdict, above
-from taichi_ants.report.intervals import WIDTH, interval_drawing
+from taichi_ants.report.page import WIDTH, interval_drawing
 
 
 def finding(criterion: Criterion, effect: float, low: float, high: float) -> Finding:
@@ -59,7 +59,7 @@ def test_the_interval_lies_in_the_band_where_it_is_supported(criterion, ends, ve
 @pytest.mark.parametrize("least", [2.0, 10.0])
 def test_the_verdict_is_the_band_that_holds_the_line(low, width, least) -> None:
     """So a dot in the band of what is too small to matter never supports or contradicts."""
-    one = finding(above(2.0, least=least), low + width / 2, low, low + width)
+    one = finding(Criterion(least, margin=2.0), low + width / 2, low, low + width)
     drawn = numbers(drawing(one))
     within = {
         kind: drawn[kind][0] <= drawn["span"][0] and drawn["span"][1] <= drawn[kind][1]

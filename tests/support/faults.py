@@ -22,8 +22,8 @@ from command_lines import assert_one_sentence, load
 
 from taichi_ants import Task, files
 from taichi_ants.analysis.bounds import baselines
-from taichi_ants.commands import compare
 from taichi_ants.files.results import ResultFolder
+from taichi_ants.report import results
 from taichi_ants.studies import colony_study, result_folder, runner
 
 KILLED, WENT_ON = 77, 78  # how processes end
@@ -32,7 +32,7 @@ KILLED, WENT_ON = 77, 78  # how processes end
 def remember(patch: pytest.MonkeyPatch) -> None:
     """Let the same work give the same at once, and let all results be made at the same time."""
     for owner, name in (
-        *((runner.RunPoint, "do"), (runner.ColonyPoint, "do"), (compare, "what_policies_do")),
+        *((runner.RunPoint, "do"), (runner.ColonyPoint, "do"), (results, "what_policies_do")),
         *((baselines, "bound_rows"), (baselines, "policy_rows")),
         *((colony_study, "_pool"), (colony_study, "limits_of")),
     ):

@@ -19,9 +19,8 @@ from taichi_ants.analysis.paper.report import Results
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
 from taichi_ants.report.colony import colony_page
-from taichi_ants.report.comparison import comparison_page
+from taichi_ants.report.comparison import Seen, comparison_page
 from taichi_ants.report.page import Picture, Player
-from taichi_ants.report.players import Seen
 from taichi_ants.viewer import record_colony, record_episode
 
 FACTS = {"World": "the <paper's>", "Command": "compare.py --out 'a & b'"}

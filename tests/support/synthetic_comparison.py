@@ -14,7 +14,7 @@ import numpy as np
 
 from taichi_ants.analysis.behaviour import DELIVERS, WALKS
 from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Row, Variant
-from taichi_ants.analysis.paper.curves import learning_curves
+from taichi_ants.analysis.paper.figures import curves_of
 from taichi_ants.analysis.paper.measures import measures_of_runs
 from taichi_ants.analysis.paper.published import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
 
@@ -166,7 +166,7 @@ def remeasured(made: Made) -> Made:
     """The same with the measures and learning curves of its episodes, which may have changed."""
     made = replace(made, measures=measures_of_runs(made.arrays))
     each = ({n: made.arrays[n][row] for n in EPISODES} for row in range(len(made.rows)))
-    return replace(made, curves=learning_curves(made, enumerate(each)))
+    return replace(made, curves=curves_of(made, enumerate(each)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -37,41 +37,29 @@ class Baseline(NamedTuple):
         return self.baseline + discount
 
 
-# Called as evaluate(world, q_values, rollouts=, max_steps=, task=, seeds=), with one table for
-# each seed: q_values (seeds, n_states, 5). What it returns has returns, steps and deliveries,
-# (seeds, rollouts) each.
-Evaluate = Callable[..., Any]
-
-
 def policy_rows(
     world: World,
     task: Task,
-    evaluate: Evaluate,
+    evaluate: Callable[..., Any],
     seeds: Sequence[int],
     rollouts: int = 50,
     max_steps: int = EPISODE_STEPS,
 ) -> list[Baseline]:
-    """Return what the random policy and the trail follower bring.
+    """Return what the random policy and the trail follower bring; trails evaporate as in training.
 
-    Trails evaporate as in training; `evaluate` rolls out policies, such as `taichi_ants.evaluate`.
+    `evaluate` is `taichi_ants.evaluate`, called with a table for each seed.
     """
-    rows = []
     # Both policies are tables of the paper's observation.
     as_trained = replace(
         task, observation="paper", evaporation_in_evaluation=task.evaporation_in_training
     )
+    how = {"rollouts": rollouts, "max_steps": max_steps, "task": as_trained, "seeds": list(seeds)}
     note = f"mean over {count(len(seeds), 'seed')} of {count(rollouts, 'rollout')}"
+    rows = []
     for name, policy in (("random policy", random_policy()), ("trail follower", trail_follower())):
-        found = evaluate(
-            world,
-            np.repeat(policy[None], len(seeds), axis=0),
-            rollouts=rollouts,
-            max_steps=max_steps,
-            task=as_trained,
-            seeds=list(seeds),
-        )
-        means = (float(np.mean(one)) for one in (found.returns, found.steps, found.deliveries))
-        rows.append(_row(name, note, Outcome(*means)))
+        found = evaluate(world, np.repeat(policy[None], len(seeds), axis=0), **how)
+        outcome = Outcome(*map(float, map(np.mean, (found.returns, found.steps, found.deliveries))))
+        rows.append(Baseline(name, None, *outcome, note))
     return rows
 
 
@@ -89,27 +77,20 @@ def bound_rows(
     try:
         bounds = EpisodeBounds(world, task)
     except AntsError as error:
-        return [_row("exact bounds", str(error))]
-    shortest = bounds.shortest()
-    note = "exact: fewest steps to a delivery, then largest return, whatever the step limit"
-    rows = [_row("shortest delivery", note if shortest else "no delivery is possible", shortest)]
+        return [Baseline("exact bounds", note=str(error))]
+    rows = [Baseline("shortest delivery", note="no delivery is possible")]
+    if shortest := bounds.shortest():
+        note = "exact: fewest steps to a delivery, then largest return, whatever the step limit"
+        rows = [Baseline("shortest delivery", None, *shortest, note)]
     for discount in dict.fromkeys(discounts):
         try:
             value, outcome = bounds.optimal(discount, max_steps)
         except AntsError as error:
-            rows.append(_row("optimal policy", str(error), discount=discount))
+            rows.append(Baseline("optimal policy", discount, note=str(error)))
             continue
         note = (
             f"exact: optimal for an episode without step limit (discounted return {value:.6g}), "
             f"followed for at most {max_steps} steps"
         )
-        rows.append(_row("optimal policy", note, outcome, discount))
+        rows.append(Baseline("optimal policy", discount, *outcome, note))
     return rows
-
-
-def _row(
-    name: str, note: str, found: Outcome | None = None, discount: float | None = None
-) -> Baseline:
-    if found is None:
-        return Baseline(name, discount, note=note)
-    return Baseline(name, discount, found.episode_return, found.steps, found.deliveries, note)

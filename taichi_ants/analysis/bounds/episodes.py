@@ -11,8 +11,7 @@ Chance only decides which of several foods in view a pick-up takes.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -32,14 +31,12 @@ MAX_STATES = 2_000_000
 _STEP = 1 << 32
 # Action values this close count as equal, since the same sums in another order differ by rounding:
 # relative to the value of the state, and, for sums that cancel to almost nothing, relative to the
-# largest value. So a goal of 10 that is discounted to less than about 1e-13 goes unnoticed, with a
-# discount factor of 0.9 after 300 steps.
+# largest value. So a goal of 10 goes unnoticed after 300 steps with a discount factor of 0.9.
 _RELATIVE_TOLERANCE = 1e-12
 _ABSOLUTE_TOLERANCE = 1e-14
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """Undiscounted return, steps and deliveries (0 or 1) of an episode; means over chances."""
 
     episode_return: float
@@ -53,12 +50,8 @@ class EpisodeBounds:
     States are numbered: first those without food, then those with each of the foods, last the one
     after the delivery, where nothing happens any more.
 
-    Args:
-        world: The world as it is when the episode starts.
-        task: Its rewards count, and whether trails change while ants learn.
-
     Raises:
-        AntsError: Trails change, no ant can start, or the world is too large.
+        AntsError: Trails change while ants learn, no ant can start, or the world is too large.
     """
 
     def __init__(self, world: World, task: Task) -> None:
@@ -73,7 +66,7 @@ class EpisodeBounds:
         self._build(around, around.food & reached, task.rewards)
 
     def _build(self, around: Surroundings, food: np.ndarray, paid: Rewards) -> None:
-        """The rewards, float64 (5, N), and what follows, a sparse matrix (5 N, N) of chances."""
+        """Set the rewards, float64 (5, N), and the chances of what follows, sparse (5 N, N)."""
         from scipy.sparse import coo_array
 
         foods, half = np.unique(around.neighbours[food]), around.n_states
@@ -149,11 +142,15 @@ class EpisodeBounds:
                 f"the discount is {shown(discount)}, so there is no optimal policy: unless it is "
                 "at least 0 and below 1 the return without step limit may grow without bound."
             )
+        from scipy.sparse import eye_array
+        from scipy.sparse.linalg import spsolve
+
         n = self._chances.shape[1]
         states = np.arange(n)
         policy = self._rewards.argmax(axis=0)
         while True:
-            values = self._values(policy, discount)
+            rewards, moved = self._of(policy)
+            values = spsolve((eye_array(n) - discount * moved).tocsc(), rewards)
             ahead = self._rewards + discount * (self._chances @ values).reshape(-1, n)
             best = ahead.max(axis=0)
             size = np.abs(best)
@@ -164,14 +161,6 @@ class EpisodeBounds:
             policy = np.where(improvable, ahead.argmax(axis=0), policy)
         policy = (ahead >= best - tolerance).argmax(axis=0)
         return float(values[self._start]), self._follow(policy, max_steps)
-
-    def _values(self, policy: np.ndarray, discount: float) -> np.ndarray:
-        """The discounted return of following a policy from each state, float64 (N,)."""
-        from scipy.sparse import eye_array
-        from scipy.sparse.linalg import spsolve
-
-        rewards, moved = self._of(policy)
-        return spsolve((eye_array(len(policy)) - discount * moved).tocsc(), rewards)
 
     def _of(self, policy: np.ndarray) -> tuple[np.ndarray, csr_array]:
         """The rewards of a policy, (N,), and the chances of what follows, (N, N)."""

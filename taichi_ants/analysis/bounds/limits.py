@@ -1,13 +1,12 @@
-"""What no colony can exceed where food grows back at once, whatever it has learned.
+"""Limits of colonies where food grows back at once, whatever they have learned.
 
 Both hold in the long run, for ants that neither die nor are born, and food that stays in place.
 
-- Time: an ant needs a number of ticks from one delivery to the next, at least that of the shortest
-  cycle queen -> food -> queen over (cell, heading, carrying). Food that grows back in the tick in
-  which it is taken never leaves its cell free, so that the ground stays the same and this is a
-  shortest path. An ant that is blocked by another turns on the spot, so the limit lets ants do so
-  everywhere. Where ants with food have right of way, they may push the ant: the limit lets an ant
-  without food be pushed from every cell onto each neighbour, while it turns as it likes.
+- Time: the ticks of an ant from one delivery to the next are at least those of the shortest cycle
+  queen -> food -> queen over (cell, heading, carrying). Food that grows back at once never leaves
+  its cell free, so that the ground stays the same. An ant that is blocked by another turns on the
+  spot, so the limit lets ants do so everywhere. Where ants with food have right of way, it lets an
+  ant without food be pushed from every cell onto each neighbour, while it turns as it likes.
 - Queen: the ant that gives in tick t leaves in t + 1 at the earliest. If the next one can take its
   place in that tick, by pushing or by following it, it gives in t + 2; else it enters in t + 2 and
   gives in t + 3. An ant that stays needs as many ticks: give, pick up (which turns it round), turn
@@ -32,9 +31,7 @@ from taichi_ants.worlds.world import World
 class Limits:
     """The limits of one world; inf or 0 where nothing can be delivered.
 
-    Attributes:
-        cycle: Ticks from one delivery to the next of one ant, in the long run.
-        queen: Foods that can be given, per 1000 ticks.
+    `cycle` are ticks from one delivery of an ant to its next, `queen` foods per 1000 ticks.
     """
 
     cycle: float
@@ -47,7 +44,7 @@ class Limits:
 
 def limits_of(world: World, task: Task | None = None) -> Limits:
     """The limits of a world under the traffic of a task; None is the paper's."""
-    task = Task() if task is None else task
+    task = task or Task()
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = world.walkable(around)[around]
     ticks = 2 if task.traffic.shared or task.turns_at_queen else 3
@@ -91,10 +88,7 @@ def shortest_cycle(world: World, task: Task) -> float:
 
 
 def _pushes(around: Surroundings) -> list[np.ndarray]:
-    """From each state those onto each neighbour that can be empty, with each heading it may take.
-
-    Edges int64 (2, n) each.
-    """
+    """From each state onto each neighbour that can be empty, turned or not; int64 (2, n) each."""
     n = len(around.cells)
     edges = []
     for neighbours, empty in zip(around.neighbours, around.empty, strict=True):
@@ -107,11 +101,7 @@ def _pushes(around: Surroundings) -> list[np.ndarray]:
 
 
 def least_mean_cycle(lengths: np.ndarray) -> float:
-    """The least mean length of an edge over all cycles of a complete graph.
-
-    Args:
-        lengths: Float (n, n), from each node to each; inf where there is no edge.
-    """
+    """The least mean length of an edge over all cycles of a graph, from float (n, n) or inf."""
     mean, walks = np.inf, lengths  # the shortest walks of k edges, from each node to each
     for k in range(1, len(lengths) + 1):
         mean = min(mean, float(walks.diagonal().min()) / k)

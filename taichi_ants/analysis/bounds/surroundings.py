@@ -1,4 +1,4 @@
-"""What lies around an ant that is alone in its world, in every state in which it can be.
+"""The surroundings of an ant that is alone in its world, in every state in which it can be.
 
 A cell here is a number in 0..n-1 among those on which an ant can ever stand, and the number of a
 state is heading * n + cell.
@@ -17,23 +17,15 @@ from taichi_ants.worlds.world import World
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What lies at each heading of each cell on which an ant can ever stand.
+    """The neighbours of each cell on which an ant can ever stand, arrays (6, n) by heading."""
 
-    Attributes:
-        cells: int64 (n,): their flat indices.
-        neighbours: int32 (6, n): the number of the neighbour, -1 if no ant can ever stand there.
-        empty, food, queen: bool (6, n): what it holds at the start.
-        nearer: bool (6, n): whether it is nearer to the queen than the cell itself.
-        trail: int64 (6, n): the trail that it shows, 0 where it is not empty.
-    """
-
-    cells: np.ndarray
-    neighbours: np.ndarray
-    empty: np.ndarray
+    cells: np.ndarray  # int64 (n,): flat indices
+    neighbours: np.ndarray  # int32: the number, -1 where no ant can ever stand
+    empty: np.ndarray  # bool: what it holds at the start
     food: np.ndarray
     queen: np.ndarray
-    nearer: np.ndarray
-    trail: np.ndarray
+    nearer: np.ndarray  # bool: to the queen than the cell itself
+    trail: np.ndarray  # int64: the trail that it shows, 0 where it is not empty
 
     @property
     def n_states(self) -> int:

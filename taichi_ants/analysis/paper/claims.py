@@ -1,15 +1,19 @@
-"""All empirical claims of the paper, in its order, as `claims.toml` has them."""
+"""All empirical claims of the paper, in its order, as `claims.toml` has them, and their audit."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
-from taichi_ants.analysis.findings import Criterion
+from taichi_ants.analysis.findings import Contrast, Criterion, Finding, Verdict, judge, weakest
 from taichi_ants.analysis.paper import quantities
-from taichi_ants.analysis.paper.published import FACTORS, VARIANTS
-from taichi_ants.analysis.paper.quantities import Quantity
+from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.paper.published import VARIANTS
+from taichi_ants.analysis.paper.quantities import Quantity, grids_of
+from taichi_ants.analysis.tables import Block, Table, interval, markdown, number, sentence
 from taichi_ants.files import tomllib
 
 
@@ -17,50 +21,36 @@ from taichi_ants.files import tomllib
 class Claim:
     """An empirical claim of the paper, made precise.
 
-    Attributes:
-        id, section, statement: A unique name, the paper's section, its claim in our words.
-        criterion: What every effect of the quantity must fulfil. It decides how far a word such as
-            "about", "close" or "consistently" goes.
-        quantity: What is computed.
-        why: Why this criterion or quantity, where it is not plain.
+    Every effect of the quantity must fulfil the criterion, which decides how far a word such as
+    "about", "close" or "consistently" goes.
     """
 
     id: str
-    section: str
-    statement: str
+    section: str  # of the paper
+    statement: str  # in our words
     criterion: Criterion
     quantity: Quantity
-    why: str = ""
+    why: str = ""  # this criterion or quantity
 
     @property
     def tested_on(self) -> str:
-        """What is computed, and why so."""
+        """The quantity and the reason for it in words."""
         text = f"{self.quantity.words}: {'; '.join(self.quantity.effects)}"
         return f"{text}; {self.why}" if self.why else text
 
     @property
     def estimator(self) -> str:
-        """What of the seeds must fulfil the criterion."""
+        """The estimate over seeds that must fulfil the criterion."""
         return "interquartile mean" if self.quantity.uses_iqm else "mean"
+
+    @property
+    def asked(self) -> str:
+        """The criterion in words."""
+        return f"{self.estimator} {self.criterion.words} {self.quantity.unit}"
 
 
 # Names in the file for arguments of quantities, besides measures.
-_NAMED: dict[str, Any] = {
-    **{one.label: one for one in VARIANTS},
-    "at table 2": quantities.AT_TABLE_2,
-    "at figure 1": quantities.AT_FIGURE_1,
-    "mean of all": quantities.MEAN_OF_ALL,
-    "least of all": quantities.LEAST_OF_ALL,
-    "best on held-out seeds": quantities.BEST,
-    "epsilon at table 2": quantities.EPSILON_AT_TABLE_2,
-    **{f"effect of {name}": quantities.effect_of(name) for name in FACTORS},
-    **{f"reversed effect of {name}": quantities.effect_of(name, sign=-1) for name in FACTORS},
-    **{
-        f"less exploration {e} {d}": quantities.less_exploration(e, d)
-        for e in (0, 1)
-        for d in (0, 1)
-    },
-}
+_NAMED: dict[str, Any] = {**{one.label: one for one in VARIANTS}, **quantities.READS}
 
 
 def _claims() -> tuple[Claim, ...]:
@@ -83,3 +73,132 @@ def _claims() -> tuple[Claim, ...]:
 
 
 CLAIMS = _claims()
+# The main claims. Two of them are about steps, because they disagree.
+HEADLINES = ("q-return-highest", "overall-sarsa-length", "sarsa-much-shorter")
+
+Audit = dict[Claim, dict[str, Finding]]  # by claim and delivery setting
+
+
+def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
+    """Return findings on the claims, each in all delivery settings, all judged together.
+
+    A claim is supported if all its contrasts are and contradicted if one is: its finding is that on
+    the weakest contrast.
+    """
+    grids = {delivery: grids_of(comparison, delivery) for delivery in comparison.delivery_settings}
+    contrasts = {
+        (claim, delivery): [
+            Contrast(
+                *(label, effect(grid), claim.criterion, claim.quantity.uses_iqm),
+                *(claim.quantity.possible, claim.quantity.of_estimates),
+            )
+            for label, effect in claim.quantity.effects.items()
+        ]
+        for claim in claims
+        for delivery, grid in grids.items()
+    }
+    findings = iter(judge([one for several in contrasts.values() for one in several]))
+    audit: Audit = {claim: {} for claim in claims}
+    for (claim, delivery), several in contrasts.items():
+        audit[claim][delivery] = weakest([next(findings) for _ in several])
+    return audit
+
+
+def claims_rows(audit: Audit) -> list[dict[str, Any]]:
+    """The rows of claims.csv; numbers are nan if not tested, None if not read by mean."""
+
+    def numbers(one: Finding | None, prefix: str = "") -> dict[str, Any]:
+        names = ("contrast", "effect", "ci_low", "ci_high", "verdict")
+        values: tuple[Any, ...] = (None,) * len(names)
+        if one:
+            values = one.contrast.label, one.effect, one.low, one.high, one.verdict.value
+        return {prefix + name: value for name, value in zip(names, values, strict=True)}
+
+    return [
+        {
+            "claim": claim.id,
+            "section": claim.section,
+            "statement": claim.statement,
+            "quantity": claim.tested_on,
+            "criterion": claim.criterion.words,
+            "unit": claim.quantity.unit,
+            "delivery": delivery,
+            "estimator": claim.estimator,
+            **numbers(one),
+            **numbers(one.by_mean, "mean_"),
+            "level": one.level,
+            "seeds": one.contrast.seeds,
+        }
+        for claim, findings in audit.items()
+        for delivery, one in findings.items()
+    ]
+
+
+def tallies(audit: Audit) -> list[str]:
+    """How many verdicts of each kind there are, a line for each delivery setting."""
+    lines = []
+    for setting in next(iter(audit.values())):
+        counted = Counter(findings[setting].verdict.value for findings in audit.values())
+        numbers = ", ".join(f"{n} {verdict}" for verdict, n in counted.most_common())
+        lines.append(f"{setting}: {numbers}")
+    return lines
+
+
+def headlines(audit: Audit) -> Table:
+    """Return a table of the findings on the main claims, a column for each delivery setting."""
+    claims = {claim.id: claim for claim in audit}
+    rows = [
+        [claims[name].statement, *(_cell(one) for one in audit[claims[name]].values())]
+        for name in HEADLINES
+    ]
+    note = (
+        "Below the verdict: the difference that decides, its interquartile mean (IQM) over seeds "
+        "in reward or steps, and its interval, which holds for all claims at once."
+    )
+    settings = next(iter(audit.values()))
+    headers = ("The paper's main claims", *map(sentence, settings))
+    return Table("", headers, rows, [note], text_columns=len(headers))
+
+
+def _cell(finding: Finding) -> str:
+    if finding.verdict is Verdict.NOT_TESTED:
+        return finding.verdict.value
+    numbers = f"{number(finding.effect)} {interval(finding.low, finding.high)}"
+    return f"{finding.verdict.value}\n{finding.contrast.label}\n{numbers}"
+
+
+def claims_markdown(audit: Audit, world: str) -> str:
+    """The world's name, how to read it, and a table of all claims with effects and intervals."""
+    rows = [
+        [
+            *(claim.id, claim.section, claim.statement, claim.tested_on, claim.asked),
+            *map(_effect, findings.values()),
+        ]
+        for claim, findings in audit.items()
+    ]
+    settings = next(iter(audit.values()))
+    headers = ("Claim", "Section", "The paper, in our words", "Tested on", "Criterion", *settings)
+    level = next(iter(settings.values())).level
+    blocks: list[Block] = [
+        f"World: {world}.",
+        "\n".join(f"- {line}." for line in tallies(audit)),
+        "Effects are paired by seed. Where the verdict by the mean is another, it stands behind. "
+        "Of claims with several contrasts the weakest is shown. Intervals are at "
+        f"{100 * level:.3f} % each, so that all hold at once with 95 %. docs/statistics.md "
+        "explains estimators, verdicts and margins mean.",
+        Table("", headers, rows, text_columns=len(headers)),
+    ]
+    return markdown(blocks)
+
+
+def _effect(finding: Finding) -> str:
+    """Verdict, effect, interval and contrast of a claim; then those by mean where they differ."""
+    if finding.verdict is Verdict.NOT_TESTED:
+        return finding.verdict.value
+    digits = 1 if finding.contrast.uses_iqm else 2
+    span = interval(finding.low, finding.high, digits)
+    text = f"**{finding.verdict.value}** {number(finding.effect, digits)} {span}, "
+    text += finding.contrast.label
+    if finding.by_mean and finding.by_mean.verdict is not finding.verdict:
+        text += f"; by mean: {_effect(finding.by_mean)}"
+    return text

@@ -1,8 +1,7 @@
 """The data of a comparison: measures of each configuration and seed, and learning curves.
 
-Rows are configurations, the second axis is the seed. The seed is the unit of all statistics, and
-because one seed drives every configuration with the same random numbers, differences of rows are
-taken seed by seed.
+The seed is the unit of all statistics, and because one seed drives every configuration with the
+same random numbers, differences of rows are taken seed by seed.
 """
 
 from __future__ import annotations
@@ -17,9 +16,7 @@ import numpy as np
 from taichi_ants.learners import TrainingConfig, label
 from taichi_ants.task import Task
 
-# The name of the world in which the paper's figures and claims mean something.
-PAPER_WORLD = "the paper's"
-_PAPER_TASK = Task()
+PAPER_WORLD = "the paper's"  # in which alone its figures and claims mean something
 
 
 class Variant(NamedTuple):
@@ -43,7 +40,7 @@ class Variant(NamedTuple):
 
 
 class GridPoint(NamedTuple):
-    """The four numbers of the paper's grid, in the order of its table 2."""
+    """The four numbers of the paper's grid."""
 
     learning_rate: float
     discount: float
@@ -52,7 +49,7 @@ class GridPoint(NamedTuple):
 
     @property
     def label(self) -> str:
-        """As in the paper's table 2, for example "0.01 / 0.9 / 0.3 / 0.995"."""
+        """As in its table 2, for example "0.01 / 0.9 / 0.3 / 0.995"."""
         return " / ".join(f"{value:g}" for value in self)
 
 
@@ -82,12 +79,10 @@ class Comparison:
     Attributes:
         measures: `MEASURES` of each run by name, float64 (rows, seeds).
         behaviours: What each final policy does, places in `BEHAVIOURS`, integer (rows, seeds).
-        policy_returns: What the ant earned in the episode that told so, integer (rows, seeds).
-        episodes, rollouts: Training episodes and greedy rollouts of a run.
-        max_steps: Limit of an episode in steps.
-        curves: Learning curves of the learners, see `curves.learning_curves`.
+        policy_returns: Returns of the episodes that told the behaviours, integer (rows, seeds).
+        episodes, rollouts, max_steps: As of a `RunPoint`.
+        curves: Learning curves of the learners, see `figures.curves_of`.
         task: The rules of all rows, except the delivery.
-        world: Name of the world; only in `PAPER_WORLD` ours can be held against the paper.
     """
 
     rows: tuple[Row, ...]
@@ -99,7 +94,7 @@ class Comparison:
     rollouts: int
     max_steps: int
     curves: Mapping[str, np.ndarray] = field(default_factory=dict)
-    task: Task = _PAPER_TASK
+    task: Task = field(default_factory=Task)
     world: str = PAPER_WORLD
 
     @property
@@ -120,9 +115,8 @@ class Comparison:
     @property
     def learners(self) -> list[tuple[str, Variant]]:
         """Each delivery setting with each learner in it."""
-        present = {(row.delivery, row.variant) for row in self.rows}
         pairs = product(self.delivery_settings, self.variants)
-        return [pair for pair in pairs if pair in present]
+        return [pair for pair in pairs if self.positions(*pair)]
 
     def position(self, delivery: str, variant: Variant, point: GridPoint) -> int | None:
         """The number of a configuration's row, None where it is not in the comparison."""
@@ -131,8 +125,5 @@ class Comparison:
 
     def positions(self, delivery: str, variant: Variant) -> list[int]:
         """The numbers of all rows of a learner in one delivery setting, in their order."""
-        return [
-            number
-            for number, row in enumerate(self.rows)
-            if (row.delivery, row.variant) == (delivery, variant)
-        ]
+        pairs = [row[:2] for row in self.rows]
+        return [number for number, pair in enumerate(pairs) if pair == (delivery, variant)]

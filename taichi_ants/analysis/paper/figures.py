@@ -1,39 +1,67 @@
-"""The figures of a comparison; without pyplot, so that nothing global changes."""
+"""The figures of a comparison, and the learning curves that they show."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from taichi_ants.analysis import style
 from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
-from taichi_ants.analysis.paper.comparison import Comparison
-from taichi_ants.analysis.paper.curves import curve_row, spans
+from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import FIGURE_1
-from taichi_ants.analysis.style import (
-    BLUE,
-    COLOURS,
-    INK,
-    ORANGE,
-    WINE,
-    frame,
-    legend_entries,
-    logarithmic,
-    new_figure,
-    styled,
-)
+from taichi_ants.analysis.paper.table2 import shown_position
+from taichi_ants.analysis.statistics import interquartile_mean
+from taichi_ants.analysis.style import BLUE, COLOURS, INK, ORANGE, WINE
 from taichi_ants.errors import count
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_CURVES = {"returns": "Return", "steps": "Steps", "deliveries": "Deliveries"}
+CURVES = {"returns": "Return", "steps": "Steps", "deliveries": "Deliveries"}
+_PER_DECADE = 12  # points of a learning curve between two powers of ten
 # Colours and marks of behaviours, by their places in `BEHAVIOURS`.
 BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
+
+
+def curve_row(comparison: Comparison, delivery: str, variant: Variant) -> int:
+    """Return the row of a learner in figure 1; where it lacks that one, the row of its table 2."""
+    row = comparison.position(delivery, variant, FIGURE_1)
+    return shown_position(comparison, delivery, variant) if row is None else row
+
+
+def spans(episodes: int) -> np.ndarray:
+    """Return the first episodes of spans, from 0, and the end of the last one, int64 (spans + 1,).
+
+    Spans grow so that points are evenly spaced on a logarithmic axis; the first ones are single
+    episodes.
+    """
+    n, end = max(2, round(_PER_DECADE * np.log10(episodes + 1)) + 1), episodes + 1
+    return np.unique(np.geomspace(1, end, n).round().astype(int)) - 1
+
+
+def curves_of(
+    comparison: Comparison, outcomes: Iterable[tuple[int, Mapping[str, np.ndarray]]]
+) -> dict[str, np.ndarray]:
+    """Return the curves of all `comparison.learners`, float64 (learners, 3, spans) by name.
+
+    The second axis is the interquartile mean over seeds and the ends of the middle half of the
+    seeds; of deliveries the mean, as a run of an episode delivers or does not. `outcomes` are rows
+    with arrays (seeds, episodes) by name, those of `curve_row` among them.
+    """
+    places = [curve_row(comparison, *learner) for learner in comparison.learners]
+    edges = spans(comparison.episodes)
+    curves = {name: np.empty((len(places), 3, len(edges) - 1)) for name in CURVES}
+    for row, outcome in outcomes:
+        for name in CURVES if row in places else ():
+            sums = np.add.reduceat(outcome[name], edges[:-1], axis=1, dtype=float)
+            means = sums / np.diff(edges)
+            middle = means.mean(axis=0) if name == "deliveries" else interquartile_mean(means.T)
+            curves[name][places.index(row)] = middle, *np.percentile(means, (25, 75), axis=0)
+    return curves
 
 
 def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
@@ -46,30 +74,33 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
     settings = comparison.delivery_settings
     edges = spans(comparison.episodes)
     at = np.sqrt((edges[:-1] + 1) * edges[1:])  # the middle of a span on a logarithmic axis
-    with styled():
-        figure = new_figure(6.5)
-        shape = len(_CURVES), len(settings)
+    with style.styled():
+        figure = style.new_figure(6.5)
+        shape = len(CURVES), len(settings)
         axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
         for place, (setting, variant) in enumerate(comparison.learners):
             point = comparison.rows[curve_row(comparison, setting, variant)].point
             label = variant.label + ("" if point == FIGURE_1 else f", {setting}: {point.label}")
-            for axis, name in zip(axes[:, settings.index(setting)], _CURVES, strict=True):
+            for axis, name in zip(axes[:, settings.index(setting)], CURVES, strict=True):
                 middle, low, high = comparison.curves[name][place]
                 mark = "o" if len(at) == 1 else ""
                 axis.plot(at, middle, marker=mark, color=colours[variant], label=label)
                 if name != "deliveries":
                     axis.fill_between(at, low, high, color=colours[variant], alpha=0.15, lw=0)
-        for (axis, *_), (name, label) in zip(axes, _CURVES.items(), strict=True):
+        for (axis, *_), (name, label) in zip(axes, CURVES.items(), strict=True):
             axis.set_ylabel(f"{label} of an episode")
             if name == "steps":
-                logarithmic(axis.yaxis, (1, 2, 5))
+                style.logarithmic(axis.yaxis, (1, 2, 5))
             if name == "deliveries":  # a share, of which few hundredths are not to look like much
                 axis.set_ylim(min(0.9, axis.get_ylim()[0]), 1.02)
         for column, setting in zip(axes.T, settings, strict=True):
             column[0].set_title(f"Delivery {setting}")
-            _shortest_delivery(column, baselines)
+            for row in baselines:
+                if row.baseline == "shortest delivery" and row.return_mean is not None:
+                    for axis, level in zip(column, (row.return_mean, row.steps_mean), strict=False):
+                        axis.axhline(level, color=INK, lw=0.9, ls=":", label=row.baseline)
             column[-1].set_xlabel("Episode")
-            logarithmic(column[-1].xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
+            style.logarithmic(column[-1].xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
         words = (
             f"World: {comparison.world}. Line: interquartile mean of "
             f"{count(len(comparison.seeds), 'seed')} (of deliveries the mean), band: their middle "
@@ -79,7 +110,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
             f"{FIGURE_1.epsilon_decay:g}: the paper's figure 1 names no configuration; this one "
             "occurs\ntwice in its table 2."
         )
-        frame(figure, "Learning", words, legend_entries(axes.flat))
+        style.frame(figure, "Learning", words, style.legend_entries(axes.flat))
     return figure
 
 
@@ -88,8 +119,8 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
     settings = comparison.delivery_settings
     returns = comparison.measures["return_last50"]
     deliveries = comparison.measures["deliveries_last50"]
-    with styled():
-        figure = new_figure(5.0)
+    with style.styled():
+        figure = style.new_figure(5.0)
         axes = figure.subplots(1, len(settings), sharex=True, sharey=True, squeeze=False)[0]
         for axis, setting in zip(axes, settings, strict=True):
             axis.set_title(f"Delivery {setting}")
@@ -98,11 +129,17 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
             for code in counts(comparison.behaviours):
                 runs = of_setting & (comparison.behaviours == code)
                 colour, marker = BEHAVIOUR_LOOKS[code]
-                look = {"color": colour, "markersize": 4, "alpha": 0.6}
-                axis.plot(deliveries[runs], returns[runs], marker, label=BEHAVIOURS[code], **look)
-            _baseline_marks(axis, baselines, setting)
+                faint: dict[str, Any] = {"color": colour, "markersize": 4, "alpha": 0.6}
+                axis.plot(deliveries[runs], returns[runs], marker, label=BEHAVIOURS[code], **faint)
+            # Hollow marks, larger than those of the data and above them. Optimal policies take
+            # delivery for the end; elsewhere they are no yardstick.
+            look: dict[str, Any] = {"color": INK, "markerfacecolor": "none", "markersize": 11}
+            for row, marker in zip(baselines, cycle("osD^vph")):
+                counts_here = setting == "terminates" or row.baseline != "optimal policy"
+                if row.return_mean is not None and counts_here:
+                    axis.plot(row.deliveries_mean, row.return_mean, marker, label=row.label, **look)
         axes[0].set_ylabel("Return (reward per episode, last 50)")
-        frame(
+        style.frame(
             figure,
             "Return against deliveries in training, and what the final policies do",
             f"World: {comparison.world}. A mark is a run: "
@@ -110,34 +147,14 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
             f"{count(len(comparison.seeds), 'seed')} each. Its shape and colour show\nthe "
             "behaviour of an ant that follows the final policy greedily, with evaporation as in "
             "training.",
-            legend_entries(axes),
+            style.legend_entries(axes),
         )
     return figure
-
-
-def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
-    """All figures, by their names."""
-    return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}
 
 
 FIGURES = (learning_curves, return_against_deliveries)
 
 
-def _shortest_delivery(column: Sequence[Axes], baselines: Sequence[Baseline]) -> None:
-    """Dotted lines at the return and the length of the shortest delivery, where it is known."""
-    for row in baselines:
-        if row.baseline == "shortest delivery" and row.return_mean is not None:
-            for axis, name in zip(column, ("return_mean", "steps_mean"), strict=False):
-                axis.axhline(getattr(row, name), color=INK, lw=0.9, ls=":", label=row.baseline)
-
-
-def _baseline_marks(axis: Axes, baselines: Sequence[Baseline], setting: str) -> None:
-    """Hollow marks, larger than those of the data and above them."""
-    for row, marker in zip(baselines, cycle("osD^vph")):
-        # Optimal policies take delivery for the end; elsewhere they are no yardstick.
-        counts_here = setting == "terminates" or row.baseline != "optimal policy"
-        x, y = row.deliveries_mean, row.return_mean
-        if x is not None and y is not None and counts_here:
-            axis.plot(
-                *(x, y, marker), color=INK, markerfacecolor="none", markersize=11, label=row.label
-            )
+def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
+    """All figures, by their names."""
+    return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}

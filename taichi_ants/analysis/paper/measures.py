@@ -1,4 +1,4 @@
-"""What is computed from one run before any statistics: one number per configuration and seed.
+"""Measures of one run before any statistics: one number per configuration and seed.
 
 "last 50" means all episodes where a run has fewer. What speaks of the first 50 or the second 50
 episodes needs 100, so that early and late never share an episode.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -25,24 +26,20 @@ _WINDOWS = {
     "last50": (slice(-WINDOW, None), "the last 50 episodes", 1),
     "all": (slice(None), "all episodes", 1),
 }
-
+_SHARE = "share of runs"
 
 # Arrays of a `RunPoint`'s outcome, integer (..., episodes) or (..., rollouts).
 Outcome = Mapping[str, np.ndarray]
-Compute = Callable[[Outcome], np.ndarray]
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A number of a run.
-
-    `compute` is outcome -> float64 (...); `episodes` the fewest training episodes.
-    """
+    """A number of a run."""
 
     words: str
     unit: str
-    compute: Compute
-    episodes: int = 1
+    compute: Callable[[Outcome], np.ndarray]  # float64 (...)
+    episodes: int = 1  # of training, at least
 
     @property
     def uses_iqm(self) -> bool:
@@ -64,22 +61,17 @@ def measures_of_runs(outcome: Outcome, names: Iterable[str] | None = None) -> di
     }
 
 
-def _mean(name: str, episodes: slice = slice(None)) -> Compute:
-    return lambda runs: runs[name][..., episodes].mean(axis=-1, dtype=float)
+def _mean(name: str, episodes: slice, runs: Outcome) -> np.ndarray:
+    return runs[name][..., episodes].mean(axis=-1, dtype=float)
 
 
-def _fluctuation(name: str, episodes: slice) -> Compute:
+def _fluctuation(name: str, episodes: slice, runs: Outcome) -> np.ndarray:
     """Root mean square change from one episode to the next, over the square root of two.
 
-    Without a trend this is the standard deviation of independent episodes. Unlike that one, it
-    hardly depends on the slow rise of a learning curve.
+    For independent episodes this is their standard deviation; a slow trend hardly changes it.
     """
-
-    def compute(runs: Outcome) -> np.ndarray:
-        changes = np.diff(runs[name][..., episodes].astype(float))
-        return np.sqrt(np.einsum("...i,...i", changes, changes) / changes.shape[-1] / 2)
-
-    return compute
+    changes = np.diff(runs[name][..., episodes].astype(float))
+    return np.sqrt(np.einsum("...i,...i", changes, changes) / changes.shape[-1] / 2)
 
 
 def _repeats(runs: Outcome) -> np.ndarray:
@@ -96,27 +88,22 @@ def _improved(runs: Outcome) -> np.ndarray:
 def _measures() -> Iterator[tuple[str, Measure]]:
     for name, (array, words, unit) in _GIVEN.items():
         for window, (episodes, when, least) in _WINDOWS.items():
-            mean = Measure(f"mean {words} of {when}", unit, _mean(array, episodes), least)
-            yield f"{name}_{window}", mean
+            mean = partial(_mean, array, episodes)
+            yield f"{name}_{window}", Measure(f"mean {words} of {when}", unit, mean, least)
             changes = f"fluctuation of the {words} from episode to episode in {when}"
-            compute = _fluctuation(array, episodes)
+            compute = partial(_fluctuation, array, episodes)
             yield f"{name}_fluctuation_{window}", Measure(changes, unit, compute, max(2, least))
-        greedy = f"mean {words} of the greedy rollouts"
-        yield f"greedy_{name}", Measure(greedy, unit, _mean(f"greedy_{array}"))
+        greedy = partial(_mean, f"greedy_{array}", slice(None))
+        yield f"greedy_{name}", Measure(f"mean {words} of the greedy rollouts", unit, greedy)
+    words = "length of the shortest training episode"
+    yield (
+        "shortest_episode",
+        Measure(words, "steps", lambda runs: runs["steps"].min(axis=-1).astype(float)),
+    )
+    words = "whether the last 50 episodes return more than the first 50"
+    yield "improved", Measure(words, _SHARE, _improved, 2 * WINDOW)
+    words = "whether all greedy rollouts of a run are equal in return and length"
+    yield "greedy_repeats", Measure(words, _SHARE, _repeats)
 
 
-_SHARE = "share of runs"
-MEASURES: dict[str, Measure] = {
-    **dict(_measures()),
-    "shortest_episode": Measure(
-        "length of the shortest training episode",
-        "steps",
-        lambda runs: runs["steps"].min(axis=-1).astype(float),
-    ),
-    "improved": Measure(
-        "whether the last 50 episodes return more than the first 50", _SHARE, _improved, 2 * WINDOW
-    ),
-    "greedy_repeats": Measure(
-        "whether all greedy rollouts of a run are equal in return and length", _SHARE, _repeats
-    ),
-}
+MEASURES: dict[str, Measure] = dict(_measures())

@@ -25,9 +25,8 @@ class PaperRow(NamedTuple):
     deliveries: float  # per episode
 
     def figure(self, measure: str) -> float:
-        """What is to be held against a measure of ours."""
-        by_word = {"return": self.reward, "steps": self.steps, "deliveries": self.deliveries}
-        return by_word[measure.partition("_")[0]]
+        """The figure for a measure of ours, by its first word."""
+        return getattr(self, measure.partition("_")[0].replace("return", "reward"))
 
 
 TABLE_2: dict[Variant, PaperRow] = {
@@ -41,8 +40,8 @@ TABLE_2: dict[Variant, PaperRow] = {
 # the only ones that occur twice in its table 2.
 FIGURE_1 = GridPoint(0.01, 0.9, 0.3, 0.995)
 
-GREEDY_RETURN = 45.0
-GREEDY_STEPS = (34.0, 36.0)
+GREEDY_RETURN = 45
+GREEDY_STEPS = (34, 36)
 
 # The paper's grid: each factor with its two values, in the order of `GridPoint`.
 FACTORS: dict[str, tuple[float, float]] = {

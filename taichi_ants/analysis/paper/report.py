@@ -1,113 +1,77 @@
-"""The comparison as text: on one screen, and all of its tables.
-
-It shows what the other tables hold, and computes nothing.
-"""
+"""The comparison as text: on one screen, and all of its tables."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
-from taichi_ants.analysis.paper.audit import Audit, assess, claims_tallies, headlines
+from taichi_ants.analysis.paper.claims import Audit, assess, headlines, tallies
 from taichi_ants.analysis.paper.comparison import Comparison
+from taichi_ants.analysis.paper.measures import WINDOW
 from taichi_ants.analysis.paper.published import GREEDY_RETURN, GREEDY_STEPS
-from taichi_ants.analysis.paper.summary import (
+from taichi_ants.analysis.paper.table2 import (
+    FIGURES,
     BehaviourMeans,
+    Line,
     Summary,
     summarise,
     summarise_behaviours,
+    table2,
 )
-from taichi_ants.analysis.paper.table2 import APART, Line, figure_tables, table2
-from taichi_ants.analysis.tables import Block, Table, markdown, number, plain_text, thousands
+from taichi_ants.analysis.sweeps import Estimator
+from taichi_ants.analysis.tables import (
+    MISSING,
+    Block,
+    Table,
+    interval,
+    markdown,
+    number,
+    percent,
+    plain_text,
+    thousands,
+)
 from taichi_ants.errors import count
 
 WIDTH = 79  # columns: what the narrowest common terminal shows
 MOST_LINES = 12  # of the table on one screen
+# Below, a note warns that means have too few seeds; what intervals cover is measured in
+# docs/statistics.md.
+FEW_SEEDS = 50
+APART = "!"  # marks a mean that the interval of the IQM excludes
+MIXED = "+ the runs do different things, and no run has their mean."
 
 
-def table2_markdown(comparison: Comparison, lines: Sequence[Line]) -> str:
-    """The paper's table 2 beside ours, as Markdown."""
-    return markdown([*heading(comparison), *figure_tables(lines, comparison), _greedy(lines)])
+class Results(NamedTuple):
+    """A comparison, the rows of `bounds.baselines`, and what follows from them."""
+
+    comparison: Comparison
+    baselines: Sequence[Baseline]
+    summaries: Sequence[Summary]
+    behaviours: Sequence[BehaviourMeans]
+    lines: Sequence[Line]
+    audit: Audit
+
+    @classmethod
+    def of(cls, comparison: Comparison, baselines: Sequence[Baseline]) -> Results:
+        """Return the results of a comparison."""
+        summaries, behaviours = summarise(comparison), summarise_behaviours(comparison)
+        lines = table2(comparison, summaries)
+        return cls(comparison, baselines, summaries, behaviours, lines, assess(comparison))
 
 
 def report(comparison: Comparison, lines: Sequence[Line], audit: Audit) -> str:
     """Return what fits on one screen, as plain text of at most `WIDTH` columns."""
     tables = _glance(lines), headlines(audit), behaviour_counts(comparison)
-    return plain_text([*heading(comparison), *tables, claims_tallies(audit)], WIDTH)
+    claims = [f"The paper's {len(audit)} claims", *(f"  {line}" for line in tallies(audit))]
+    return plain_text([*heading(comparison), *tables, "\n".join(claims)], WIDTH)
 
 
-def behaviour_counts(comparison: Comparison) -> Table:
-    """Return a table of how many final policies do what, by delivery setting."""
-    settings = comparison.delivery_settings
-    by_setting = []
-    for setting in settings:
-        here = [row.delivery == setting for row in comparison.rows]
-        by_setting.append(counts(comparison.behaviours[here]))
-    rows = [
-        [name, *(thousands(done.get(code, 0)) for done in by_setting)]
-        for code, name in enumerate(BEHAVIOURS)
-        if any(code in done for done in by_setting)
-    ]
-    return Table("", ("What the final policies do", *settings), rows)
-
-
-def all_tables(
-    comparison: Comparison,
-    lines: Sequence[Line],
-    behaviours: Sequence[BehaviourMeans],
-    baselines: Sequence[Baseline] = (),
-) -> list[Table]:
-    """All tables, but those of the claims, each with its notes.
-
-    What is given is from `table2.table2`, `summary.summarise_behaviours` and `bounds.baselines`.
-    """
-    return [
-        *figure_tables(lines, comparison),
-        _greedy(lines),
-        behaviour_table(lines, behaviours),
-        _baselines(baselines),
-    ]
-
-
-def _glance(lines: Sequence[Line]) -> Table:
-    """Return the returns and steps of the learners beside the paper's."""
-    shown = lines[:MOST_LINES]
-    beside = any(line.paper for line in lines)
-    paper = ("paper",) if beside else ()
-    returns = ("Return\nmean", "IQM", "best\nrun", *paper)
-    headers = ("Learner", "Delivery", *returns, "Steps\nmean", "best\nrun", *paper, "Food\nmean")
-    rows = []
-    for line in shown:
-        estimates, best = line.summary.estimates, line.best_run
-        gains = estimates["return_last50"]
-        rows.append(
-            [
-                *(line.label, line.delivery),
-                number(gains.mean) + (f" {APART}" if gains.apart else ""),
-                number(gains.iqm),
-                number(best["return_last50"].median),
-                *([number(line.of_paper("return"))] if beside else []),
-                number(estimates["steps_all"].mean),
-                number(best["steps_all"].median),
-                *([number(line.of_paper("steps"))] if beside else []),
-                number(estimates["deliveries_last50"].mean, 2),
-            ]
-        )
-    notes = [
-        "Return and food of the last 50 episodes, steps of all. IQM: interquartile mean, the "
-        "IQM. Best run: best by return of all configurations, one run each."
-    ]
-    if any(line.summary.estimates["return_last50"].apart for line in shown):
-        notes.append(f"{APART} a few far runs have moved the mean away from the IQM.")
-    if any(line.summary.mixed for line in shown):
-        notes.append("+ the runs do different things, and no run has their mean.")
-    if not all(line.paper_configuration for line in shown):
-        notes.append("* its best configuration by the IQM of the return, which flatters it.")
-    if len(lines) > len(shown):
-        notes.append(f"table2.csv has {len(lines) - len(shown)} more.")
-    return Table("", headers, rows, notes, text_columns=2)
+def table2_markdown(comparison: Comparison, lines: Sequence[Line]) -> str:
+    """The paper's table 2 beside ours, as Markdown."""
+    return markdown([*heading(comparison), *figure_tables(lines, comparison), greedy_table(lines)])
 
 
 def heading(comparison: Comparison) -> list[Block]:
@@ -126,19 +90,137 @@ def heading(comparison: Comparison) -> list[Block]:
     return [f"World: {comparison.world}.\n{sizes}\n{trails}"]
 
 
-def _greedy(lines: Sequence[Line]) -> Table:
+def behaviour_counts(comparison: Comparison) -> Table:
+    """Return a table of how many final policies do what, by delivery setting."""
+    settings = comparison.delivery_settings
+    by_setting = []
+    for setting in settings:
+        here = [row.delivery == setting for row in comparison.rows]
+        by_setting.append(counts(comparison.behaviours[here]))
+    rows = [
+        [name, *(thousands(done.get(code, 0)) for done in by_setting)]
+        for code, name in enumerate(BEHAVIOURS)
+        if any(code in done for done in by_setting)
+    ]
+    return Table("", ("What the final policies do", *settings), rows)
+
+
+def _mean(one: Estimator) -> str:
+    return number(one.mean) + (f" {APART}" if one.apart else "")
+
+
+def _glance(lines: Sequence[Line]) -> Table:
+    """Return the returns and steps of the learners beside the paper's."""
+    shown = lines[:MOST_LINES]
+    beside = any(line.paper for line in lines)
+    paper = ("paper",) if beside else ()
+    returns = ("Return\nmean", "IQM", "best\nrun", *paper)
+    headers = ("Learner", "Delivery", *returns, "Steps\nmean", "best\nrun", *paper, "Food\nmean")
+    rows = []
+    for line in shown:
+        estimates, best = line.summary.estimates, line.best_run
+        gains = estimates["return_last50"]
+        cells = [
+            *(line.label, line.delivery, _mean(gains), number(gains.iqm)),
+            *(number(best["return_last50"].median), number(line.of_paper("return"))),
+            *(number(estimates["steps_all"].mean), number(best["steps_all"].median)),
+            *(number(line.of_paper("steps")), number(estimates["deliveries_last50"].mean, 2)),
+        ]
+        rows.append(cells if beside else [*cells[:5], *cells[6:8], cells[9]])
+    notes = [
+        "Return and food of the last 50 episodes, steps of all. IQM: interquartile mean, the "
+        "IQM. Best run: best by return of all configurations, one run each."
+    ]
+    if any(line.summary.estimates["return_last50"].apart for line in shown):
+        notes.append(f"{APART} a few far runs have moved the mean away from the IQM.")
+    if any(line.summary.mixed for line in shown):
+        notes.append(MIXED)
+    if not all(line.paper_configuration for line in shown):
+        notes.append("* its best configuration by the IQM of the return, which flatters it.")
+    if len(lines) > len(shown):
+        notes.append(f"table2.csv has {len(lines) - len(shown)} more.")
+    return Table("", headers, rows, notes, text_columns=2)
+
+
+def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
+    """A table for each figure of a run, beside the paper's in its world, and what they mean."""
+    runs = comparison.episodes
+    late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
+    titles = (f"Return, {late}", "Steps, all episodes", f"Steps, {late}", f"Deliveries, {late}")
+    headers = ("Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below")
+    beside = any(line.paper for line in lines)
+    width = len(headers) if beside else len(headers) - 2
+    tables = []
+    for name, title in zip(FIGURES, titles, strict=True):
+        rows = []
+        for line in lines:
+            estimator, best = line.summary.estimates[name], line.best_run[name]
+            cells = [
+                *(line.label, line.delivery),
+                _spread(name, *estimator[:3], mark=f" {APART}" if estimator.apart else ""),
+                _spread(name, *estimator[3:]),
+                _spread(name, *best[:3]),
+                number(line.of_paper(name), 2 if "deliver" in name else 1),
+                percent(best.paper_percentile / 100),
+            ]
+            rows.append(cells[:width])
+        tables.append(Table(title, headers[:width], rows, text_columns=2))
+    return [*tables, Table("", (), (), _notes(lines, len(comparison.seeds), beside))]
+
+
+def _spread(measure: str, middle: float | None, low: float, high: float, mark: str = "") -> str:
+    """Return an estimator and below it its interval, if it has one; "-" if there is none."""
+    if middle is None:
+        return MISSING
+    large = max(abs(middle), abs(high)) >= 100
+    digits = 2 if measure.startswith("deliveries") else 0 if large else 1
+    text = number(middle, digits) + mark
+    return text if math.isnan(low) or low == high else f"{text}\n{interval(low, high, digits)}"
+
+
+def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
+    notes = [
+        f"Mean, IQM: over {seeds} seeds, with intervals at 95 %."
+        if seeds > 1
+        else "Mean, IQM: of one seed, which has no interval.",
+        "IQM: interquartile mean, of the middle half of the runs.",
+        "Best run: best by return of all configurations, one run each: median, [95 % range].",
+    ]
+    if any(line.summary.estimates[name].apart for line in lines for name in FIGURES):
+        notes.append(f"{APART} the mean is outside of the IQM's interval: far runs have moved it.")
+    if beside:
+        notes += [
+            "Paper: its table 2. Its steps may be of all episodes or of the last 50.",
+            "Below: percentage of the best runs below the paper's figure.",
+        ]
+    if 1 < seeds < FEW_SEEDS:
+        notes += [
+            f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean "
+            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md)."
+        ]
+    starred = [
+        f"  {line.label}, {line.delivery}: {line.summary.row.point.label}"
+        for line in lines
+        if not line.paper_configuration
+    ]
+    if starred:
+        best = "* its best by the IQM of the return, on these seeds, which flatters it"
+        notes += [f"{best} (learning rate / discount / epsilon / decay):", *starred]
+    return [*notes, MIXED] if any(line.summary.mixed for line in lines) else notes
+
+
+def greedy_table(lines: Sequence[Line]) -> Table:
     """Return a table of the greedy rollouts of the final policies."""
     headers = ("Learner", "Delivery", "Return\nmean", "IQM", "Steps\nmean", "IQM", "Food\nmean")
     rows = []
     for line in lines:
-        cells = [line.label, line.delivery]
-        for name in ("greedy_return", "greedy_steps"):
-            one = line.summary.estimates[name]
-            cells += [number(one.mean) + (f" {APART}" if one.apart else ""), number(one.iqm)]
-        food = line.summary.estimates["greedy_deliveries"].mean
-        rows.append([*cells, number(food, 2)])
+        gains, steps, food = (
+            line.summary.estimates[f"greedy_{name}"] for name in ("return", "steps", "deliveries")
+        )
+        both = (text for one in (gains, steps) for text in (_mean(one), number(one.iqm)))
+        rows.append([line.label, line.delivery, *both, number(food.mean, 2)])
     low, high = GREEDY_STEPS
-    note = f"The paper, in its world: about {GREEDY_RETURN:g} reward in {low:g} to {high:g} steps."
+    note = f"The paper, in its world: about {GREEDY_RETURN} reward in {low} to {high} steps."
     return Table("Greedy evaluation, configurations as above", headers, rows, [note], 2)
 
 
@@ -146,13 +228,16 @@ def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans])
     """Return what the final policies do, in the configurations that the tables above show."""
     returns = ("Return\nin training", "Return\nfollowed", "Return\ngreedy")
     headers = ("Learner", "Delivery", "Behaviour", "Runs", *returns)
-    rows = []
-    for line in lines:
-        for one in behaviours:
-            if one.row == line.summary.row:
-                means = one.return_last50_mean, one.policy_return_mean, one.greedy_return_mean
-                cells = [line.label, line.delivery, BEHAVIOURS[one.behaviour], str(one.runs)]
-                rows.append([*cells, *map(number, means)])
+    shown = ("return_last50", "policy_return", "greedy_return")
+    rows = [
+        [
+            *(line.label, line.delivery, BEHAVIOURS[one.behaviour], str(one.runs)),
+            *(number(one.means[name]) for name in shown),
+        ]
+        for line in lines
+        for one in behaviours
+        if one.row == line.summary.row
+    ]
     notes = (
         "Each policy is followed greedily once, with evaporation as in training.",
         *(f"{one}: {words}." for one, words in zip(BEHAVIOURS, DEFINITIONS, strict=True)),
@@ -163,31 +248,13 @@ def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans])
     return Table("What they do, in the configurations above", headers, rows, notes, text_columns=3)
 
 
-def _baselines(baselines: Sequence[Baseline]) -> Table:
-    rows, notes = [], []
-    for one in baselines:
-        if one.return_mean is None:
-            notes.append(f"{one.label}: {one.note}")
-        else:
-            lengths = number(one.return_mean), number(one.steps_mean)
-            rows.append([one.label, *lengths, number(one.deliveries_mean, 2)])
+def baseline_table(baselines: Sequence[Baseline]) -> Table:
+    """Return what exact bounds and simple policies bring; what is not known is in the notes."""
+    rows = [
+        [one.label, number(one.return_mean), number(one.steps_mean), number(one.deliveries_mean, 2)]
+        for one in baselines
+        if one.return_mean is not None
+    ]
+    notes = [f"{one.label}: {one.note}" for one in baselines if one.return_mean is None]
     headers = ("Behaviour", "Return", "Steps", "Deliveries")
     return Table("Baselines, with evaporation as in training", headers, rows, notes)
-
-
-class Results(NamedTuple):
-    """A comparison, the rows of `bounds.baselines`, and the tables that follow from them."""
-
-    comparison: Comparison
-    baselines: Sequence[Baseline]
-    summaries: Sequence[Summary]
-    behaviours: Sequence[BehaviourMeans]
-    lines: Sequence[Line]
-    audit: Audit
-
-    @classmethod
-    def of(cls, comparison: Comparison, baselines: Sequence[Baseline]) -> Results:
-        """Return the results of a comparison."""
-        summaries = summarise(comparison)
-        lines, behaviours = table2(comparison, summaries), summarise_behaviours(comparison)
-        return cls(comparison, baselines, summaries, behaviours, lines, assess(comparison))

@@ -1,7 +1,7 @@
-"""The paper's table 2, beside ours.
+"""The paper's table 2 beside ours, and summaries of all configurations.
 
-Each row twice, for each delivery setting: the same configuration over all our seeds, and the
-paper's way (train each configuration once, report the best by return) with other seeds.
+The paper trains each configuration once, and reports for each algorithm the best of 16 by return.
+`best_of` repeats that with other seeds, which shows how much of a figure is luck.
 """
 
 from __future__ import annotations
@@ -12,32 +12,114 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.paper.best_of import (
-    DRAWS,
-    FIGURES,
-    best_of,
-    paper_row,
-    percentile_of,
-    shown_position,
-)
-from taichi_ants.analysis.paper.comparison import Comparison
-from taichi_ants.analysis.paper.measures import WINDOW
-from taichi_ants.analysis.paper.published import PaperRow
-from taichi_ants.analysis.paper.summary import Summary
-from taichi_ants.analysis.tables import MISSING, Table, interval, number, percent
-from taichi_ants.errors import count
+from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
+from taichi_ants.analysis.paper.comparison import Comparison, Row, Variant
+from taichi_ants.analysis.paper.measures import MEASURES
+from taichi_ants.analysis.paper.published import TABLE_2, PaperRow
+from taichi_ants.analysis.statistics import RANDOM_SEED, interquartile_mean
+from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of
 
-# Below, a note warns that means have too few seeds; what intervals cover is measured in
-# docs/statistics.md.
-FEW_SEEDS = 50
-APART = "!"  # marks a mean that the interval of the IQM excludes
+DRAWS = 20_000
+# What is reported of a run. The paper has one figure of steps, we have two readings of it.
+FIGURES = ("return_last50", "steps_all", "steps_last50", "deliveries_last50")
+_GREEDY = ("greedy_return", "greedy_steps", "greedy_deliveries")
+_MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", *_GREEDY)
+
+
+class Summary(NamedTuple):
+    """A configuration over all seeds, a row of summary.csv."""
+
+    row: Row
+    seeds: int
+    estimates: Mapping[str, Estimator]
+    runs: Mapping[int, int]  # by place in `BEHAVIOURS`
+
+    @property
+    def mixed(self) -> bool:
+        """Whether the runs do different things."""
+        return len(self.runs) > 1
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of summary.csv."""
+        return {
+            **self.row.columns(),
+            "seeds": self.seeds,
+            **centre_columns(self.estimates),
+            **{f"runs_{name}": self.runs.get(code, 0) for code, name in enumerate(NAMES)},
+        }
+
+
+def summarise(comparison: Comparison) -> list[Summary]:
+    """Return a summary of each configuration, in their order."""
+    values = {name: comparison.measures[name] for name in _MEASURES}
+    estimates = centres_of(values, [name for name in values if MEASURES[name].uses_iqm])
+    rows = zip(comparison.rows, estimates, comparison.behaviours, strict=True)
+    seeds = len(comparison.seeds)
+    return [Summary(row, seeds, found, counts(done)) for row, found, done in rows]
+
+
+class BehaviourMeans(NamedTuple):
+    """The runs of a configuration with one behaviour, a row of behaviours.csv."""
+
+    row: Row
+    behaviour: int
+    runs: int
+    means: Mapping[str, float]  # "policy_return" is of the episode that told the behaviour
+
+    def columns(self) -> dict[str, Any]:
+        """Return the columns of behaviours.csv."""
+        done = {"behaviour": BEHAVIOURS[self.behaviour], "runs": self.runs}
+        return self.row.columns() | done | {f"{name}_mean": x for name, x in self.means.items()}
+
+
+def summarise_behaviours(comparison: Comparison) -> list[BehaviourMeans]:
+    """Return means for each configuration and behaviour that occurs in it."""
+    names = ("return_last50", "policy_return", *_GREEDY)
+    values = {"policy_return": comparison.policy_returns, **comparison.measures}
+    found = []
+    for place, (row, done) in enumerate(zip(comparison.rows, comparison.behaviours, strict=True)):
+        for code, runs in counts(done).items():
+            means = {name: float(values[name][place, done == code].mean()) for name in names}
+            found.append(BehaviourMeans(row, code, runs, means))
+    return found
+
+
+def paper_row(comparison: Comparison, variant: Variant) -> PaperRow | None:
+    """The paper's table 2 for a learner; None where it has none, and in other worlds."""
+    return TABLE_2.get(variant) if comparison.in_paper_world else None
+
+
+def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> int:
+    """The row that stands for a learner: the paper's configuration.
+
+    Where there is none, its best one by the IQM of the return, which no outlier decides. It is
+    chosen and reported on the same seeds, which flatters it.
+    """
+    paper = paper_row(comparison, variant)
+    same = comparison.position(delivery, variant, paper.point) if paper else None
+    if same is not None:
+        return same
+    positions = comparison.positions(delivery, variant)
+    returns = interquartile_mean(comparison.measures["return_last50"][positions])
+    return positions[int(returns.argmax())]
+
+
+def best_of(
+    comparison: Comparison, delivery: str, variant: Variant, draws: int = DRAWS
+) -> dict[str, np.ndarray]:
+    """The winner's `FIGURES`, float64 (draws,) each: each configuration runs once, on any seed."""
+    rows = np.array(comparison.positions(delivery, variant))
+    random = np.random.default_rng(RANDOM_SEED)
+    seeds = random.integers(0, len(comparison.seeds), size=(draws, len(rows)))
+    winner = comparison.measures["return_last50"][rows, seeds].argmax(axis=1)
+    won = rows[winner], seeds[np.arange(draws), winner]
+    return {name: comparison.measures[name][won] for name in FIGURES}
 
 
 class BestRun(NamedTuple):
     """A figure of the best run of all configurations, had each been trained once.
 
-    Over repetitions with other seeds: median, range from 2.5 % to 97.5 %, and the percentage below
-    the paper's figure, nan without one.
+    The range is from 2.5 % to 97.5 % of repetitions with other seeds.
     """
 
     median: float
@@ -45,21 +127,21 @@ class BestRun(NamedTuple):
     high: float
     paper_percentile: float
 
+    @classmethod
+    def of(cls, values: np.ndarray, paper: float = math.nan) -> BestRun:
+        """Return it from the values of repetitions; ties with the paper's count by half."""
+        low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
+        below = float(50 * ((values < paper).mean() + (values <= paper).mean()))
+        return cls(median, low, high, math.nan if math.isnan(paper) else below)
+
 
 class Line(NamedTuple):
-    """A learner in one delivery setting, a row of table2.csv.
+    """A learner in one delivery setting, a row of table2.csv."""
 
-    Attributes:
-        summary: The configuration that stands for it, see `best_of.shown_position`.
-        paper: The paper's row; None for a learner that it does not have, and in other worlds.
-        best_run_of: From how many configurations the best run is chosen.
-        best_run: By the names of `FIGURES`.
-    """
-
-    summary: Summary
-    paper: PaperRow | None
-    best_run_of: int
-    best_run: Mapping[str, BestRun]
+    summary: Summary  # of the configuration that stands for it, see `shown_position`
+    paper: PaperRow | None  # see `paper_row`
+    best_run_of: int  # configurations
+    best_run: Mapping[str, BestRun]  # by the names of `FIGURES`
 
     @property
     def delivery(self) -> str:
@@ -97,85 +179,40 @@ class Line(NamedTuple):
 
 
 def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DRAWS) -> list[Line]:
-    """Return a line for each delivery setting and learner, from `summary.summarise`."""
+    """Return a line for each delivery setting and learner, from `summarise`."""
     lines = []
-    for delivery, variant in comparison.learners:
-        paper = paper_row(comparison, variant)
-        best = {}
-        for name, values in best_of(comparison, delivery, variant, draws).items():
-            low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
-            percentile = percentile_of(paper.figure(name), values) if paper else math.nan
-            best[name] = BestRun(median, low, high, percentile)
-        shown = summaries[shown_position(comparison, delivery, variant)]
-        several = len(comparison.positions(delivery, variant))
-        lines.append(Line(shown, paper, several, best))
+    for learner in comparison.learners:
+        paper = paper_row(comparison, learner[1])
+        best = {
+            name: BestRun.of(values, paper.figure(name) if paper else math.nan)
+            for name, values in best_of(comparison, *learner, draws).items()
+        }
+        shown = summaries[shown_position(comparison, *learner)]
+        lines.append(Line(shown, paper, len(comparison.positions(*learner)), best))
     return lines
 
 
-def _spread(measure: str, middle: float | None, low: float, high: float, mark: str = "") -> str:
-    """Return an estimator and below it its interval, if it has one; "-" if there is none."""
-    if middle is None:
-        return MISSING
-    large = max(abs(middle), abs(high)) >= 100
-    digits = 2 if measure.startswith("deliveries") else 0 if large else 1
-    text = number(middle, digits) + mark
-    return text if math.isnan(low) or low == high else f"{text}\n{interval(low, high, digits)}"
+def examples(comparison: Comparison) -> list[tuple[int, int]]:
+    """Return runs to look at, as row and place of the seed: one of each behaviour of each learner.
+
+    It is the run of median return, in the configuration that stands for the learner, else in the
+    one in which the behaviour is most frequent.
+    """
+    codes = comparison.behaviours
+    shown = [shown_position(comparison, *learner) for learner in comparison.learners]
+    kinds = [(row, code) for row in shown for code in counts(codes[row])]
+    others = counts(codes).keys() - {code for _, code in kinds}
+    kinds += [(int((codes == code).sum(axis=1).argmax()), code) for code in sorted(others)]
+    chosen = []
+    for row, code in kinds:
+        runs = np.flatnonzero(codes[row] == code)
+        order = np.argsort(comparison.measures["return_last50"][row, runs], kind="stable")
+        chosen.append((row, int(runs[order[(len(runs) - 1) // 2]])))
+    return chosen
 
 
-def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
-    """A table for each figure of a run, beside the paper's in its world, and what they mean."""
-    runs = comparison.episodes
-    late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
-    titles = (f"Return, {late}", "Steps, all episodes", f"Steps, {late}", f"Deliveries, {late}")
-    headers = ("Learner", "Delivery", "Mean", "IQM", "Best run", "Paper", "Below")
-    beside = any(line.paper for line in lines)
-    width = len(headers) if beside else len(headers) - 2
-    tables = []
-    for name, title in zip(FIGURES, titles, strict=True):
-        rows = []
-        for line in lines:
-            estimator, best = line.summary.estimates[name], line.best_run[name]
-            cells = [
-                *(line.label, line.delivery),
-                _spread(name, *estimator[:3], mark=f" {APART}" if estimator.apart else ""),
-                _spread(name, *estimator[3:]),
-                _spread(name, *best[:3]),
-                number(line.of_paper(name), 2 if "deliver" in name else 1),
-                percent(best.paper_percentile / 100),
-            ]
-            rows.append(cells[:width])
-        tables.append(Table(title, headers[:width], rows, text_columns=2))
-    return [*tables, Table("", (), (), _notes(lines, len(comparison.seeds), beside))]
-
-
-def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
-    notes = [
-        f"Mean, IQM: over {seeds} seeds, with intervals at 95 %."
-        if seeds > 1
-        else "Mean, IQM: of one seed, which has no interval.",
-        "IQM: interquartile mean, of the middle half of the runs.",
-        "Best run: best by return of all configurations, one run each: median, [95 % range].",
-    ]
-    if any(line.summary.estimates[name].apart for line in lines for name in FIGURES):
-        notes.append(f"{APART} the mean is outside of the IQM's interval: far runs have moved it.")
-    if beside:
-        notes += [
-            "Paper: its table 2. Its steps may be of all episodes or of the last 50.",
-            "Below: percentage of the best runs below the paper's figure.",
-        ]
-    if 1 < seeds < FEW_SEEDS:
-        notes += [
-            f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean "
-            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md)."
-        ]
-    starred = [
-        f"  {line.label}, {line.delivery}: {line.summary.row.point.label}"
-        for line in lines
-        if not line.paper_configuration
-    ]
-    if starred:
-        best = "* its best by the IQM of the return, on these seeds, which flatters it"
-        notes += [f"{best} (learning rate / discount / epsilon / decay):", *starred]
-    if any(line.summary.mixed for line in lines):
-        notes.append("+ the runs do different things, and no run has their mean.")
-    return notes
+def example_name(comparison: Comparison, row: int, run: int) -> str:
+    """The name of the files of an example: its delivery setting, learner and behaviour."""
+    delivery, variant, _ = comparison.rows[row]
+    own = "".join(f"_{part}" for part in variant.short)
+    return f"{delivery}_{variant.learner}{own}_{NAMES[comparison.behaviours[row, run]]}"

@@ -20,7 +20,7 @@ from taichi_ants.worlds.world import World
 
 
 def assert_outcome(outcome: Outcome, expected: Outcome) -> None:
-    assert vars(outcome) == pytest.approx(vars(expected))
+    assert outcome == pytest.approx(expected)
 
 
 @st.composite

@@ -9,8 +9,13 @@ import pytest
 from synthetic_comparison import Edit, build, change, level_truth, remeasured, subset, unchanged
 
 from taichi_ants.analysis.findings import SIMULTANEOUS_LEVEL, UNBOUNDED, Finding, Verdict
-from taichi_ants.analysis.paper.audit import Audit, assess, claims_markdown, claims_rows
-from taichi_ants.analysis.paper.claims import CLAIMS
+from taichi_ants.analysis.paper.claims import (
+    CLAIMS,
+    Audit,
+    assess,
+    claims_markdown,
+    claims_rows,
+)
 from taichi_ants.analysis.paper.comparison import PAPER_WORLD, Comparison, GridPoint, Variant
 from taichi_ants.analysis.paper.published import (
     DYNA_P3,

@@ -154,7 +154,7 @@ def test_importing_the_analysis_is_light() -> None:
 import importlib, pkgutil, sys, taichi_ants.analysis as analysis
 for module in pkgutil.walk_packages(analysis.__path__, "taichi_ants.analysis."):
     importlib.import_module(module.name)
-assert "taichi_ants.analysis.paper.audit" in sys.modules
+assert "taichi_ants.analysis.paper.claims" in sys.modules
 print(*{"taichi", "matplotlib", "scipy", "rich"}.intersection(sys.modules))
 """
     found = subprocess.run(

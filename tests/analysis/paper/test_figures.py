@@ -25,7 +25,6 @@ from synthetic_comparison import (
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
 from taichi_ants.analysis.bounds.baselines import Baseline
-from taichi_ants.analysis.paper.best_of import shown_position
 from taichi_ants.analysis.paper.comparison import Variant
 from taichi_ants.analysis.paper.figures import (
     BEHAVIOUR_LOOKS,
@@ -34,6 +33,7 @@ from taichi_ants.analysis.paper.figures import (
     return_against_deliveries,
 )
 from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA, VARIANTS
+from taichi_ants.analysis.paper.table2 import shown_position
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import COLOURS, save_all
 

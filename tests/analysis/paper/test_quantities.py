@@ -10,23 +10,25 @@ from synthetic_comparison import build, remeasured, subset, unchanged
 
 from taichi_ants.analysis.paper.published import FIGURE_1, Q_LEARNING, SARSA
 from taichi_ants.analysis.paper.quantities import (
-    AT_FIGURE_1,
-    MEAN_OF_ALL,
-    Slice,
+    READS,
+    grids_of,
     minus,
     of,
+    pairs,
     rank_correlation,
     share_above,
 )
 
+AT_FIGURE_1, MEAN_OF_ALL = READS["at figure 1"], READS["mean of all"]
+
 
 def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
     comparison = build({"terminates": unchanged, "truncates": unchanged}, seeds=4)
-    part = Slice(comparison, "terminates")
+    part = grids_of(comparison, "terminates")
     values = AT_FIGURE_1.values(part, "return_last50", SARSA)
     position = comparison.position("terminates", SARSA, FIGURE_1)
     np.testing.assert_array_equal(values, comparison.measures["return_last50"][position])
-    grid = part.grid("steps_all", Q_LEARNING)
+    grid = part("steps_all", Q_LEARNING)
     assert grid.shape == (2, 2, 2, 2, 4)
     # Learning rate 0.01, discount 0.9, epsilon 0.5, decay 0.99.
     row = next(
@@ -37,22 +39,23 @@ def test_a_slice_reads_the_rows_it_is_asked_for() -> None:
         and row.delivery == "terminates"
     )
     np.testing.assert_array_equal(grid[1, 0, 1, 0], comparison.measures["steps_all"][row])
-    pairs = part.pairs("steps_all", Q_LEARNING, "epsilon")
-    assert pairs.shape == (8, 4)
+    differences = pairs(grid, "epsilon")
+    assert differences.shape == (8, 4)
     np.testing.assert_allclose(
-        pairs.mean(axis=0), grid[:, :, 1].mean(axis=(0, 1, 2)) - grid[:, :, 0].mean(axis=(0, 1, 2))
+        differences.mean(axis=0),
+        grid[:, :, 1].mean(axis=(0, 1, 2)) - grid[:, :, 0].mean(axis=(0, 1, 2)),
     )
 
 
 def test_what_is_missing_is_nan() -> None:
     comparison = build({"truncates": unchanged}, seeds=2, variants=[SARSA], grid=[FIGURE_1])
-    part = Slice(comparison, "truncates")
+    part = grids_of(comparison, "truncates")
     assert np.isfinite(AT_FIGURE_1.values(part, "return_last50", SARSA)).all()
     assert np.isnan(MEAN_OF_ALL.values(part, "return_last50", SARSA)).all()
     for missing in (
-        Slice(comparison, "terminates"),
-        Slice(replace(comparison, world="garden.txt"), "truncates"),
-        Slice(subset(comparison, [0], 2, 49), "truncates"),
+        grids_of(comparison, "terminates"),
+        grids_of(replace(comparison, world="garden.txt"), "truncates"),
+        grids_of(subset(comparison, [0], 2, 49), "truncates"),
     ):
         assert np.isnan(AT_FIGURE_1.values(missing, "return_last50", SARSA)).all()
     for quantity in (
@@ -71,7 +74,9 @@ def test_the_held_out_half_does_not_choose() -> None:
     comparison.arrays["returns"][3, 1::2] = 0
     comparison.arrays["returns"][5, 1::2] = 99
     comparison = remeasured(comparison)
-    values = Slice(comparison, "truncates").held_out("return_last50", SARSA)
+    values = READS["best on held-out seeds"].values(
+        grids_of(comparison, "truncates"), "return_last50", SARSA
+    )
     assert values.tolist() == [0.0, 0.0, 0.0]
 
 
@@ -80,9 +85,9 @@ def test_shares_count_ties_by_half() -> None:
     comparison.arrays["returns"][...] = 10
     comparison.arrays["returns"][:4, 0] = 20  # four of 16 pairs are above, the others tie
     comparison = remeasured(comparison)
-    part = Slice(comparison, "truncates")
-    for below, expected in ((False, [10 / 16, 0.5]), (True, [6 / 16, 0.5])):
-        quantity = share_above("return_last50", Q_LEARNING, SARSA, below)
+    part = grids_of(comparison, "truncates")
+    for sign, expected in ((1, [10 / 16, 0.5]), (-1, [6 / 16, 0.5])):
+        quantity = share_above("return_last50", Q_LEARNING, SARSA, sign)
         (share,) = (effect(part) for effect in quantity.effects.values())
         assert share.tolist() == expected
 
@@ -94,7 +99,7 @@ def test_the_rank_correlation_is_spearmans_within_each_seed() -> None:
     comparison.arrays["steps"][:, 2] = 50  # constant: no correlation
     comparison = remeasured(comparison)
     quantity = rank_correlation("return_last50", "steps_last50", SARSA)
-    (found,) = (effect(Slice(comparison, "truncates")) for effect in quantity.effects.values())
+    (found,) = (effect(grids_of(comparison, "truncates")) for effect in quantity.effects.values())
     returns, steps = (comparison.measures[name] for name in ("return_last50", "steps_last50"))
     for seed in (0, 1):
         assert found[seed] == pytest.approx(spearmanr(returns[:, seed], steps[:, seed])[0])

@@ -9,14 +9,25 @@ from synthetic_comparison import build, change, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, OTHER, WALKS
 from taichi_ants.analysis.bounds.baselines import Baseline
-from taichi_ants.analysis.paper.audit import HEADLINES, assess
-from taichi_ants.analysis.paper.best_of import shown_position
-from taichi_ants.analysis.paper.claims import CLAIMS
+from taichi_ants.analysis.paper.claims import CLAIMS, HEADLINES, assess
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import DYNA_P5, FIGURE_1, SARSA
-from taichi_ants.analysis.paper.report import MOST_LINES, WIDTH, all_tables, heading, report
-from taichi_ants.analysis.paper.summary import summarise, summarise_behaviours
-from taichi_ants.analysis.paper.table2 import table2
+from taichi_ants.analysis.paper.report import (
+    MOST_LINES,
+    WIDTH,
+    baseline_table,
+    behaviour_table,
+    figure_tables,
+    greedy_table,
+    heading,
+    report,
+)
+from taichi_ants.analysis.paper.table2 import (
+    shown_position,
+    summarise,
+    summarise_behaviours,
+    table2,
+)
 from taichi_ants.analysis.tables import plain_text
 from taichi_ants.task import Task
 
@@ -29,8 +40,12 @@ BASELINES = [
 def render(comparison: Comparison) -> str:
     """All tables as text."""
     lines = table2(comparison, summarise(comparison), 50)
-    behaviours = summarise_behaviours(comparison)
-    tables = all_tables(comparison, lines, behaviours, BASELINES)
+    tables = [
+        *figure_tables(lines, comparison),
+        greedy_table(lines),
+        behaviour_table(lines, summarise_behaviours(comparison)),
+        baseline_table(BASELINES),
+    ]
     return plain_text([*heading(comparison), *tables], WIDTH)
 
 

@@ -10,7 +10,7 @@ from synthetic_comparison import build, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, WALKS
 from taichi_ants.analysis.paper.published import FIGURE_1, SARSA
-from taichi_ants.analysis.paper.summary import (
+from taichi_ants.analysis.paper.table2 import (
     summarise,
     summarise_behaviours,
 )

@@ -10,13 +10,6 @@ import pytest
 from synthetic_comparison import build, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, OTHER
-from taichi_ants.analysis.paper.best_of import (
-    best_of,
-    example_name,
-    examples,
-    percentile_of,
-    shown_position,
-)
 from taichi_ants.analysis.paper.comparison import Comparison, Variant
 from taichi_ants.analysis.paper.published import (
     DYNA_P3,
@@ -27,8 +20,16 @@ from taichi_ants.analysis.paper.published import (
     VARIANTS,
 )
 from taichi_ants.analysis.paper.report import table2_markdown
-from taichi_ants.analysis.paper.summary import summarise
-from taichi_ants.analysis.paper.table2 import Line, table2
+from taichi_ants.analysis.paper.table2 import (
+    BestRun,
+    Line,
+    best_of,
+    example_name,
+    examples,
+    shown_position,
+    summarise,
+    table2,
+)
 from taichi_ants.analysis.statistics import interquartile_mean
 
 
@@ -83,10 +84,8 @@ def test_seeds_of_the_configurations_are_independent() -> None:
 
 def test_percentiles_count_ties_by_half() -> None:
     values = np.array([1.0, 2.0, 2.0, 3.0])
-    assert percentile_of(2.0, values) == 50
-    assert percentile_of(0.5, values) == 0
-    assert percentile_of(2.5, values) == 75
-    assert percentile_of(9.0, values) == 100
+    for figure, percentile in ((2.0, 50), (0.5, 0), (2.5, 75), (9.0, 100)):
+        assert BestRun.of(values, figure).paper_percentile == percentile
 
 
 def test_table2_lines(comparison: Comparison) -> None:
@@ -104,9 +103,9 @@ def test_table2_lines(comparison: Comparison) -> None:
     assert line["best_run_return_last50_median"] == np.median(best["return_last50"])
     for name in ("steps_all", "steps_last50"):
         assert line[f"best_run_{name}_high"] == pytest.approx(np.percentile(best[name], 97.5))
-        assert line[f"best_run_{name}_paper_percentile"] == percentile_of(73.0, best[name])
+        assert line[f"best_run_{name}_paper_percentile"] == BestRun.of(best[name], 73.0)[3]
     percentile = line["best_run_return_last50_paper_percentile"]
-    assert percentile == percentile_of(47.3, best["return_last50"])
+    assert percentile == BestRun.of(best["return_last50"], 47.3)[3]
 
 
 def test_what_the_paper_does_not_have_is_nan() -> None:
