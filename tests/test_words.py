@@ -41,7 +41,7 @@ PATTERNS = {
 _CODE = re.compile(r"```.*?```|<!--.*?-->", re.DOTALL)
 _INLINE = re.compile(r"`[^`]*`|https?://\S+|\$[^$]+\$")
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
-_END = re.compile(r"(?<=[.!?])(?<!e\.g\.)(?<!i\.e\.)(?<!cf\.)(?<!vs\.)(?<!al\.)[)\"']?\s+(?=[\"'(`*A-Z0-9])")
+_END = re.compile(r"(?<=[.!?])(?<!e\.g\.)(?<!i\.e\.)(?<!cf\.)(?<!vs\.)(?<! al\.)[)\"']?\s+(?=[\"'(`*A-Z0-9])")
 
 
 class Text(NamedTuple):
@@ -67,7 +67,7 @@ def paragraphs_of_markdown(place: str, text: str) -> Iterator[Text]:
                     yield Text(place, plain(cell))
             continue
         for item in re.split(r"\n\s*(?:[-*]|\d+\.)\s", "\n" + block):
-            if not item.lstrip().startswith("#"):
+            if not re.match(r"\s*(#|\*\*[^*]+\*\*\s*$)", item):  # a heading
                 yield Text(place, plain(item))
 
 
