@@ -19,7 +19,7 @@ README_LINES = 120
 PATTERNS = {
     r"^(What|Whatever|Who|Whoever|Whether|How)\b[^?]*$": "a noun as subject",
     r"\b([Ww]hatever|[Ww]hoever)\b": "any, all, whether",
-    r"\bof (one's|your|its|their|my|our|his|her) own\b": "your own X",
+    r"\bof (one's|your|its|their|my|our|his|her) own\b(?! \w)": "your own X",
     r"(?<!\b[Tt]here )\b(is|are) no (?!longer\b|more\b|less\b|later\b|earlier\b)": "is not a",
     r"\bbut for\b": "except",
     r"^(Out|Not so|So do|So does|So is|Nor)\b": "subject first",
