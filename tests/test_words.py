@@ -17,7 +17,8 @@ README_LINES = 120
 
 # Each with what to write instead. Patterns apply to single sentences.
 PATTERNS = {
-    r"^(What|Whatever|Who|Whoever|Whether|How)\b[^?]*$": "a noun as subject",
+    r"^(What|Whatever|Who|Whoever|Where|How)\b[^?,]*$": "a noun as subject",
+    r"^(Whatever|Who|Whoever)\b[^?]*$": "a noun as subject",
     r"\b([Ww]hatever|[Ww]hoever)\b": "any, all, whether",
     r"\bof (one's|your|its|their|my|our|his|her) own\b(?! \w)": "your own X",
     r"(?<!\b[Tt]here )\b(is|are) no (?!longer\b|more\b|less\b|later\b|earlier\b)": "is not a",
@@ -94,9 +95,13 @@ class Docstring(NamedTuple):
     text: str
 
     @property
-    def summary(self) -> str:
-        """The first paragraph in one line."""
-        return " ".join(self.text.split("\n\n")[0].split())
+    def returns(self) -> bool:
+        """Whether it is that of a public function that returns something, and no property."""
+        node = self.node
+        if not isinstance(node, ast.FunctionDef) or node.name.startswith("_") or node.returns is None:
+            return False
+        names = " ".join(ast.unparse(one) for one in node.decorator_list)
+        return "property" not in names and ast.unparse(node.returns) not in ("None", "NoReturn")
 
     def texts(self) -> Iterator[Text]:
         """Paragraphs and items, without code and names of items."""
@@ -161,6 +166,19 @@ def faults(texts: Iterator[Text]) -> list[str]:
     return found
 
 
+def docstring_faults(one: Docstring) -> list[str]:
+    """What is wrong with the form of a docstring."""
+    first = one.text.split("\n\n")[0]
+    found = []
+    if not first[0].isupper() and not re.match(r"[\w.]+[ (]", first):
+        found.append("start with a capital")
+    if not first.rstrip().endswith((".", ":")):
+        found.append("end the first line with a full stop")
+    if one.returns and not first.startswith(("Return ", "Yield ")) and "Returns:" not in one.text:
+        found.append('start with "Return" or "Yield", or add "Returns:"')
+    return [f"{one.place}: {fault}: {first}" for fault in found]
+
+
 def test_documents_are_plain_english():
     found = faults(documents())
     assert not found, "\n".join(found)
@@ -169,5 +187,6 @@ def test_documents_are_plain_english():
 @pytest.mark.parametrize("path", python_files(), ids=lambda path: str(path.relative_to(ROOT)))
 def test_docstrings_and_messages_are_plain_english(path):
     of_docstrings = (text for one in docstrings(path) for text in one.texts())
-    found = [*faults(of_docstrings), *faults(messages(path))]
+    forms = [fault for one in docstrings(path) for fault in docstring_faults(one)]
+    found = [*forms, *faults(of_docstrings), *faults(messages(path))]
     assert not found, "\n".join(found)
