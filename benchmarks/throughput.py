@@ -223,7 +223,7 @@ def table(
     columns = ["learner", "steps", "ours", *yardsticks, *(f"ours to {name}" for name in yardsticks)]
     what = "one thread, by processor time" if threads == 1 else f"{threads} threads, by wall clock"
     taken_of = f"{count(seeds, 'seed')}, medians of {count(len(taken), 'round')}"
-    notes = [f"Million steps a second of {what}; {taken_of}. {machine(('taichi', 'numpy'))}"]
+    notes = [f"Million steps/s of {what}; {taken_of}. {machine(('taichi', 'numpy'))}"]
     if "C" in names and "vector C" not in names:
         notes.append("No vector C: this processor or its compiler has no AVX-512.")
     return Table("Training beside C", columns, rows, notes)

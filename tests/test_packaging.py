@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tarfile
@@ -56,6 +57,15 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
     data = ("paper/claims.toml", "colony/series.toml", "taichi_ants.mplstyle")
     page |= {f"taichi_ants/analysis/{name}" for name in data}
     assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"} | page
+
+
+def test_a_package_index_shows_no_broken_links(built):
+    with zipfile.ZipFile(built["wheel"]) as wheel:
+        (name,) = [name for name in wheel.namelist() if name.endswith("/METADATA")]
+        shown = wheel.read(name).decode().split("\n\n", 1)[1]
+    assert len(re.findall(r"\]\((?!https?:)", (ROOT / "README.md").read_text("utf-8"))) > 20
+    assert shown.startswith("# Taichi Ants") and "(`docs/paper.md`)" in shown
+    assert re.findall(r"\]\((?!https?:)", shown) == []
 
 
 def test_the_source_distribution_can_run_the_tests(built):

@@ -2,18 +2,18 @@
 
 const SLIDERS = {
   ants: "Ants", evaporation: "Trails evaporate", half_life: "Half-life of trails", diffusion: "Diffusion",
-  deposit: "Deposit", cap: "Most of a trail", slope: "Slope of trails", epsilon: "Epsilon", learning_rate: "Learning rate",
+  deposit: "Deposit", cap: "Largest trail", slope: "Slope of trails", epsilon: "Epsilon", learning_rate: "Learning rate",
 };
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const WORKS = { page: "page", gif: "GIF" };
 // What happened to the connection, and what the second button does then.
 const LOST = {
-  "no token": ["This page has no token, so the server does not let it in. Open the address that the server prints.", "Try again"],
-  lost: ["The connection is lost. This page keeps what it has shown, and connects again by itself when the server is back. "
-    + "A server that you start anew has a new address: open that one.", "Try now"],
-  ended: ["The server has ended. This page keeps what it has shown.", "Try to connect"],
-  "cut off": ["The server has cut this page off", "Connect again"],
-  another: ["The server is back with another session. This page still has the one before; the other one takes its place if you show it.", "Show the other session"],
+  "no token": ["This page has no token, so the server refuses it. Open the address that the server prints.", "Try again"],
+  lost: ["The connection is lost. This page keeps everything it has shown, and reconnects when the server is back. "
+    + "A restarted server has a new address; open that one.", "Try now"],
+  ended: ["The server has ended. This page keeps everything it has shown.", "Try to connect"],
+  "cut off": ["The server has disconnected this page", "Connect again"],
+  another: ["The server is back with another session. This page still shows the previous one; you can replace it.", "Show the other session"],
 };
 const MOST_UPLOAD = 2 ** 22;
 const MAP = `; lines shift by two columns
@@ -46,7 +46,7 @@ class Controls {
     const on = (id, kind, act) => byId(id).addEventListener(kind, act);
     on("chosen", "submit", (event) => {
       event.preventDefault();
-      this.busy("The session begins …");
+      this.busy("Starting the session …");
       this.begins = true;
       live.stand();
       live.ask("begin", { chosen: this.chosen() });
@@ -101,7 +101,7 @@ class Controls {
       byId("task").innerHTML = options([...Object.entries(choices.tasks).map(([name, { words }]) => [name, words]), ["", "other settings"]]);
       byId("settings").innerHTML = this.fields();
       byId("policy").innerHTML = `<optgroup label="Learn now">${options(Object.entries(choices.learners).map(([name, { words }]) => [`learn ${name}`, words]))}</optgroup>
-        <optgroup label="Follow a policy">${options([["by hand", "the trail, by hand"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, name.replaceAll("_", " ")])])}</optgroup>`;
+        <optgroup label="Follow a policy">${options([["by hand", "the trail-following policy"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, name.replaceAll("_", " ")])])}</optgroup>`;
       byId("ants").max = choices.most.ants;
       [byId("size").min, byId("size").max] = choices.sizes;
       byId("map").value = MAP;
@@ -154,7 +154,7 @@ class Controls {
       }
     }
     for (const group of document.querySelectorAll("#settings fieldset")) group.hidden = !group.querySelector("label:not([hidden])");
-    const follows = policy === "by hand" ? "They follow a trail, with values set by hand." : `They follow ${name}, and do not learn.`;
+    const follows = policy === "by hand" ? "They follow the trail, with action values set by hand." : `They follow ${name}, and do not learn.`;
     byId("policy-help").textContent = policy.startsWith("learn ") ? `They learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
   }
 
@@ -165,7 +165,7 @@ class Controls {
     event.preventDefault();
     const { selectionStart: from, selectionEnd: to } = map, room = map.maxLength - map.textLength + to - from;
     map.setRangeText(data.slice(0, room), from, to, "end");
-    if (room < data.length) this.say(`The map is longer than ${map.maxLength} characters; its end is left out.`, true);
+    if (room < data.length) this.say(`The map is longer than ${map.maxLength} characters and was cut.`, true);
   }
 
   chosen() {
@@ -270,7 +270,7 @@ class Controls {
       }
     }
     this.live.viewer?.timeline.showSpeed();
-    byId("watchers").innerHTML = pages > 1 ? `${pages} pages<span> look on</span>` : "";
+    byId("watchers").innerHTML = pages > 1 ? `${pages} pages<span> are watching</span>` : "";
   }
 
   /* What decays from episode to episode, as it was in the frame that is drawn. */
@@ -360,9 +360,9 @@ class Controls {
   async upload() {
     const [file] = byId("upload").files;
     if (!file) return;
-    if (file.size > MOST_UPLOAD) this.say("This file is larger than any session.", true);
+    if (file.size > MOST_UPLOAD) this.say("This file is too large to be a session.", true);
     else {
-      this.busy("The session is read …");
+      this.busy("Reading the session …");
       this.live.socket.send(await file.arrayBuffer());
     }
     byId("upload").value = "";
@@ -397,7 +397,7 @@ class Controls {
     this.hush();
     this.connected(false);
     this.lost = why;
-    byId("lost").querySelector("p").textContent = why === "cut off" ? `${words} (${reason}). This page keeps what it has shown.` : words;
+    byId("lost").querySelector("p").textContent = why === "cut off" ? `${words} (${reason}). This page keeps everything it has shown.` : words;
     byId("again").textContent = button;
     byId("keep").hidden = !this.live.viewer;
   }

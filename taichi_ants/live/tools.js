@@ -5,8 +5,8 @@ const TOOLS = {
   rock: ["Rock", "draw rock; ants in the way move aside", '<path class="fill-rock" d="M16.5 10l-3.2 5.6H6.7L3.5 10l3.2-5.6h6.6z"/>'],
   food: ["Food", "draw food; ants in the way move aside", '<g class="fill-food"><circle cx="10" cy="6.4" r="2.9"/><circle cx="6.6" cy="12.6" r="2.9"/><circle cx="13.4" cy="12.6" r="2.9"/></g>'],
   trail: ["Trail", "draw a trail", '<path class="line-trail" d="M3.5 15.5c5 0 1.5-7 6.5-7s2 6 6.5-4"/>'],
-  ants: ["Ants", "set ants", '<g class="fill-ant"><ellipse cx="10" cy="5.2" rx="1.9" ry="1.7"/><ellipse cx="10" cy="8.8" rx="1.4" ry="2"/><ellipse cx="10" cy="13.8" rx="2.6" ry="3.6"/></g><path d="m7 4-2.2-1.6M13 4l2.2-1.6M8.4 8.6 4.6 8M11.6 8.6l3.8-.6M7.6 12 4 14.5M12.4 12l3.6 2.5"/>'],
-  erase: ["Erase", "take rock, food, trail and ants away", '<path d="m8 16.2-4-4 7.6-7.6a1.4 1.4 0 0 1 2 0l2.3 2.3a1.4 1.4 0 0 1 0 2L8.6 16.2H16M7.2 8.9l4.5 4.5"/>'],
+  ants: ["Ants", "add ants", '<g class="fill-ant"><ellipse cx="10" cy="5.2" rx="1.9" ry="1.7"/><ellipse cx="10" cy="8.8" rx="1.4" ry="2"/><ellipse cx="10" cy="13.8" rx="2.6" ry="3.6"/></g><path d="m7 4-2.2-1.6M13 4l2.2-1.6M8.4 8.6 4.6 8M11.6 8.6l3.8-.6M7.6 12 4 14.5M12.4 12l3.6 2.5"/>'],
+  erase: ["Erase", "erase rock, food, trails and ants", '<path d="m8 16.2-4-4 7.6-7.6a1.4 1.4 0 0 1 2 0l2.3 2.3a1.4 1.4 0 0 1 0 2L8.6 16.2H16M7.2 8.9l4.5 4.5"/>'],
   queen: ["Queen", "move the queen", '<path class="fill-queen" d="M2.8 7 7 9.2 10 4.4l3 4.8L17.2 7 15.6 15H4.4z"/>'],
 };
 const MOST_RADIUS = 4;
@@ -38,8 +38,8 @@ class Tools {
     Object.keys(TOOLS).forEach((name, number) => (live.acts[number + 1] = () => this.choose(name)));
     live.keys = [
       ["1 2 3 4 5 6 7", Object.values(TOOLS).map(([label]) => label.toLowerCase()).join(", ")],
-      ["[ ]", "a smaller brush, a larger one"], ["Enter", "use the tool at the cell cursor"],
-      ["Ctrl+Z", "undo: back to the moment before the last change"],
+      ["[ ]", "smaller or larger brush"], ["Enter", "use the tool at the cell cursor"],
+      ["Ctrl+Z", "undo the last change"],
     ];
     live.news.addEventListener("begin", () => this.choose(this.name));
   }
@@ -94,7 +94,7 @@ class Tools {
     if (this.name === "queen" && this.last >= 0) this.edit({ kind: "queen", cell: this.last });
     this.send();
     this.last = -1;
-    if (this.aside) this.live.controls.say(`${this.aside} ${this.aside > 1 ? "ants move" : "ant moves"} aside.`);
+    if (this.aside) this.live.controls.say(`${this.aside} ${this.aside > 1 ? "ants" : "ant"} moved aside.`);
   }
 
   /* The cells from where the stroke was to a cell. */

@@ -3,7 +3,7 @@
 const HOLDS = { [EMPTY]: "nothing", [OBSTACLE]: "a rock", [FOOD]: "food", [QUEEN]: "the queen" };
 const CAME = {
   ENTERED_EMPTY: "enters an empty cell", BLOCKED: "is blocked", PICKED_UP: "picks up food",
-  DELIVERED: "gives food to the queen", FAILED: "fails", PUSHED: "is pushed aside",
+  DELIVERED: "delivers food to the queen", FAILED: "fails", PUSHED: "is pushed aside",
 };
 const LETTERS = {
   E: "empty", O: "obstacle", T: "trail", S: "nearer to the queen", F: "food", Q: "queen",
@@ -80,14 +80,14 @@ class Panel {
     card.hidden = followed < 0;
     if (followed < 0) return;
     const ant = this.history.ant(moment, followed);
-    const buttons = button("ant-before", "The ant before (P)", "before") + button("ant-after", "The next ant (N)", "after")
-      + button("ant-aim", "Keep it in the middle (F)", "aim", `aria-pressed="${aims}"`)
+    const buttons = button("ant-before", "Previous ant (P)", "before") + button("ant-after", "Next ant (N)", "after")
+      + button("ant-aim", "Keep it centred (F)", "aim", `aria-pressed="${aims}"`)
       + button("ant-close", "Stop following (Esc)", "close");
     const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "no food"}</span>` : "";
     const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>`;
     if (ant) ant.tick = this.history.frames[moment].tick;
     if (ant && !ant.act && this.history.live) ant.past = this.lastAct(moment, followed);
-    card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>It does not live now.</p>");
+    card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>This ant is not alive at this tick.</p>");
   }
 
   /* An ant as it was when it did what it did last, a few moments ago at most. */
@@ -112,7 +112,7 @@ class Panel {
         <path d="${HEXAGON}" transform="scale(.93)" fill="${letter === "O" ? "var(--rock)" : this.fillOf(cell, world, hidden)}"/>
         <text font-size=".95" stroke="var(--halo)" stroke-width=".2" paint-order="stroke">${safe(letter)}</text></g>`;
     });
-    const blind = !hides ? "" : ant.loaded ? "an ant with food sees no trails" : "it sees the strongest trails only";
+    const blind = !hides ? "" : ant.loaded ? "ants with food do not see trails" : "it sees only the strongest trails";
     const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => LETTERS[kind]);
     const meanings = known.map((kind) => `${kind} ${LETTERS[kind]}`);
     const more = known.length < kinds.length || !kinds.length ? header.letters : "";
@@ -147,22 +147,22 @@ class Panel {
           <line class="zero" x1="${share(0)}%" x2="${share(0)}%" y1="-3" y2="14"/></svg>
         <span class="value ${chosen}">${plain(value)}</span>`;
     });
-    const when = ant.act?.ahead ? "action values when it chose, a tick ago" : "action values";
+    const when = ant.act?.ahead ? "action values at its last choice" : "action values";
     return `<span class="label">${when}</span><div class="bars">${rows.join("")}</div>`;
   }
 
   storyOf(ant, before = "") {
     const { header, live } = this.history, act = ant.act;
-    if (ant.past) return this.storyOf(ant.past, '<span class="label">In the last tick, before what it sees now:</span>');
+    if (ant.past) return this.storyOf(ant.past, '<span class="label">In the last tick:</span>');
     if (!act) {
-      const late = this.history.length === 1 ? "What it did before this page came is not known; it is shown from the next tick on."
-        : "Time passes too fast to show each step; slow down, or pause and step.";
-      const early = ant.tick === 0 ? "It has not chosen yet." : late;
-      const words = live ? early : "What it does next is not in the recording.";
+      const late = this.history.length === 1 ? "This page was opened later. Its steps appear from the next tick."
+        : "Steps are too fast to show. Slow down, or pause and step.";
+      const early = ant.tick === 0 ? "It has not acted yet." : late;
+      const words = live ? early : "The recording ends here.";
       return `<div class="story"><span class="label">${words}</span></div>`;
     }
     const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
-    const better = ant.loaded ? "comes nearer to the queen" : "enters a trail";
+    const better = ant.loaded ? "moves nearer to the queen" : "enters a trail";
     const came = CAME[act.event] || better;
     const action = header.actions[act.action], worth = { 1: "up", "-1": "down" }[Math.sign(act.reward)] ?? "";
     const lines = [

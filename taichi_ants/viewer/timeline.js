@@ -2,7 +2,7 @@
 
 /* Name, name where there are several episodes, key of a frame or a point, digits. */
 const CURVES = [
-  ["delivered", "delivered in all", "delivered", 0],
+  ["delivered", "delivered in total", "delivered", 0],
   ["return", "return by episode", "returns", 0],
   ["epsilon", "epsilon", "epsilon", 3],
 ];
@@ -148,7 +148,7 @@ class Timeline {
     const pace = speed * this.ticksAMoment;
     const shown = unlimited ? "fastest" : `${pace < 3 ? pace.toFixed(1) : Math.round(pace)} / s`;
     byId("speed-value").textContent = shown;
-    this.speed.setAttribute("aria-valuetext", unlimited ? "as fast as it can" : `${shown.split(" ")[0]} ticks a second`);
+    this.speed.setAttribute("aria-valuetext", unlimited ? "as fast as possible" : `${shown.split(" ")[0]} ticks/s`);
   }
 
   /* Draw the events and the curves, as far as the history goes. */

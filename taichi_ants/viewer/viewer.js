@@ -2,20 +2,20 @@
 
 const KEYS = [
   ["Space", "play or pause"],
-  ["← →", "a tick back or on; ten with Shift"],
-  ["Home End", "to the start, to the end"],
+  ["← →", "one tick back or forward; with Shift ten"],
+  ["Home End", "go to the start or the end"],
   ["↑ ↓", "faster, slower"],
-  ["E", "to the next pick-up or delivery; with Shift to the one before"],
-  ["N P", "follow the next ant, the one before"],
-  ["F", "keep the followed ant in the middle"],
-  ["+ −", "zoom in, zoom out"],
+  ["E", "go to the next pick-up or delivery; with Shift to the previous one"],
+  ["N P", "follow the next or the previous ant"],
+  ["F", "keep the followed ant centred"],
+  ["+ −", "zoom in or out"],
   ["W A S D", "move the view"],
-  ["0", "the whole world"],
+  ["0", "show the whole world"],
   ["U I O J K L", "move the cell cursor to one of its six neighbours"],
   ["Enter", "follow the ant at the cursor (when the world has the focus)"],
-  ["T", "light or dark"],
-  ["Esc", "stop following, close"],
-  ["?", "this help"],
+  ["T", "switch between light and dark"],
+  ["Esc", "stop following; close"],
+  ["?", "show this help"],
 ];
 const CURSOR = { u: 5, i: 0, o: 1, j: 4, k: 3, l: 2 }; // headings, as the keys lie
 const PANEL_SHARE = 0.5; // of the time, which the text beside the world may take while playing
@@ -78,8 +78,8 @@ class Viewer {
     }, signal);
     this.timeline = new Timeline(this.history, this.player, signal);
     if (this.source.live) document.querySelector(".about summary").textContent = "About this session";
-    byId("hint").textContent = matchMedia("(hover: none)").matches ? "Tap an ant to follow it, or a cell to look at it."
-      : "Click an ant to follow it, or a cell to look at it. Press ? for all keys.";
+    byId("hint").textContent = matchMedia("(hover: none)").matches ? "Tap an ant to follow it, or a cell to inspect it."
+      : "Click an ant to follow it, or a cell to inspect it. Press ? for all keys.";
     byId("keys").innerHTML = [...(this.source.keys ?? []), ...KEYS].map(([keys, does]) =>
       `<dt>${keys.split(" ").map((key) => `<kbd>${key}</kbd>`).join(" ")}</dt><dd>${does}</dd>`).join("");
     this.listen();
@@ -217,7 +217,7 @@ class Viewer {
   setTheme(theme) {
     this.theme = theme;
     const dark = theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-    byId("theme").setAttribute("aria-label", `Theme: ${theme || "as the system's"}`);
+    byId("theme").setAttribute("aria-label", `Theme: ${theme || "same as the system"}`);
     this.wear(dark ? "dark" : "light");
   }
 

@@ -333,7 +333,7 @@ def test_a_seed_that_is_named_is_not_chosen(capsys) -> None:
 def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many_ants(
     monkeypatch,
 ) -> None:
-    """The README says of it what the picture shows, and how many of 200 ants do so."""
+    """docs/paper.md says of it what the picture shows, and how many of 200 ants do so."""
     arguments = render.parse_arguments(gallery.GALLERY["learning.gif"])
     assert render.parse_arguments(["learning"]).checkpoints == arguments.checkpoints
     _, checkpoints = render.noted_checkpoints(arguments, paper())
@@ -341,11 +341,11 @@ def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many
     assert len(
         {(n, checkpoint.note) for n, checkpoint in zip(steps, checkpoints, strict=True)}
     ) == len(checkpoints)
-    readme = " ".join((ROOT / "README.md").read_text(encoding="utf-8").lower().split())
+    page = " ".join((ROOT / "docs" / "paper.md").read_text(encoding="utf-8").lower().split())
     for n, checkpoint in zip(steps[1:], checkpoints[1:], strict=True):
         assert checkpoint.note == "delivered"
         number, _, seeds = checkpoint.among.split()[:3]
-        assert f"{checkpoint.title} it delivers in {n} steps ({number} of {seeds} ants" in readme
+        assert f"{checkpoint.title} it delivers in {n} steps ({number} of {seeds} ants" in page
     lines = []
     monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     list(learning_frames(checkpoints, arguments.size))

@@ -154,7 +154,7 @@ def test_a_followed_ant_is_explained(ant, episode):
             moment > 16
         )
     ant.press("End")
-    assert "not in the recording" in ant.text("#ant")
+    assert "The recording ends here" in ant.text("#ant")
     assert ant.text("#now").startswith("tick 34 ants 1 with food 0 delivered 1 return 45")
 
 
@@ -472,7 +472,7 @@ def test_the_panel_shows_what_an_ant_with_food_sees(ant, episode):
     letters = ant.text("#ant b").split()[1:]
     colours = {"E": "var(--empty)", "O": "var(--rock)", "S": "var(--empty)"}
     assert ant.read(fills) == [colours[letter] for letter in letters]
-    assert "an ant with food sees no trails" in ant.text("#ant")
+    assert "ants with food do not see trails" in ant.text("#ant")
     ant.read("() => { viewer.history.kept = []; viewer.history.world.moment = 1e9; }")
 
 

@@ -1,0 +1,192 @@
+"""The project's words: patterns that are not plain English, long sentences, docstrings, README."""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+from command_lines import ROOT
+
+LONGEST = 35  # words in a sentence
+README_LINES = 120
+
+# Each with what to write instead. Patterns apply to single sentences.
+PATTERNS = {
+    r"^(What|Whatever|Who|Whoever|Where|How)\b[^?,]*$": "a noun as subject",
+    r"^(Whatever|Who|Whoever)\b[^?]*$": "a noun as subject",
+    r"\b([Ww]hatever|[Ww]hoever)\b": "any, all, whether",
+    r"\bof (one's|your|its|their|my|our|his|her) own\b(?! \w)": "your own X",
+    r"(?<!\b[Tt]here )\b(is|are) no (?!longer\b|more\b|less\b|later\b|earlier\b)": "is not a",
+    r"\bbut for\b": "except",
+    r"^(Out|Not so|So do|So does|So is|Nor)\b": "subject first",
+    r"\b(is|are|was|were|be) told\b": "name who acts: the command reports ...",
+    r"\bgo(es)? on (where|from|with|bit|as|alike)\b": "resume, continue",
+    r"\b(begins?|all begins) anew\b|\banew\b": "starts over, again",
+    r"(?<!first )(?<!other )\b(ticks|steps|frames|times) a second\b": "ticks/s",
+    r"\bfoods\b": "food items",
+    r"\b(is|are) gone\b": "missing, removed",
+    r"\ball else\b": "everything else",
+    r", since (?!then|the session|the start|it began)": "because",
+    r"\bthe (rest|others) (is|are) told\b": "see",
+    r"\bwho (has|have|asks|wants|looks|knows|reads)\b.* (is|are|gets?)\b": "if you ...",
+    r"\bstands? (beside|for itself|to reason|side by side)\b": "is, has",
+    r"\b(upon|thereof|hereby|whereby|wherein|therein)\b": "on, of it, which",
+    r"\b(seal|sealed|eyes|meeting point|hands)\b": "no metaphors",
+    r"\btells apart\b|\btold apart\b": "distinguishes",
+}
+_CODE = re.compile(r"```.*?```|<!--.*?-->", re.DOTALL)
+_INLINE = re.compile(r"`[^`]*`|https?://\S+|\$[^$]+\$")
+_LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
+_END = re.compile(r"(?<=[.!?])(?<!e\.g\.)(?<!i\.e\.)(?<!cf\.)(?<!vs\.)(?<! al\.)[)\"']?\s+(?=[\"'(`*A-Z0-9])")
+
+
+class Text(NamedTuple):
+    """Words with the place where they are."""
+
+    place: str
+    text: str
+
+
+def plain(text: str) -> str:
+    """Without code, links and emphasis."""
+    text = _INLINE.sub("`x`", _LINK.sub(r"\1", text))
+    return " ".join(text.replace("*", "").replace("_ci_", " ").split())
+
+
+def paragraphs_of_markdown(place: str, text: str) -> Iterator[Text]:
+    """Paragraphs, items of lists, and cells of tables; no code and no headings."""
+    for block in re.split(r"\n\s*\n", _CODE.sub("\n\n", text)):
+        lines = block.splitlines()
+        if any(line.lstrip().startswith("|") for line in lines):
+            for line in lines:
+                for cell in re.split(r"(?<!\\)\|", line):
+                    yield Text(place, plain(cell))
+            continue
+        for item in re.split(r"\n\s*(?:[-*]|\d+\.)\s", "\n" + block):
+            if not re.match(r"\s*(#|\*\*[^*]+\*\*\s*$)", item):  # a heading
+                yield Text(place, plain(item))
+
+
+def sentences(text: str) -> list[str]:
+    """The sentences of a paragraph."""
+    return [one for one in _END.split(text) if one]
+
+
+def documents() -> Iterator[Text]:
+    for path in (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))):
+        yield from paragraphs_of_markdown(str(path.relative_to(ROOT)), path.read_text("utf-8"))
+    for path in sorted((ROOT / "docs" / "lessons").glob("*.ipynb")):
+        for number, cell in enumerate(json.loads(path.read_text("utf-8"))["cells"]):
+            if cell["cell_type"] == "markdown":
+                place = f"{path.name}, cell {number}"
+                yield from paragraphs_of_markdown(place, "".join(cell["source"]))
+
+
+class Docstring(NamedTuple):
+    """A docstring, its summary, and the sentences of its paragraphs and items."""
+
+    place: str
+    node: ast.AST
+    text: str
+
+    @property
+    def returns(self) -> bool:
+        """Whether it is that of a public function that returns something, and no property."""
+        node = self.node
+        if not isinstance(node, ast.FunctionDef) or node.name.startswith("_") or node.returns is None:
+            return False
+        names = " ".join(ast.unparse(one) for one in node.decorator_list)
+        return "property" not in names and ast.unparse(node.returns) not in ("None", "NoReturn")
+
+    def texts(self) -> Iterator[Text]:
+        """Paragraphs and items, without code and names of items."""
+        body = re.sub(r"::\n\n(?:[ ]{4,}.*\n?)+", "\n\n", self.text)
+        for block in re.split(r"\n\s*\n", body):
+            item = r"\n(?=[ ]{4}[`*\w][\w.`*, ]*: )|\n\s*(?:-|\d+\.)\s"
+            for one in re.split(item, re.sub(r"^(Args|Attributes|Raises|Returns):\s*", "\n", block)):
+                yield Text(self.place, plain(re.sub(r"^\s*[`*\w][\w.`*, ]*: ", "", one)))
+
+
+def python_files() -> list[Path]:
+    """The modules that users run, import or read."""
+    folders = ("taichi_ants", "experiments", "examples", "benchmarks")
+    return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
+
+
+def docstrings(path: Path) -> Iterator[Docstring]:
+    tree = ast.parse(path.read_text("utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
+            text = ast.get_docstring(node)
+            if text:
+                name = getattr(node, "name", "")
+                yield Docstring(f"{path.relative_to(ROOT)}:{name}", node, text)
+
+
+def messages(path: Path) -> Iterator[Text]:
+    """The text of errors, of help and of settings: strings of two words or more in calls."""
+    named = ("AntsError", "Is", "add_argument", "add", "add_parser", "Parser", "MissingPackage")
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        if not isinstance(node, ast.Call):
+            continue
+        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        if called in named:
+            for value in (*node.args, *(one.value for one in node.keywords)):
+                text = "".join(_literal(value))
+                if " " in text.strip():
+                    yield Text(f"{path.relative_to(ROOT)}:{node.lineno}", plain(text))
+
+
+def _literal(node: ast.AST) -> Iterator[str]:
+    """The text of a string or an f-string, its values as `x`."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.JoinedStr):
+        for part in node.values:
+            yield part.value if isinstance(part, ast.Constant) else "`x`"
+
+
+def faults(texts: Iterator[Text]) -> list[str]:
+    """What is not plain English, with its place and what to write."""
+    found = []
+    for place, text in texts:
+        for sentence in sentences(text):
+            if len(sentence.split()) > LONGEST:
+                found.append(f"{place}: {len(sentence.split())} words: {sentence}")
+            found += [
+                f"{place}: write {advice}: {sentence}"
+                for pattern, advice in PATTERNS.items()
+                if re.search(pattern, sentence)
+            ]
+    return found
+
+
+def docstring_faults(one: Docstring) -> list[str]:
+    """What is wrong with the form of a docstring."""
+    first = one.text.split("\n\n")[0]
+    found = []
+    if not first[0].isupper() and not re.match(r"[\w.]+[ (]", first):
+        found.append("start with a capital")
+    if not first.rstrip().endswith((".", ":")):
+        found.append("end the first line with a full stop")
+    if one.returns and not first.startswith(("Return ", "Yield ")) and "Returns:" not in one.text:
+        found.append('start with "Return" or "Yield", or add "Returns:"')
+    return [f"{one.place}: {fault}: {first}" for fault in found]
+
+
+def test_documents_are_plain_english():
+    found = faults(documents())
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize("path", python_files(), ids=lambda path: str(path.relative_to(ROOT)))
+def test_docstrings_and_messages_are_plain_english(path):
+    of_docstrings = (text for one in docstrings(path) for text in one.texts())
+    forms = [fault for one in docstrings(path) for fault in docstring_faults(one)]
+    found = [*forms, *faults(of_docstrings), *faults(messages(path))]
+    assert not found, "\n".join(found)
