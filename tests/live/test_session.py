@@ -28,11 +28,9 @@ from taichi_ants import (
 from taichi_ants import task as tasks
 from taichi_ants.files import archives
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.live import log as log_module
 from taichi_ants.live import session as session_module
 from taichi_ants.live.exports import gif_bytes, recording
-from taichi_ants.live.log import Log
-from taichi_ants.live.session import Session, Setup
+from taichi_ants.live.session import Log, Session, Setup
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.viewer import Recording, progress
 from taichi_ants.viewer.frames import CLOCK, unpack
@@ -465,7 +463,7 @@ def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
 
 
 def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
-    monkeypatch.setattr(log_module, "KIND", replace(log_module.KIND, most=1000))
+    monkeypatch.setattr(session_module, "KIND", replace(session_module.KIND, most=1000))
     with pytest.raises(AntsError, match=r"unpacks to .* bytes, and 1000 are allowed"):
         replayed(edited["foraging"].to_bytes())
 
