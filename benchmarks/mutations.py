@@ -170,7 +170,7 @@ MUTATIONS = [
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
     ("viewer/recorder.py", "ants[place], len(weights) - 1", "1, len(weights) - 1", RECORDING),
     ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
-    ("viewer/progress.py", "self._before = self.ticks", "self._before = 0", SESSION),
+    ("viewer/recorder.py", "self._before = self.ticks", "self._before = 0", SESSION),
     # Server.
     ("live/server.py", "self.unseen >= _MOST_UNSEEN", "self.unseen < 0", SERVER),
     ("live/server.py", "hmac.compare_digest(first.encode(), self.token.encode())", "True", SERVER),

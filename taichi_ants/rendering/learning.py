@@ -14,8 +14,7 @@ from taichi_ants.engines.runs.training import evaluate, train
 from taichi_ants.errors import AntsError, count, entries_of, expect, shown, whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.marks import cell
-from taichi_ants.rendering.rasteriser import Rasteriser, draw_marks
+from taichi_ants.rendering.rasteriser import Rasteriser, cell, draw_marks
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.snapshots import Episode
 from taichi_ants.task import Rewards, Task

@@ -16,11 +16,17 @@ from taichi_ants.errors import expect
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.grid.hexgrid import centre_of
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.marks import CELL_LETTERS, Mark, ants, cell, cell_colour, marks
-from taichi_ants.rendering.panel import fill
-from taichi_ants.rendering.rasteriser import draw_marks
-from taichi_ants.rendering.state_names import Observation, name_parts, possible_states
-from taichi_ants.task import Task
+from taichi_ants.rendering.rasteriser import (
+    CELL_LETTERS,
+    Mark,
+    ants,
+    cell,
+    cell_colour,
+    draw_marks,
+    marks,
+)
+from taichi_ants.rendering.scene import fill, name_parts, possible_states
+from taichi_ants.task import Observation, Task
 from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import io
 import os
 import struct
+from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
-from itertools import chain
+from itertools import chain, groupby
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
@@ -27,7 +28,7 @@ _LONGEST_PAUSE = 60
 _SIDES = {".gif": (1, 65_535), ".mp4": (2, 16_384), "": (1, 2**31 - 1)}
 
 _SAME = 255  # in a GIF, for pixels that stay as they are; palettes have fewer colours
-_LONGEST = 655_350  # milliseconds for which a GIF can show a picture
+_LONGEST = 600  # seconds for which a GIF shows a picture; it can count 655
 
 # The colours of scenes, which all palettes hold.
 _KEPT = (
@@ -210,7 +211,7 @@ def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write a GIF that repeats for ever.
 
     Pillow's own writer keeps all frames until the last one; this one keeps two, and has Pillow
-    compress one at a time.
+    compress what has changed since the one before. Equal frames become one.
     """
     from PIL import GifImagePlugin, Image
 
@@ -224,40 +225,26 @@ def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
     file.write(colour_table.ljust(3 * 256, b"\0"))
     file.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # repeat without end
 
-    def write(picture: np.ndarray, place: tuple[int, int], duration: int) -> None:
-        options = {"duration": duration, "transparency": _SAME, "disposal": 1}
-        image = Image.frombytes("P", picture.shape[::-1], picture.tobytes())
-        for part in GifImagePlugin.getdata(image, place, **options):
-            file.write(part)
+    def drawn() -> Iterator[tuple[int, bytes]]:
+        for number, frame in enumerate(chain([first], waiting), start=1):
+            image = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+            yield number, image.tobytes()
 
-    before, change, place, shown, lasts = None, np.empty(0), (0, 0), 0, 0
-    for number, frame in enumerate(chain([first], waiting), start=1):
-        drawn = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-        picture = np.asarray(drawn)
+    before, shown = np.full((height, width), _SAME, np.uint8), 0
+    most = _LONGEST * fps
+    for _, same in groupby(drawn(), key=lambda one: (one[1], (one[0] - 1) // most)):
+        ((number, content),) = deque(same, maxlen=1)
+        picture = np.frombuffer(content, np.uint8).reshape(height, width)
+        differs = picture != before
+        box = Image.fromarray(differs).getbbox() or (0, 0, 1, 1)
+        change = Image.fromarray(np.where(differs, picture, np.uint8(_SAME))).crop(box)
         # A GIF counts hundredths of a second; rounded so that their sum is right.
         until = 10 * round(100 * number / fps)
-        duration, shown = until - shown, until
-        if before is None:
-            change, place, lasts = picture, (0, 0), duration
-        elif (picture == before).all() and lasts + duration <= _LONGEST:
-            lasts += duration
-        else:
-            write(change, place, lasts)
-            (change, place), lasts = _change(before, picture), duration
-        before = picture
-    write(change, place, lasts)
+        options = {"duration": until - shown, "transparency": _SAME, "disposal": 1}
+        for part in GifImagePlugin.getdata(change, box[:2], **options):
+            file.write(part)
+        before, shown = picture, until
     file.write(b";")
-
-
-def _change(before: np.ndarray, picture: np.ndarray) -> tuple[np.ndarray, tuple[int, int]]:
-    """The smallest part of a picture that holds all that has changed, and its left upper corner."""
-    differs = picture != before
-    rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
-    if not len(rows):
-        return np.full((1, 1), _SAME, np.uint8), (0, 0)
-    top, left = rows[0], columns[0]
-    part = (slice(top, rows[-1] + 1), slice(left, columns[-1] + 1))
-    return np.where(differs[part], picture[part], np.uint8(_SAME)), (int(left), int(top))
 
 
 def _palette(first: np.ndarray) -> np.ndarray:

@@ -17,8 +17,8 @@ import numpy as np
 from taichi_ants.analysis.findings import Finding, Verdict
 from taichi_ants.analysis.tables import number
 from taichi_ants.report.intervals import interval_drawing
+from taichi_ants.viewer.frames import Recording
 from taichi_ants.viewer.page import content_policy, part
-from taichi_ants.viewer.recording import Recording
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -16,7 +16,8 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, expect
 from taichi_ants.rendering.writers import write
-from taichi_ants.viewer.recording import Recording, record_colony, record_trace
+from taichi_ants.viewer.frames import Recording
+from taichi_ants.viewer.recorder import record_colony, record_trace
 
 # The parts of one script, in this order: what a part uses stands in those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")

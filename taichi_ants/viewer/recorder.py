@@ -1,23 +1,89 @@
-"""Records a colony while it runs: a frame for each moment, of what has changed since the last."""
+"""Records a colony while it runs: a frame for each moment, of what has changed since the last.
+
+An episode of one ant is played once more by a colony of one.
+"""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import learners
+from taichi_ants.checks import check_progress
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.errors import count, expect
-from taichi_ants.rendering.state_names import name_parts
+from taichi_ants.engines.runs.traces import Trace
+from taichi_ants.errors import AntsError, count, expect
+from taichi_ants.rendering.scene import name_parts
+from taichi_ants.rendering.snapshots import Episode, colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
-from taichi_ants.viewer.frames import pack, types_of
-from taichi_ants.viewer.progress import Progress
+from taichi_ants.viewer.frames import Recording, pack, types_of
 
 _MOST_NAMES = 4096  # of states that a header holds, seen or not
+_MOST = 1000  # points of curves of each kind
+
+Point = tuple[float, ...]  # see `frames.POINT`
+
+
+class Progress:
+    """Points of one world of a colony: at the end of each episode, and within the first one."""
+
+    def __init__(self, colony: Colony, world: int) -> None:
+        self._colony, self._world, self._first = colony, world, colony.episode
+        self._before = 0  # ticks of episodes that have ended
+        self._within, self._ends = _Thinned(), _Thinned()
+        self._new: list[Point] = []
+
+    @property
+    def ticks(self) -> int:
+        """How many have passed in all episodes."""
+        return self._before + self._colony.ticks
+
+    def note(self, ended: bool = False) -> None:
+        """Remember how the colony is now; tell it each time before another episode begins."""
+        colony = self._colony
+        if not ended and colony.episode != self._first:
+            return
+        outcome = colony.outcome()
+        delivered = colony.delivered[self._world] + outcome.deliveries[0, self._world]
+        returns = outcome.returns[0, self._world]
+        numbers = (colony.episode, self.ticks, delivered, returns, colony.epsilon, ended)
+        point = tuple(map(float, numbers))
+        if (self._ends if ended else self._within).add(point):
+            self._new.append(point)
+        if ended:
+            self._before = self.ticks
+
+    def news(self) -> list[Point]:
+        """The points since this was asked last."""
+        new, self._new = self._new, []
+        return new
+
+    def points(self) -> list[Point]:
+        """All points that are kept, those at the ends of episodes last."""
+        return self._within.points + self._ends.points
+
+
+class _Thinned:
+    """The first of each so many points, more of them the more there are."""
+
+    def __init__(self) -> None:
+        self.points: list[Point] = []
+        self._every, self._seen = 1, 0
+
+    def add(self, point: Point) -> bool:
+        """Whether it is kept."""
+        keeps = self._seen % self._every == 0
+        self._seen += 1
+        if keeps:
+            self.points.append(point)
+        if len(self.points) > _MOST:
+            self.points = self.points[::2]
+            self._every *= 2
+        return keeps
 
 
 class Recorder:
@@ -229,3 +295,84 @@ def _changes(name: str, old: np.ndarray, new: np.ndarray) -> dict[str, np.ndarra
     """Where an array has changed, and what it holds there."""
     places = np.flatnonzero(old != new)
     return {f"{name}_at": places, name: new[places]}
+
+
+def record_colony(
+    colony: Colony,
+    ticks: int = 0,
+    frame_interval: int = 1,
+    *,
+    world: int = 0,
+    title: str = "",
+    follow: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """What a colony does from now on; it is moved on by `ticks`.
+
+    Args:
+        colony: In an episode.
+        ticks: How many; 0 gives the moment as it is.
+        frame_interval: Ticks from one moment to the next; what each ant did is known only if it is
+            1.
+        world: Which of its worlds.
+        title: What the page is called.
+        follow: The number of the ant that the page follows at first.
+        progress: Called after each moment with the share of the work that is done.
+
+    Raises:
+        AntsError: A number is not allowed, or no episode has begun.
+    """
+    between, done = intervals(colony, ticks, frame_interval, follow), 0
+    check_progress(progress)
+    recorder = Recorder(colony, world, title, follow)
+    frames = [recorder.snapshot()]
+    for n in between:
+        frames.append(recorder.tick(n))
+        done += n
+        if progress is not None:
+            progress(done / ticks)
+    return Recording(recorder.header(), frames)
+
+
+def record_episode(episode: Episode, title: str = "") -> Recording:
+    """An episode in which one ant follows a policy."""
+    expect("episode", episode, Episode)
+    return record_trace(episode.trace, title)
+
+
+def record_trace(trace: Trace, title: str = "") -> Recording:
+    """A trace of `rollout` or `trace_training`, with its TD errors.
+
+    Raises:
+        AntsError: It is none of one policy, so nobody knows how to play it again.
+    """
+    expect("trace", trace, Trace)
+    made = trace.made
+    if made is None:
+        raise AntsError(
+            "the trace does not say how it was made, so it cannot be played again; take one of "
+            "rollout or trace_training."
+        )
+    expect("title", title, str)
+    if made.config is None:
+        assert made.q_values is not None  # one of the two it has
+        colony = colony_of_rollout(
+            made.world, made.task, made.q_values, made.epsilon, made.seed, made.number
+        )
+        title = title or "One ant that follows a policy"
+        return record_colony(colony, len(trace), title=title, follow=0)
+    # A colony of one ant with a table of its own learns as it did.
+    options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
+    colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
+    colony.begin_episode(made.max_steps)
+    recorder, frames = Recorder(colony, 0, title, 0), []
+    errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
+    for number, (step, error) in enumerate(zip(trace.steps.tolist(), errors, strict=True)):
+        if step == 0 and number:
+            recorder.progress.note(ended=True)
+            colony.end_episode()
+            colony.begin_episode(made.max_steps)
+        if step == 0:
+            frames.append(recorder.snapshot())
+        frames.append(recorder.tick(td_errors=np.array([error])))
+    return Recording(recorder.header(), frames)

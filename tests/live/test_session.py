@@ -32,9 +32,8 @@ from taichi_ants.live import session as session_module
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
-from taichi_ants.viewer import Recording, progress
-from taichi_ants.viewer.frames import CLOCK, unpack
-from taichi_ants.viewer.progress import POINT
+from taichi_ants.viewer import Recording, recorder
+from taichi_ants.viewer.frames import CLOCK, POINT, unpack
 
 LEARNS = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 0.9, learning_rate_decay=0.8)
 LIVELY = Task(
@@ -608,7 +607,7 @@ def test_a_late_page_is_told_of_the_whole_progress():
 
 
 def test_a_long_progress_is_thinned(monkeypatch):
-    monkeypatch.setattr(progress, "_MOST", 8)
+    monkeypatch.setattr(recorder, "_MOST", 8)
     session = Session(SETUPS["foraging"])
     for _ in range(60):
         session.apply({"kind": "episode"})
