@@ -174,7 +174,7 @@ class Session:
         return new
 
     def snapshot(self) -> bytes:
-        """A frame that holds all as it is now, for a page that has read none."""
+        """A frame of all as it is now, for a page that has read none."""
         return self._recorder.whole()
 
     def advance(self, n: int = 1) -> bytes:
@@ -279,13 +279,13 @@ class Session:
         done, changes = tuple(self.edits), tuple(self.changes)
         return Log(self.setup, done, self.steps, self.ticks, state, changes=changes)
 
-    def to_bytes(self) -> bytes:
-        """The log, as a file holds it."""
-        return _bytes_of("session.npz", self.save)
-
     def save(self, path: files.PathLike) -> None:
         """Write the log; raises as `archives.write` does."""
         self.log().write(path)
+
+    def to_bytes(self) -> bytes:
+        """The log, as a file holds it."""
+        return _bytes_of("session.npz", self.save)
 
     @classmethod
     def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
@@ -314,23 +314,22 @@ class Session:
         """
         with KIND.building(log.name):
             session = cls(log.setup)
-            for _ in session._follow(log.edits, log.steps, log.changes):
-                yield session
+            yield from session._follow(log.edits, log.steps, log.changes)
             if log.state not in (None, session.interventions.state()):
                 raise ValueError("replayed, it does not end as it did")
-        yield session
 
     def _follow(
         self, edits: Sequence[tuple[int, Any]], steps: int, changes: Sequence[int]
-    ) -> Iterator[None]:
+    ) -> Iterator[Session]:
         """Let time pass until it has made so many steps, with these edits, in short pieces."""
         for at, edit in edits:
             yield from self._pieces(at)
             self._do(edit)
-            yield
+            yield self
         yield from self._pieces(steps)
         self.changes = list(changes)
         self._recorder.snapshot()
+        yield self
 
     def same(self, other: Session) -> bool:
         """Whether another one began alike, was changed alike, and stands where this one does."""
@@ -348,9 +347,6 @@ class Session:
         """
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
-        return self._before_last_change()
-
-    def _before_last_change(self) -> Iterator[Session]:
         *changes, last = self.changes
         kept = [one for one in self._snapshots if one.edits <= last]
         if kept:
@@ -360,9 +356,7 @@ class Session:
         else:
             session = Session(self.setup)
         steps, _ = self.edits[last]
-        for _ in session._follow(self.edits[len(session.edits) : last], steps, changes):
-            yield session
-        yield session
+        return session._follow(self.edits[len(session.edits) : last], steps, changes)
 
     @classmethod
     def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
@@ -393,14 +387,14 @@ class Session:
             if wanted if every == 1 else steps == log.steps:
                 yield session, session._recorder.snapshot()
 
-    def _pieces(self, steps: int) -> Iterator[None]:
+    def _pieces(self, steps: int) -> Iterator[Session]:
         """Let time pass until it has made so many steps, in pieces of about `_PIECE` seconds."""
         ticks = 1
         while self.steps < steps:
             began = time.perf_counter()
             self._pass(min(ticks, steps - self.steps), self.colony.tick)
             ticks = max(1, 2 * ticks if time.perf_counter() - began < _PIECE else ticks // 2)
-            yield
+            yield self
 
     def policy_bytes(self) -> bytes:
         """The action values as they are now, as a policy file holds them.
