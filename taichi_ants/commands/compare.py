@@ -349,6 +349,7 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
 
     from taichi_ants import runtime
     from taichi_ants.analysis import style
+    from taichi_ants.engines.runs.traces import Made
     from taichi_ants.rendering import colony_snapshots, frames
     from taichi_ants.rendering.snapshots import colony_of_rollout
     from taichi_ants.task.constants import N_ACTIONS
@@ -357,7 +358,7 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
     load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
-    colony = colony_of_rollout(point.world, point.task, nothing)
+    colony = colony_of_rollout(Made(point.world, point.task, 0, 1, q_values=nothing))
     next(frames(colony_snapshots(colony), SIZE))
     record_colony(colony, 1)
     for kind in ("png", "svg") if draws else ():

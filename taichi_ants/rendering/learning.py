@@ -183,7 +183,7 @@ def learning_frames(
     expect("checkpoints", checkpoints, list, tuple)
     for checkpoint in checkpoints:
         expect("a checkpoint", checkpoint, Checkpoint)
-    if len({checkpoint.episode.world for checkpoint in checkpoints}) != 1:
+    if len({checkpoint.episode.made.world for checkpoint in checkpoints}) != 1:
         raise AntsError(
             "the checkpoints are of several worlds, or there are none; give those of one."
         )
@@ -196,7 +196,7 @@ def learning_frames(
     room = width - 2 * letters
     text.write(canvas, title, width / 2, 1.5 * letters, letters, align="middle", room=room)
     if letters:
-        _draw_legend(canvas, bottom, letters, checkpoints[0].episode.task.rewards)
+        _draw_legend(canvas, bottom, letters, checkpoints[0].episode.made.task.rewards)
     columns = math.ceil(len(checkpoints) / max(1, math.isqrt(len(checkpoints) * height // width)))
     more = _MORE_LINES * any(checkpoint.among for checkpoint in checkpoints)
     rows, lines = math.ceil(len(checkpoints) / columns), round((_TILE_LINES + more) * letters)
@@ -204,7 +204,7 @@ def learning_frames(
     # No higher than wide, so that a title stays near to what it speaks of.
     h = min((bottom - top) // rows, w + lines)
     top += (bottom - top - rows * h) // 2
-    grid, margin = checkpoints[0].episode.world.grid, max(2, round(min(w, h) / 60))
+    grid, margin = checkpoints[0].episode.made.world.grid, max(2, round(min(w, h) / 60))
     rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
     pictures = [
         _tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints

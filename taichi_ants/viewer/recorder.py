@@ -355,12 +355,8 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
         )
     expect("title", title, str)
     if made.config is None:
-        assert made.q_values is not None  # one of the two it has
-        colony = colony_of_rollout(
-            made.world, made.task, made.q_values, made.epsilon, made.seed, made.number
-        )
         title = title or "One ant that follows a policy"
-        return record_colony(colony, len(trace), title=title, follow=0)
+        return record_colony(colony_of_rollout(made), len(trace), title=title, follow=0)
     # A colony of one ant with a table of its own learns as it did.
     options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
     colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
