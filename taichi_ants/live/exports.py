@@ -51,6 +51,7 @@ def _snapshots(log: Log, most: int, progress: Progress | None) -> Iterator[tuple
 
 
 # What pages call it, the name of the file, and what makes it: at once, or from the beginning.
+LOAD = "load"  # what they call the replay of an uploaded file, or of a session in part undone
 QUICK: dict[str, tuple[str, Callable[[Session], bytes]]] = {
     "session": ("session.npz", Session.to_bytes),
     "policy": ("policy.npz", Session.policy_bytes),
@@ -62,14 +63,8 @@ SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
 }
 
 
-LOAD = "load"
-
-
 class Undoing:
-    """A session that is made once more without its last change, a little at each turn.
-
-    Attributes, as of `Making`: `done` of `total` steps; `made`; `page`.
-    """
+    """A session that is made once more without its last change; attributes as of `Making`."""
 
     page = None
 

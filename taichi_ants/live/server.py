@@ -128,14 +128,9 @@ class Page:
 class Room:
     """A session that people watch and change together.
 
-    Args:
-        session: That begins.
-        choices: What pages can choose from.
-        port: On which it listens; 0 for one that is free.
-        prepare: Called first in processes that replay the session, as to load a plugin.
-
-    Raises:
-        AntsError: The library `websockets` is not installed, or the port cannot be used.
+    Pages can choose from `choices`. It listens on `port`, 0 for one that is free; `prepare` is
+    called first in processes that replay the session, as to load a plugin. AntsError if the library
+    `websockets` is not installed, or the port cannot be used.
     """
 
     def __init__(
@@ -164,6 +159,7 @@ class Room:
         self._shown = secrets.token_hex(8)  # by which pages that come back know the session
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, a page or not yet
+        # Who asks, what is to be done, and what is set when it is done.
         self._requests: queue.Queue[tuple[Page, Callable[[], None], asyncio.Future[None]]]
         self._requests = queue.Queue()
         self._loop = asyncio.new_event_loop()
@@ -171,8 +167,7 @@ class Room:
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
         self._prepare = prepare
         self._former: Session | None = None  # whose place the present one has taken
-        # Steps and edits, where it is one in part undone.
-        self._undone: tuple[int, int] | None = None
+        self._undone: tuple[int, int] | None = None  # steps and edits, if it is in part undone
         self._stroke: tuple[Page, float] | None = None  # by whom, and which, of the last edit
         self._works: dict[str, Making | Undoing] = {}  # what takes long: LOAD, or a file of SLOW
         self._loaded: Session | None = None  # by another process, and has not gone on yet
@@ -386,7 +381,7 @@ class Room:
             self._tell(_say("file", name=name), make(self.session), to=page)
         elif kind not in SLOW:
             raise Closed("there is no file of this kind")
-        elif self._works.keys() & SLOW:
+        elif self._works.keys() & SLOW.keys():
             raise AntsError("another file is being made; wait for it, or cancel it.")
         else:
             content, ticks = self.session.to_bytes(), self.session.ticks
@@ -408,33 +403,23 @@ class Room:
     def _show_session(self, session: Session) -> None:
         self.session, self._undone, self._shown = session, None, secrets.token_hex(8)
         self.playing, self._piece, self._stroke = False, 1.0, None
-        messages = [*self._about(), *self._moment()]
+        self._tell_whole()
+
+    def _tell_whole(self, page: Page | None = None, begins: bool = True) -> None:
+        """Tell a page, or all, how all is now; where a session begins, also what it is about."""
+        messages: list[str | bytes] = [_say("snapshot"), self.session.snapshot()]
+        if begins:
+            header, setup, choices = self.session.header(), self.session.setup, self.choices
+            offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
+            begin = _say("begin", session=self._shown, header=header, **offered)
+            messages = [begin, self._state(), *messages]
 
         def show() -> None:
-            for page in self._pages:
-                page.begin(*messages)
+            self._pages.update([page] if page else [])
+            for one in [page] if page else self._pages:
+                one.begin(*messages)
 
         self._post(show)
-
-    def _welcome(self, page: Page, joins: bool) -> None:
-        """Tell a page how all is now; one that joins also what the session is about."""
-        messages = [*(self._about() if joins else ()), *self._moment()]
-
-        def show() -> None:
-            self._pages.add(page)
-            page.begin(*messages)
-
-        self._post(show)
-
-    def _about(self) -> list[str | bytes]:
-        """What a page needs to know before the first frame of a session."""
-        header, setup, choices = self.session.header(), self.session.setup, self.choices
-        offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
-        return [_say("begin", session=self._shown, header=header, **offered), self._state()]
-
-    def _moment(self) -> list[str | bytes]:
-        """All as it is now, for a page that knows nothing of it."""
-        return [_say("snapshot"), self.session.snapshot()]
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages but those that are behind."""
@@ -545,7 +530,7 @@ class Room:
         page = Page(connection)
         self._joined += 1
         try:
-            await self._ask(page, partial(self._welcome, page, joins=True))
+            await self._ask(page, partial(self._tell_whole, page))
             async for message in connection:
                 if isinstance(message, bytes):
                     await self._upload(page, message)
@@ -554,7 +539,7 @@ class Room:
                 if request["do"] != "seen":
                     await self._ask(page, partial(self._do, page, request))
                 elif page.has_seen(int(_number(request, "frames", 0, 1000))):
-                    await self._ask(page, partial(self._welcome, page, joins=False))
+                    await self._ask(page, partial(self._tell_whole, page, begins=False))
         except Closed as error:
             await connection.close(1008, str(error))
         except ConnectionClosed:

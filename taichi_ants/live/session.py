@@ -85,10 +85,8 @@ class Log:
             for at, edit in facts["edits"]:
                 before = checked_whole("steps", at, before, steps)
                 edits.append((before, edit))
-            changes = [
-                checked_whole("changes", first, 0, max(len(edits) - 1, 0))
-                for first in facts["changes"]
-            ]
+            last = max(len(edits) - 1, 0)
+            changes = [checked_whole("changes", first, 0, last) for first in facts["changes"]]
             if changes[:1] != [0][: len(edits)] or changes != sorted(set(changes)):
                 raise ValueError("changes")
             log = cls(
@@ -117,10 +115,8 @@ class _Snapshot(NamedTuple):
 class Session:
     """A colony in a world, from its first tick on, and all interventions.
 
-    It depends on its setup and its edits alone: `load` replays them.
-
-    Args:
-        setup: How it begins.
+    It depends on its setup and its edits alone: `load` replays them. AntsError if the world or the
+    colony cannot be built.
 
     Attributes:
         colony: As it is now; nobody else may move it on.
@@ -128,9 +124,6 @@ class Session:
         steps: How many steps time has made: ticks, and episodes that began since one had ended.
         edits: (steps, edit) of each edit, in order.
         changes: Where in `edits` each change begins; the strokes of a brush are one change.
-
-    Raises:
-        AntsError: The world or the colony cannot be built.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -181,9 +174,6 @@ class Session:
         """Let n ticks pass, fewer where the episode ends before; a frame of what has changed.
 
         If the episode has ended, the next one begins instead, and no tick passes.
-
-        Raises:
-            AntsError: n is not allowed.
         """
         return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
 
@@ -191,9 +181,6 @@ class Session:
         """Let time make n steps, also through several episodes; a frame of what has changed.
 
         What ants did between is in no frame, as it may be in those of `advance`.
-
-        Raises:
-            AntsError: n is not allowed.
         """
         until = self.steps + checked_whole("n", n)
         while self.steps < until:
@@ -225,10 +212,8 @@ class Session:
         """Do an edit now, see `edits`, and record it; a frame of what has changed.
 
         If the episode has ended, what is of this episode alone goes with it. An edit that `goes_on`
-        belongs to the same change as the one before, see `undone`.
-
-        Raises:
-            AntsError: It is none, or there is no room for it; nothing has changed.
+        belongs to the same change as the one before, see `undone`. AntsError if it is none, or
+        there is no room for it; nothing has changed.
         """
         self._do(edit, goes_on)
         return self._recorder.snapshot()
@@ -256,9 +241,8 @@ class Session:
         are the nearest to each other in time.
         """
         kept = self._snapshots
-        if kept and self._spent - kept[-1].spent < _BETWEEN:
-            return
-        if self.colony.nbytes > _LARGEST:
+        is_near = kept and self._spent - kept[-1].spent < _BETWEEN
+        if is_near or self.colony.nbytes > _LARGEST:
             return
         bare: Any = copy.copy(self)
         bare.setup, bare.edits, bare.changes, bare._snapshots = None, [], [], []
@@ -291,10 +275,8 @@ class Session:
     def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
         """Replay a session that `save` wrote, up to its end.
 
-        `progress` is called now and then with the share of the ticks that have passed.
-
-        Raises:
-            AntsError: The file is missing, damaged or altered, or its end is another one here.
+        `progress` is called now and then with the share of the ticks that have passed. AntsError if
+        the file is missing, damaged or altered, or its end is another one here.
         """
         log = Log.read(path)
         for session in cls.replay(log):
@@ -306,11 +288,8 @@ class Session:
     def replay(cls, log: Log) -> Iterator[Session]:
         """Make the session of a log once more, in pieces, so that others get their turn.
 
-        Yields:
-            The session as far as it has come, some times a second at least; at last all of it.
-
-        Raises:
-            AntsError: The log is damaged, or its end is another one here.
+        Yields the session as far as it has come, some times a second at least; at last all of it.
+        AntsError if the log is damaged, or its end is another one here.
         """
         with KIND.building(log.name):
             session = cls(log.setup)
@@ -339,11 +318,7 @@ class Session:
     def undone(self) -> Iterator[Session]:
         """Make the session as it was before its last change, from the last snapshot before it.
 
-        Yields:
-            As `replay` does; this session stays as it is.
-
-        Raises:
-            AntsError: Nothing has been changed.
+        Yields as `replay` does; this session stays as it is. AntsError if nothing has been changed.
         """
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
@@ -363,10 +338,8 @@ class Session:
         """Replay a session from its beginning, snapshot by snapshot.
 
         There are about `most` snapshots. If there are fewer steps and edits, each step has a
-        snapshot, and so does each intervention.
-
-        Yields:
-            The session at that moment, and a frame of what has changed since the last one.
+        snapshot, and so does each intervention. Yields the session at that moment, and a frame of
+        what has changed since the last one.
         """
         changes = len({steps for steps, _ in log.edits})
         every = max(1, -(-(log.steps + changes) // checked_whole("most", most)))
@@ -397,11 +370,7 @@ class Session:
             yield self
 
     def policy_bytes(self) -> bytes:
-        """The action values as they are now, as a policy file holds them.
-
-        Raises:
-            AntsError: Each ant has a table of its own.
-        """
+        """The action values as a policy file holds them; AntsError if each ant has a table."""
         colony = self.colony
         if colony.one_a_slot:
             raise AntsError(
@@ -411,8 +380,8 @@ class Session:
         told = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
         if self.setup.learns:
             told["training"] = colony.training.as_dict()
-        values, sees = colony.q_values[0], colony.task.observation
-        return _bytes_of("policy.npz", lambda path: save_policy(path, values, told, sees))
+        given = (colony.q_values[0], told, colony.task.observation)
+        return _bytes_of("policy.npz", lambda path: save_policy(path, *given))
 
     def colony_bytes(self) -> bytes:
         """The colony as it is now, as `Colony.save` writes it; `Colony.load` goes on from it.

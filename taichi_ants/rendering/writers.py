@@ -82,9 +82,16 @@ def is_picture(path: files.PathLike) -> bool:
 
 def check_picture(path: files.PathLike) -> Path:
     """Make sure that a picture can be written; raises as `save_picture` does."""
+    return check_single(path, "one picture", ".png")
+
+
+def check_single(path: files.PathLike, holds: str, *endings: str) -> Path:
+    """Make sure that a file of one of these endings can be written; AntsError if not."""
     target = files.check_writable_file(path)
-    if not is_picture(target):
-        raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
+    if target.suffix.lower() not in endings:
+        raise AntsError(
+            f"{str(path)!r} is to hold {holds}; give it a name that ends in {endings[0]}."
+        )
     return target
 
 

@@ -6,7 +6,7 @@
 """
 
 from taichi_ants.viewer.frames import Recording
-from taichi_ants.viewer.page import check_page, frame, is_page, notebook, page, save_page
+from taichi_ants.viewer.page import check_page, frame, notebook, page, save_page
 from taichi_ants.viewer.recorder import Recorder, record_colony, record_episode, record_trace
 
 __all__ = [
@@ -14,7 +14,6 @@ __all__ = [
     "Recording",
     "check_page",
     "frame",
-    "is_page",
     "notebook",
     "page",
     "record_colony",

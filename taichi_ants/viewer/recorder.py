@@ -91,12 +91,9 @@ class Recorder:
 
     Args:
         colony: In an episode.
-        world: Which of its worlds.
+        world: Which of its worlds; AntsError if there is no such world.
         title: What the page is called; "" for a name of the colony.
         follow: The number of the ant that the page follows at first.
-
-    Raises:
-        AntsError: No episode has begun, or there is no such world.
     """
 
     def __init__(
@@ -121,16 +118,12 @@ class Recorder:
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables
         self._table = np.full((owners * self._n_states, N_ACTIONS), np.nan, np.float32)
         self._owners = np.full(owners, -1 if colony.one_a_slot else 0)
-        self._fixed: np.ndarray | None = None  # the tables where nobody learns
-        self._fixed = None if self._learns else self._tables()
+        self._fixed: np.ndarray | None = None
+        self._fixed = None if self._learns else self._tables()  # read once where nobody learns
         self.progress = Progress(colony, world)
 
     def header(self) -> dict[str, Any]:
-        """What all frames are about.
-
-        States have names as far as they have been seen, all of them if they are few: a task or "",
-        the rest of the name, and a letter or two for each cell in view where the name has them.
-        """
+        """What all frames are about, as JSON can hold it."""
         colony, task = self.colony, self.colony.task
         changes = task.life.births or task.life.lifespan
         ants = "Ants" if changes else count(colony.ants, "ant")
@@ -142,8 +135,8 @@ class Recorder:
             "strongest": int(task.pheromone.level),
             "n_states": self._n_states,
             "names": self.names(),
-            "view": list(self.colony.task.sees.cells),
-            "letters": self.colony.task.sees.letters,
+            "view": list(task.sees.cells),
+            "letters": task.sees.letters,
             "actions": ACTION_NAMES,
             "events": [event.name for event in Event],
             "rewards": task.rewards.by_event().tolist(),
@@ -155,7 +148,7 @@ class Recorder:
         }
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
-        """The names of the states seen, of all if they are few, but not of those `known`."""
+        """The `name_parts` of the states seen, of all if they are few, but not of those `known`."""
         few = self._n_states <= _MOST_NAMES
         seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
         named = range(self._n_states) if few else seen
@@ -165,21 +158,20 @@ class Recorder:
         """Lines about the colony, names and values."""
         colony, config = self.colony, self.colony.training
         x, y, z = self.grid.ranges
-        lines = [
-            ("world", f"{self.grid.count} cells, ranges {x}, {y}, {z}"),
-            ("ants at first", str(colony.ants)),
-            ("seed", str(colony.seeds[self.world])),
-            ("they see", f"{self.colony.task.sees.name}, {self._n_states} states"),
-        ]
-        if not self._learns:
-            return [*lines, ("policy", "frozen"), ("epsilon", f"{colony.epsilon:g}")]
-        return [
-            *lines,
-            ("learner", learners.label(config.learner)),
-            ("table", "each has its own" if colony.one_a_slot else "one for all"),
-            ("learning rate", f"{config.learning_rate:g}"),
-            ("discount", f"{config.discount:g}"),
-        ]
+        lines = {
+            "world": f"{self.grid.count} cells, ranges {x}, {y}, {z}",
+            "ants at first": str(colony.ants),
+            "seed": str(colony.seeds[self.world]),
+            "they see": f"{colony.task.sees.name}, {self._n_states} states",
+        }
+        if self._learns:
+            lines["learner"] = learners.label(config.learner)
+            lines["table"] = "each has its own" if colony.one_a_slot else "one for all"
+            lines["learning rate"] = f"{config.learning_rate:g}"
+            lines["discount"] = f"{config.discount:g}"
+        else:
+            lines |= {"policy": "frozen", "epsilon": f"{colony.epsilon:g}"}
+        return [*lines.items()]
 
     def snapshot(self) -> bytes:
         """A frame of the colony as it is now: the first one, or after an intervention."""
@@ -307,16 +299,12 @@ def record_colony(
     follow: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """What a colony does from now on; it is moved on by `ticks`.
+    """What a colony does from now on, as a recording; other arguments are those of `Recorder`.
 
     Args:
-        colony: In an episode.
+        colony: In an episode; it is moved on by `ticks`.
         ticks: How many; 0 gives the moment as it is.
-        frame_interval: Ticks from one moment to the next; what each ant did is known only if it is
-            1.
-        world: Which of its worlds.
-        title: What the page is called.
-        follow: The number of the ant that the page follows at first.
+        frame_interval: Ticks from one moment to the next; at 1, what each ant did is known.
         progress: Called after each moment with the share of the work that is done.
 
     Raises:
@@ -341,11 +329,7 @@ def record_episode(episode: Episode, title: str = "") -> Recording:
 
 
 def record_trace(trace: Trace, title: str = "") -> Recording:
-    """A trace of `rollout` or `trace_training`, with its TD errors.
-
-    Raises:
-        AntsError: It is none of one policy, so nobody knows how to play it again.
-    """
+    """A trace of `rollout` or `trace_training`, with its TD errors; AntsError if it is another."""
     expect("trace", trace, Trace)
     made = trace.made
     if made is None:
