@@ -172,27 +172,10 @@ def blend(rgb, colour, distance, opacity):
 
 
 @ti.func
-def draw_ant(rgb, p, radius, shape, colour):
-    """A pixel with an ant over it; `p` in units of the ant, which looks up."""
-    body = radius * dart(p)
-    if shape >= Mark.ANT:
-        limb = ti.max(0.032 * radius, 0.45)
-        body = radius * ti.min(ant_body(p), ant_limbs(p) - limb / radius)
-    result = blend(rgb, PAGE, body - _HALO, 0.8)
-    result = blend(result, colour, body, 1.0)
-    if shape == Mark.ANT_WITH_FOOD or shape == Mark.DART_WITH_FOOD:
-        scale = ti.select(shape == Mark.DART_WITH_FOOD, 1.5, 1.0)
-        crumb = radius * disc(p, 0.0, _CRUMB_AT, scale * _CRUMB_RADIUS)
-        result = blend(result, PAGE, crumb - _HALO, 1.0)
-        result = blend(result, CELL_FOOD, crumb, 1.0)
-    return result
-
-
-@ti.func
 def draw_mark(rgb, p, radius, shape, colour):
-    """A pixel with any other mark over it; `p` in units of the mark."""
+    """A pixel with a mark over it; `p` in units of the mark, which looks up."""
     # A halo of the page around it; none at all, not even on smooth edges, around a cell.
-    distance, halo = radius * hexagon(p), -1.0
+    distance, halo, opacity = radius * hexagon(p), -1.0, 1.0
     if shape == Mark.OUTLINE:
         half_width = ti.max(0.06 * radius, 0.8)
         distance, halo = ti.abs(distance + half_width) - half_width, 0.5 * _HALO
@@ -204,7 +187,18 @@ def draw_mark(rgb, p, radius, shape, colour):
         distance, halo = radius * arrow(p), _HALO
     elif shape == Mark.DOT:
         distance, halo = radius * disc(p, 0.0, 0.0, 1.0), 0.0
-    return blend(blend(rgb, PAGE, distance - halo, 1.0), colour, distance, 1.0)
+    elif shape >= Mark.ANT:
+        limb = ti.max(0.032 * radius, 0.45)
+        distance = radius * ti.min(ant_body(p), ant_limbs(p) - limb / radius)
+        halo, opacity = _HALO, 0.8
+    elif shape >= Mark.DART:
+        distance, halo, opacity = radius * dart(p), _HALO, 0.8
+    result = blend(blend(rgb, PAGE, distance - halo, opacity), colour, distance, 1.0)
+    if shape == Mark.ANT_WITH_FOOD or shape == Mark.DART_WITH_FOOD:
+        scale = ti.select(shape == Mark.DART_WITH_FOOD, 1.5, 1.0)
+        crumb = radius * disc(p, 0.0, _CRUMB_AT, scale * _CRUMB_RADIUS)
+        result = blend(blend(result, PAGE, crumb - _HALO, 1.0), CELL_FOOD, crumb, 1.0)
+    return result
 
 
 @ti.kernel
@@ -234,9 +228,5 @@ def draw_marks(
                         dx, dy = (i + 0.5 - x) / radius, (j + 0.5 - y) / radius
                         p = vec2(dx * cosine + dy * sine, dy * cosine - dx * sine)
                         rgb = vec3(frame[j, i, 0], frame[j, i, 1], frame[j, i, 2])
-                        drawn = rgb
-                        if shape >= Mark.DART:
-                            drawn = draw_ant(rgb, p, radius, shape, colour)
-                        else:
-                            drawn = draw_mark(rgb, p, radius, shape, colour)
+                        drawn = draw_mark(rgb, p, radius, shape, colour)
                         put(frame, j, i, mix(rgb, drawn, table[n, 5]))

@@ -71,15 +71,9 @@ def marks(
     headings: npt.ArrayLike = 0,
     opacity: float = 1.0,
 ) -> np.ndarray:
-    """Marks at places (n, 2), float32 (n, 7).
+    """Marks, float32 (n, 7), of kinds of `Mark` with their middles at places (n, 2) in pixels.
 
-    Args:
-        places: Their middles in pixels; (2,) for a single one.
-        radius: Of the circle that holds them, in pixels.
-        mark: Of the kind `Mark`, one for all or one for each, as what follows.
-        colour: 0xRRGGBB.
-        headings: Where they point, 0 to 5.
-        opacity: From 0 to 1.
+    `radius` is of the circle that holds them, in pixels; `headings` are where they point, 0 to 5.
     """
     places = np.asarray(places, dtype=np.float32).reshape(-1, 2)
     table = np.empty((len(places), 7), dtype=np.float32)  # colours are below 2^24, so it holds them

@@ -60,23 +60,14 @@ def possible_states(observation: Observation) -> Sequence[int]:
 
 @dataclass(frozen=True, eq=False)
 class Status:
-    """The text about a snapshot.
+    """The text about a snapshot, with the state of ant number 0 and its action values."""
 
-    Attributes:
-        lines: Names and values, such as ("step", "12").
-        state: Number of the state that ant number 0 is in; None if there is none to speak of.
-        q_values: float (5,), the action values of the state; None draws no bars.
-        action: The chosen action, 0 to 4; None if there is none.
-        q_range: The action values at both ends of the bars, the first at most 0, the last above.
-        observation: What the state is a state of.
-    """
-
-    lines: tuple[tuple[str, str], ...]
+    lines: tuple[tuple[str, str], ...]  # names and values, such as ("step", "12")
     state: int | None = None
-    q_values: np.ndarray | None = None
-    action: int | None = None
-    q_range: tuple[float, float] = (0.0, 1.0)
-    observation: Observation = PAPER
+    q_values: np.ndarray | None = None  # float (5,), of the state; None draws no bars
+    action: int | None = None  # the chosen one, 0 to 4
+    q_range: tuple[float, float] = (0.0, 1.0)  # at the ends of the bars; at most 0, and above
+    observation: Observation = PAPER  # whose state it is
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -183,7 +174,7 @@ class Scene:
 def _draw_status(
     frame: np.ndarray, status: Status, left: int, top: int, width: int, size: int
 ) -> None:
-    """Draw what is said into a part of a frame, uint8 (height, width, 3), in text of a size."""
+    """Draw what is said into a part of a frame, in text of a size."""
     y = top + size
     for label, value in status.lines:
         text.write(frame, label, left, y, size, colours.FAINT_INK)
