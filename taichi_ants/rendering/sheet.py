@@ -54,10 +54,7 @@ _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
 
 
 def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
-    """The mean gap from best to worst action value (n_states, 5) of possible states, or 0.
-
-    States whose values are all equal do not count.
-    """
+    """The mean gap from best to worst action value of possible states with different values."""
     rows = q_values.astype(np.float64)[list(possible_states(observation))]
     spreads = np.ptp(rows, axis=1)
     return float(spreads[spreads > 0].mean()) if spreads.any() else 0.0
@@ -85,16 +82,12 @@ def learned(values: np.ndarray, spread: float) -> bool:
 def policy_sheet(
     q_values: np.ndarray, title: str = "Policy", *, task: Task | None = None
 ) -> np.ndarray:
-    """The sheet of a policy, uint8 (height, 1280, 3).
+    """The sheet of a policy, uint8 (height, 1280, 3), with a title above it.
 
     Args:
         q_values: float (n_states, 5), finite action values; or the `TrainingResult` of a single
             run, or a `Policy`.
-        title: Stands above it, in ASCII.
         task: Whose states they are; None is the paper's.
-
-    Raises:
-        AntsError: The table is no policy of the task, or the title no text.
     """
     task = checked_task(Task() if task is None else task)
     table = checked_table(q_values, task)

@@ -39,10 +39,7 @@ def frames(
 ) -> Iterator[np.ndarray]:
     """The pictures of snapshots of one world, uint8 (height, width, 3), as they come.
 
-    Args:
-        snapshots: Of an `Episode`, of `colony_snapshots`, or made by hand.
-        size: Width and height in pixels.
-        look: What to draw, see `Scene`.
+    `size` is width and height in pixels; `look`, what to draw, see `Scene`.
     """
     scene = None
     expect("snapshots", snapshots, Iterable)

@@ -7,7 +7,7 @@ import os
 import struct
 from collections import deque
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from itertools import chain, groupby
 from numbers import Real
 from pathlib import Path
@@ -43,12 +43,11 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
     """Make sure, before the work begins, that an animation can be written.
 
     Args:
-        path: The file, .gif or .mp4; without an ending a folder for numbered PNG pictures.
+        path: The file, .gif or .mp4; without an ending a new folder for numbered PNG pictures.
         fps: Frames per second, 0.1 to 50.
 
     Raises:
-        AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, the folder
-            holds something, or the place cannot be written to.
+        AntsError: One is not allowed, or the place cannot be written to, or PyAV is missing.
     """
     expect("path", path, str, os.PathLike)
     target = Path(path)
@@ -119,11 +118,18 @@ def save_animation(
     sides = _SIDES.get(target.suffix.lower(), _SIDES[""])
     checked = _checked(frames, round(pause * fps) - 1, sides)
     encode = _mp4 if target.suffix.lower() == ".mp4" else _gif
-    with _folder_of(target):
+    missing = [folder for folder in target.absolute().parents if not folder.exists()]
+    try:
+        files.check_writable_folder(target.parent)
         if target.suffix:
             files.write_atomically(target, lambda file: encode(file, checked, fps))
         else:
             _write_folder(target, checked)
+    except BaseException:
+        for folder in missing:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
@@ -141,20 +147,6 @@ def write(target: Path, content: bytes) -> None:
     """Write a file into a folder that is made if it is missing."""
     files.check_writable_folder(target.parent)
     files.write_bytes(target, content)
-
-
-@contextmanager
-def _folder_of(target: Path) -> Iterator[None]:
-    """The folder of a file; if writing fails, folders that were missing are gone again."""
-    missing = [folder for folder in target.absolute().parents if not folder.exists()]
-    try:
-        files.check_writable_folder(target.parent)
-        yield
-    except BaseException:
-        for folder in missing:
-            with suppress(OSError):
-                folder.rmdir()
-        raise
 
 
 def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
