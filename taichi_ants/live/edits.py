@@ -16,7 +16,6 @@ food move ants aside. See `taichi_ants.engines.colony.interventions` for how, an
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -24,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
@@ -164,9 +163,9 @@ def _checked(name: str, edit: Mapping, interventions: Interventions) -> Any:
         case "cell":
             return _checked_cells([given], interventions)[0]
         case "level":
-            return _number(name, given, Value(0, 0, MAX_DEPOSIT, 1))
+            return checked_whole(name, given, 0, MAX_DEPOSIT)
         case "heading" if given is not None:
-            return _number(name, given, Value(0, 0, N_HEADINGS - 1, 1), ", or None")
+            return checked_whole(name, given, 0, N_HEADINGS - 1, ", or None")
         case "value":  # of a name that was checked before
             return _number(edit["name"], given, values(interventions)[edit["name"]])
         case "what":
@@ -189,13 +188,10 @@ def _checked_cells(cells: Any, interventions: Interventions) -> list[int]:
     return list(dict.fromkeys(cells))
 
 
-def _number(name: str, value: Any, allowed: Value, otherwise: str = "") -> float:
-    whole = isinstance(allowed.step, int)
-    if type(value) not in ((int,) if whole else (int, float)) or not (
-        allowed.least <= value <= allowed.most and math.isfinite(value)
-    ):
-        raise AntsError(
-            f"{name} is {shown(value)}; it must be a {'whole ' * whole}number from "
-            f"{allowed.least:g} to {allowed.most:g}{otherwise}."
-        )
-    return value if whole else float(value)
+def _number(name: str, value: Any, allowed: Value) -> float:
+    if isinstance(allowed.step, int):
+        return checked_whole(name, value, int(allowed.least), int(allowed.most))
+    if type(value) not in (int, float) or not allowed.least <= value <= allowed.most:
+        least, most = f"{allowed.least:g}", f"{allowed.most:g}"
+        raise AntsError(f"{name} is {shown(value)}; it must be a number from {least} to {most}.")
+    return float(value)

@@ -5,17 +5,15 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from pathlib import Path
 from typing import Any
 
 from taichi_ants.errors import AntsError
-from taichi_ants.live.session import Log, Session
+from taichi_ants.live.session import Log, Session, bytes_of
 from taichi_ants.viewer import Recording, page
 
 Progress = Callable[[int], None]  # called with the number of ticks that have passed
@@ -37,10 +35,7 @@ def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300
     passed = _snapshots(log, most_frames, progress)
     shown = (one for session, _ in passed for one in colony_snapshots(session.colony))
     pictures = frames(shown, strongest=log.setup.task.pheromone.level)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "session.gif")
-        save_animation(path, pictures, fps=12.0)
-        return path.read_bytes()
+    return bytes_of("session.gif", lambda path: save_animation(path, pictures, fps=12.0))
 
 
 def _snapshots(log: Log, most: int, progress: Progress | None) -> Iterator[tuple[Session, bytes]]:

@@ -269,7 +269,7 @@ class Session:
 
     def to_bytes(self) -> bytes:
         """The log, as a file holds it."""
-        return _bytes_of("session.npz", self.save)
+        return bytes_of("session.npz", self.save)
 
     @classmethod
     def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
@@ -342,7 +342,7 @@ class Session:
         what has changed since the last one.
         """
         changes = len({steps for steps, _ in log.edits})
-        every = max(1, -(-(log.steps + changes) // checked_whole("most", most)))
+        every = max(1, -(-(log.steps + changes) // most))
         session = cls(log.setup)
         yield session, session.snapshot()
         for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda one: one[0]):
@@ -381,7 +381,7 @@ class Session:
         if self.setup.learns:
             told["training"] = colony.training.as_dict()
         given = (colony.q_values[0], told, colony.task.observation)
-        return _bytes_of("policy.npz", lambda path: save_policy(path, *given))
+        return bytes_of("policy.npz", lambda path: save_policy(path, *given))
 
     def colony_bytes(self) -> bytes:
         """The colony as it is now, as `Colony.save` writes it; `Colony.load` goes on from it.
@@ -389,10 +389,10 @@ class Session:
         Its later episodes begin as those of the session would, with as many ants as this one.
         """
         self.colony.worlds = (self.interventions.world(),)
-        return _bytes_of("colony.npz", self.colony.save)
+        return bytes_of("colony.npz", self.colony.save)
 
 
-def _bytes_of(name: str, write: Callable[[Path], None]) -> bytes:
+def bytes_of(name: str, write: Callable[[Path], None]) -> bytes:
     """What a function writes into a file of that name."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name

@@ -34,7 +34,10 @@ class Progress:
     def __init__(self, colony: Colony, world: int) -> None:
         self._colony, self._world, self._first = colony, world, colony.episode
         self._before = 0  # ticks of episodes that have ended
-        self._within, self._ends = _Thinned(), _Thinned()
+        # Within the first episode, and at ends: the points that are kept, the first of each so
+        # many, and how many there were.
+        self._kept: tuple[list[Point], list[Point]] = ([], [])
+        self._every, self._seen = [1, 1], [0, 0]
         self._new: list[Point] = []
 
     @property
@@ -47,13 +50,17 @@ class Progress:
         colony = self._colony
         if not ended and colony.episode != self._first:
             return
-        outcome = colony.outcome()
+        outcome, kept = colony.outcome(), self._kept[ended]
         delivered = colony.delivered[self._world] + outcome.deliveries[0, self._world]
         returns = outcome.returns[0, self._world]
         numbers = (colony.episode, self.ticks, delivered, returns, colony.epsilon, ended)
-        point = tuple(map(float, numbers))
-        if (self._ends if ended else self._within).add(point):
-            self._new.append(point)
+        if self._seen[ended] % self._every[ended] == 0:
+            kept.append(tuple(map(float, numbers)))
+            self._new.append(kept[-1])
+        self._seen[ended] += 1
+        if len(kept) > _MOST:
+            del kept[1::2]
+            self._every[ended] *= 2
         if ended:
             self._before = self.ticks
 
@@ -64,26 +71,7 @@ class Progress:
 
     def points(self) -> list[Point]:
         """All points that are kept, those at the ends of episodes last."""
-        return self._within.points + self._ends.points
-
-
-class _Thinned:
-    """The first of each so many points, more of them the more there are."""
-
-    def __init__(self) -> None:
-        self.points: list[Point] = []
-        self._every, self._seen = 1, 0
-
-    def add(self, point: Point) -> bool:
-        """Whether it is kept."""
-        keeps = self._seen % self._every == 0
-        self._seen += 1
-        if keeps:
-            self.points.append(point)
-        if len(self.points) > _MOST:
-            self.points = self.points[::2]
-            self._every *= 2
-        return keeps
+        return [*self._kept[False], *self._kept[True]]
 
 
 class Recorder:
