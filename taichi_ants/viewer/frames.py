@@ -81,16 +81,6 @@ def pack(types: Mapping[str, str], sections: Mapping[str, Any]) -> bytes:
     return numbers.ljust(_HEAD, b"\0") + body
 
 
-def unpack(types: Mapping[str, str], frame: bytes) -> dict[str, np.ndarray]:
-    """The sections of a frame."""
-    lengths = np.frombuffer(frame, "<u4", 1 + len(types)).tolist()[1:]
-    sections, at = {}, _HEAD
-    for (name, kind), length in zip(types.items(), lengths, strict=True):
-        sections[name] = np.frombuffer(frame, f"<{kind}", length, at)
-        at += 8 * -(-sections[name].nbytes // 8)
-    return sections
-
-
 @dataclass(frozen=True, eq=False)
 class Recording:
     """What happened, as a page plays it.
@@ -113,7 +103,3 @@ class Recording:
         header += b" " * (-(len(header) + 4) % 8)  # frames begin at a multiple of eight
         length = np.array([len(header)], dtype="<u4").tobytes()
         return zlib.compress(b"".join([length, header, *self.frames]), 9)
-
-    def sections(self, moment: int) -> dict[str, np.ndarray]:
-        """The sections of the frame of a moment."""
-        return unpack(self.header["types"], self.frames[moment])

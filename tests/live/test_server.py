@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from attacks import ATTACKS, attack
 from command_lines import crowding
-from playback import played
+from playback import played, unpack
 from rooms import CHOSEN, Guest, running
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -31,7 +31,6 @@ from taichi_ants.live.exports import QUICK, SLOW
 from taichi_ants.live.session import Log, Session
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.viewer import Recording
-from taichi_ants.viewer.frames import unpack
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from command_lines import ROOT, environment
-from playback import played, unpacked
+from playback import played, unpack, unpacked
 from random_edits import random_edit
 
 from taichi_ants import (
@@ -33,7 +33,7 @@ from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.viewer import Recording, recorder
-from taichi_ants.viewer.frames import CLOCK, POINT, unpack
+from taichi_ants.viewer.frames import CLOCK, POINT
 
 LEARNS = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 0.9, learning_rate_decay=0.8)
 LIVELY = Task(
