@@ -142,8 +142,7 @@ class Rasteriser:
 
     Args:
         grid: The grid of all worlds to draw.
-        width, height: Of the pictures, in pixels.
-        margin: Pixels to leave free at each side.
+        width, height, margin: Of the pictures, and what to leave free at each side, in pixels.
         beyond: Whether to leave room for the cells just beyond the border of the world.
         strongest: The trail level of the darkest colour.
 
@@ -182,9 +181,7 @@ class Rasteriser:
     def draw(self, snapshot: Snapshot, in_view: np.ndarray | None = None) -> np.ndarray:
         """The picture of a world with its ants, uint8 (height, width, 3).
 
-        Args:
-            snapshot: The world, of this grid.
-            in_view: Flat indices of the cells that ant number 0 sees, to be marked.
+        `in_view` are flat indices of the cells that ant number 0 sees, to be marked.
         """
         hexagon, tables = self.hexagon, []
         frame = self.draw_cells(self.cell_colours(snapshot))

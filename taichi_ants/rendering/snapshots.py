@@ -135,9 +135,6 @@ def colony_snapshots(
         frame_interval: Ticks from one snapshot to the next, at least 1.
         follow: The number of an ant, from 0, whose view, state and action values are shown while
             it lives; None: of no ant.
-
-    Raises:
-        AntsError: A number is not allowed, or no episode has begun.
     """
     between = intervals(colony, ticks, frame_interval, follow)
     yield _snapshot(colony, follow)

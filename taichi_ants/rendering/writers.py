@@ -22,7 +22,6 @@ from taichi_ants.rendering import colours
 
 DEFAULT_FPS = 8.0
 PAUSE = 1.5  # seconds, for which episodes are shown as they ended
-_LONGEST_PAUSE = 60
 # The shortest and the longest side of a picture in pixels, by the kind of file; of PNG anything
 # that fits into the memory.
 _SIDES = {".gif": (1, 65_535), ".mp4": (2, 16_384), "": (1, 2**31 - 1)}
@@ -51,19 +50,18 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
     """
     expect("path", path, str, os.PathLike)
     target = Path(path)
-    if target.suffix or not os.path.lexists(target):
+    is_old_folder = not target.suffix and os.path.lexists(target)
+    if not is_old_folder:
         files.check_writable_file(target)
     if target.suffix.lower() not in (".gif", ".mp4", ""):
         raise AntsError(
             f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, .mp4, or in "
             "nothing for a folder of PNG pictures."
         )
-    if isinstance(fps, bool) or not isinstance(fps, Real) or not 0.1 <= fps <= 50:
-        # Viewers slow a GIF down that is faster.
-        raise AntsError(f"fps is {shown(fps)}; it must be a number from 0.1 to 50.")
+    _check_number("fps", fps, "number", 0.1, 50)  # viewers slow a GIF down that is faster
     if target.suffix.lower() == ".mp4":
         _import_av()
-    if not target.suffix and os.path.lexists(target):
+    if is_old_folder:
         files.check_writable_folder(target.absolute().parent)
         named = target.name not in ("", "..") and not target.is_symlink()
         if not (named and target.is_dir() and not any(target.iterdir())):
@@ -72,6 +70,11 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
                 "file that ends in .gif or .mp4."
             )
     return target
+
+
+def _check_number(name: str, value: float, kind: str, least: float, most: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, Real) or not least <= value <= most:
+        raise AntsError(f"{name} is {shown(value)}; it must be a {kind} from {least} to {most}.")
 
 
 def is_picture(path: files.PathLike) -> bool:
@@ -111,10 +114,7 @@ def save_animation(
             before all begins anew.
     """
     target = check_animation(path, fps)
-    if isinstance(pause, bool) or not isinstance(pause, Real) or not 0 <= pause <= _LONGEST_PAUSE:
-        raise AntsError(
-            f"pause is {shown(pause)}; it must be a number of seconds from 0 to {_LONGEST_PAUSE}."
-        )
+    _check_number("pause", pause, "number of seconds", 0, 60)
     sides = _SIDES.get(target.suffix.lower(), _SIDES[""])
     checked = _checked(frames, round(pause * fps) - 1, sides)
     encode = _mp4 if target.suffix.lower() == ".mp4" else _gif
@@ -122,7 +122,9 @@ def save_animation(
     try:
         files.check_writable_folder(target.parent)
         if target.suffix:
-            files.write_atomically(target, lambda file: encode(file, checked, fps))
+            first = next(checked)
+            every = chain([first], checked)
+            files.write_atomically(target, lambda file: encode(file, first, every, fps))
         else:
             _write_folder(target, checked)
     except BaseException:
@@ -206,7 +208,7 @@ def _png(frame: np.ndarray, optimize: bool = False) -> bytes:
     return buffer.getvalue()
 
 
-def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
+def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write a GIF that repeats for ever.
 
     Pillow's own writer keeps all frames until the last one; this one keeps two, and has Pillow
@@ -214,8 +216,6 @@ def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
     """
     from PIL import GifImagePlugin, Image
 
-    waiting = iter(frames)
-    first = next(waiting)
     colour_table = _palette(first).tobytes()
     palette = Image.new("P", (1, 1))
     palette.putpalette(colour_table)
@@ -225,7 +225,7 @@ def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
     file.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # repeat without end
 
     def drawn() -> Iterator[tuple[int, bytes]]:
-        for number, frame in enumerate(chain([first], waiting), start=1):
+        for number, frame in enumerate(frames, start=1):
             image = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
             yield number, image.tobytes()
 
@@ -260,13 +260,11 @@ def _palette(first: np.ndarray) -> np.ndarray:
     return np.concatenate([kept, others[away > 20]])
 
 
-def _mp4(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
+def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write an MP4 (H.264); of an odd width or height the last column or row is left out."""
     av = _import_av()
     from fractions import Fraction
 
-    waiting = iter(frames)
-    first = next(waiting)
     height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
     with av.open(file, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
@@ -276,7 +274,7 @@ def _mp4(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
             **{"crf": "17", "preset": "superfast", "tune": "animation"},
             "x264-params": "colorprim=bt709:transfer=bt709:colormatrix=bt709",
         }
-        for frame in chain([first], waiting):
+        for frame in frames:
             picture = np.ascontiguousarray(frame[:height, :width])
             video = av.VideoFrame.from_ndarray(picture, format="rgb24")
             # Players take pictures of this kind for BT.709, PyAV's default is BT.601.
