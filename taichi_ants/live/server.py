@@ -332,10 +332,10 @@ class Room:
             case (
                 "edit"
             ):  # {"edit": see taichi_ants.live.edits, "stroke": same in those of a stroke}
-                edit, stroke = request.get("edit"), (page, _number(request, "stroke", 0, 2**53))
-                if not isinstance(edit, dict):
+                if not isinstance(request.get("edit"), dict):
                     raise Closed("an edit has to be an object")
-                self._show(self.session.apply(edit, goes_on=stroke == self._stroke))
+                stroke = page, _number(request, "stroke", 0, 2**53)
+                self._show(self.session.apply(request["edit"], goes_on=stroke == self._stroke))
                 self._stroke = stroke
             case "undo":
                 self._works[LOAD] = Undoing(self.session)
