@@ -83,7 +83,7 @@ class Undoing:
             self.made = "undoing needs more memory than there is."
 
     def cancel(self) -> None:
-        """Nothing to do: the session that it was made from is as it was."""
+        """Nothing to do: the session is as it was."""
 
 
 class Making:

@@ -342,8 +342,7 @@ class Room:
             case "back":  # go on with the session whose place the present one has taken
                 if self._former is None:
                     raise AntsError("there is no session before this one.")
-                former, self._former = self._former, self.session
-                self._show_session(former)
+                self._begin(self._former, comes_back=True)
             case "begin":  # {"chosen": see taichi_ants.live.choices}
                 self._begin(Session(self.choices.setup(request.get("chosen"))))
             case "restart":
@@ -387,7 +386,7 @@ class Room:
             content, ticks = self.session.to_bytes(), self.session.ticks
             self._works[kind] = Making(kind, content, ticks, self._prepare, page)
 
-    def _begin(self, session: Session, undoes: bool = False) -> None:
+    def _begin(self, session: Session, undoes: bool = False, comes_back: bool = False) -> None:
         """Go on with another session; pages can go back to the one before.
 
         That is the one before several in a row, where each undoes a change of the last one, or
@@ -395,13 +394,10 @@ class Room:
         """
         before = self.session
         in_a_row = undoes and self._undone == (before.steps, len(before.edits))
-        if not (in_a_row or before.same(session)):
+        if comes_back or not (in_a_row or before.same(session)):
             self._former = before
-        self._show_session(session)
         self._undone = (session.steps, len(session.edits)) if undoes else None
-
-    def _show_session(self, session: Session) -> None:
-        self.session, self._undone, self._shown = session, None, secrets.token_hex(8)
+        self.session, self._shown = session, secrets.token_hex(8)
         self.playing, self._piece, self._stroke = False, 1.0, None
         self._tell_whole()
 
