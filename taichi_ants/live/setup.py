@@ -99,17 +99,13 @@ class Setup:
         self.check_size()
         if "\n" in self.world:
             return worlds.from_text(self.world)
-        if self.world not in worlds.names():  # never a path
-            raise AntsError(
-                f"there is no world named {shown(self.world)}; choose one of "
-                f"{', '.join(worlds.names())}, or give the text of a map."
-            )
+        check_one_of("the world", self.world, worlds.names())  # never a path
         world = worlds.build(self.world, self.world_seed, **self.world_settings)
         _check_cells(world.ranges)
         return world
 
     def build_colony(self) -> Colony:
-        """The colony, before its first episode; raises AntsError if it cannot be."""
+        """The colony, before its first episode; AntsError if it cannot be."""
         options: dict[str, Any] = {"ants": self.ants, "capacity": self.capacity}
         numbers = self.capacity * self.task.n_states * ROW  # type: ignore[operator]
         if self.learns and self.sharing == "independent" and numbers > _MOST_NUMBERS:

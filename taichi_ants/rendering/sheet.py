@@ -61,10 +61,9 @@ def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
 
 
 def clarity(values: np.ndarray, spread: float) -> float:
-    """How clear the best of action values (5,) is, from 0 to 1.
+    """The gap from best to second best of action values (5,) as a share of `usual_spread`, 0 to 1.
 
-    The gap from the best to the second best as a share of `spread`, the table's `usual_spread`: a
-    state's own values would make every hair's breadth look like a clear choice.
+    As a share of the state's own values, every small gap would look like a clear choice.
     """
     *_, second, best = np.sort(values.astype(np.float64)).tolist()
     return min(1.0, (best - second) / spread)
@@ -132,9 +131,7 @@ def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None
     *lines, letters = _EXPLANATION
     letters = "; ".join(filter(None, [letters, observation.letters])) + "."
     if not name_parts(observation, 0)[2]:
-        letters = (
-            "The text in a drawing is the name or the number of the state; cells have no letters."
-        )
+        letters = "The text in a drawing is the name or number of the state; cells have no letters."
     for number, line in enumerate([*lines, letters]):
         y = _MARGIN + 2 * _LARGE + number * 1.5 * _SMALL
         text.write(sheet, line, _MARGIN, y + 7, _SMALL, colours.FAINT_INK, room=room)

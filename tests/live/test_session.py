@@ -476,8 +476,8 @@ def test_no_session_at_all(content):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"world": "nowhere"}, "no world named 'nowhere'"),
-        ({"world": "pyproject.toml"}, "no world named 'pyproject.toml'"),
+        ({"world": "nowhere"}, "the world is 'nowhere'"),
+        ({"world": "pyproject.toml"}, "the world is 'pyproject.toml'"),
         ({"world": 3}, "world is 3"),
         ({"world": "Q ?\n"}, "'?'"),
         ({"world": "Q" + " " * 4999 + "F\n"}, "a world of ranges ("),
