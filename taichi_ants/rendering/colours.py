@@ -1,10 +1,12 @@
-"""The colours of the pictures, as 0xRRGGBB.
+"""The colours of the pictures, as 0xRRGGBB, and the shapes of marks.
 
-Chosen so that people with any of the common colour deficiencies can tell them apart, on a light
-page, in print and on a projector.
+The colours are chosen so that people with any of the common colour deficiencies can tell them
+apart, on a light page, in print and on a projector.
 """
 
 from __future__ import annotations
+
+from enum import IntEnum
 
 import numpy as np
 
@@ -42,3 +44,18 @@ TRAIL_RAMP = np.rint([_red, _green, _blue]).astype(np.uint32).T @ np.array(
     [1 << 16, 1 << 8, 1], np.uint32
 )
 TRAIL_RAMP.setflags(write=False)
+
+
+class Mark(IntEnum):
+    """The shapes, whose outlines are in `raster_kernels`."""
+
+    HEXAGON = 0
+    OUTLINE = 1  # of a hexagon
+    FOOD = 2
+    QUEEN = 3
+    ARROW = 4
+    DOT = 5
+    DART = 6
+    DART_WITH_FOOD = 7
+    ANT = 8
+    ANT_WITH_FOOD = 9

@@ -10,8 +10,7 @@ import math
 import taichi as ti
 from taichi.math import clamp, mix, vec2, vec3
 
-from taichi_ants.rendering.colours import CELL_FOOD, PAGE
-from taichi_ants.rendering.rasteriser import Mark
+from taichi_ants.rendering.colours import CELL_FOOD, PAGE, Mark
 
 BAND = 16  # rows that one thread draws
 _SQRT_3 = math.sqrt(3.0)

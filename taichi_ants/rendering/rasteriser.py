@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from enum import IntEnum
 from types import ModuleType
 
 import numpy as np
@@ -14,6 +13,7 @@ from taichi_ants.engines.records import Snapshot
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours
+from taichi_ants.rendering.colours import Mark
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
 # From this size on, food and queen are drawings on a light floor. In smaller cells food is a dot
@@ -33,22 +33,6 @@ _DARTS_BELOW = 11.0  # ants have no legs
 _DOT = 0.9  # pixels, the radius of an ant in cells that are too small for it
 _DOT_WITH_FOOD = 0x9A3F00
 _FILL = 0.83  # the radius of an ant in sizes of its cell; the largest disc in one is 0.866
-
-
-class Mark(IntEnum):
-    """The shapes, whose outlines are in `raster_kernels`."""
-
-    HEXAGON = 0
-    OUTLINE = 1  # of a hexagon
-    FOOD = 2
-    QUEEN = 3
-    ARROW = 4
-    DOT = 5
-    DART = 6
-    DART_WITH_FOOD = 7
-    ANT = 8
-    ANT_WITH_FOOD = 9
-
 
 _COLOURS = {Mark.FOOD: colours.CELL_FOOD, Mark.QUEEN: colours.CELL_QUEEN}
 # By the letters of states: the colour of a cell, and what stands on it.

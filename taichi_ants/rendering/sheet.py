@@ -16,9 +16,9 @@ from taichi_ants.errors import expect
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.grid.hexgrid import centre_of
 from taichi_ants.rendering import colours, text
+from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import (
     CELL_LETTERS,
-    Mark,
     ants,
     cell,
     cell_colour,
