@@ -170,14 +170,14 @@ MUTATIONS = [
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
     ("viewer/recorder.py", "ants[place], len(weights) - 1", "1, len(weights) - 1", RECORDING),
     ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
-    ("viewer/progress.py", "self._before = self.ticks", "self._before = 0", SESSION),
+    ("viewer/recorder.py", "self._before = self.ticks", "self._before = 0", SESSION),
     # Server.
     ("live/server.py", "self.unseen >= _MOST_UNSEEN", "self.unseen < 0", SERVER),
-    ("live/server.py", "hmac.compare_digest(first.encode(), self.token.encode())", "True", SERVER),
+    ("live/server.py", "not (knows or (", "not (True or (", SERVER),
     ("live/server.py", "len(host) == 1 and host[0] in hosts", "len(host) == 1", SERVER),
     ("live/server.py", "self._runs and bool(self._pages)", "self._runs", SERVER),
-    ("live/server.py", "self._joined >= _MOST_PAGES", "self._joined > _MOST_PAGES", SERVER),
-    ("live/server.py", "self._replays and what in _CHANGES", "self._replays and False", SERVER),
+    ("live/server.py", "self._joined < _MOST_PAGES", "self._joined <= _MOST_PAGES", SERVER),
+    ("live/server.py", 'request["do"] in _CHANGES', "False", SERVER),
     ("live/server.py", "in_a_row or before.same(session)", "in_a_row", SERVER),
     # Worlds and the grid.
     (

@@ -139,7 +139,7 @@ def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) 
     assert render.training_config(settings).planning_steps == 2
     if shown == "learning":
         _, (checkpoint,) = render.noted_checkpoints(settings, paper())
-        table, task = checkpoint.episode.q_values, checkpoint.episode.task
+        table, task = checkpoint.episode.made.q_values, checkpoint.episode.made.task
     else:
         table, task, title = render.find_policy(settings, paper())
         assert title == "Dyna-Q after 1 episode"

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from attacks import ATTACKS, attack
 from command_lines import crowding
-from playback import played
+from playback import played, unpack
 from rooms import CHOSEN, Guest, running
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -28,11 +28,9 @@ from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import QUICK, SLOW
-from taichi_ants.live.log import Log
-from taichi_ants.live.session import Session
+from taichi_ants.live.session import Log, Session
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.viewer import Recording
-from taichi_ants.viewer.frames import unpack
 
 
 @pytest.fixture(scope="module")
@@ -625,7 +623,7 @@ def test_pages_are_answered_quickly_while_any_file_loads(room, tmp_path):
             guest.until("state")
             slowest = max(slowest, time.monotonic() - asked)
         assert slowest < 0.3 * crowding()
-        process = room._loading._process
+        process = room._works["load"]._process
         guest.ask("cancel", kind="load")
         guest.until("cancelled")
         process.join(2)
@@ -719,13 +717,13 @@ def test_a_file_that_is_made_can_be_cancelled(room, endless):
         while not other.state["works"]:
             other.until("state")
         assert other.state["works"][0]["kind"] == "gif"
-        making = room._making
+        making = room._works["gif"]
         other.ask("cancel", kind="gif")
         both(guest, other, "cancelled")
         for page in (guest, other):
             while page.state["works"]:
                 page.until("state")
-        assert making.over
+        making._process.join(2)
         assert not making._process.is_alive()
         guest.ask("export", kind="page")
         while not other.state["works"]:
@@ -733,7 +731,7 @@ def test_a_file_that_is_made_can_be_cancelled(room, endless):
         guest.close()  # nobody waits for it any more
         while other.state["works"] or other.state["pages"] > 1:
             other.until("state")
-        assert room._making.over
+        assert not room._works
 
 
 @pytest.mark.slow
