@@ -10,8 +10,8 @@ from colonies import act, begun, cells_of, foods_of, load, n_draws, training
 
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.reference.geometry import neighbour
+from taichi_ants.reference.observations import observe
 from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.reference.vision import observe
 from taichi_ants.task.constants import FOOD, FORWARD, GIVE
 from taichi_ants.worlds import World
 

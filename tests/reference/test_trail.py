@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from random_worlds import random_world
 
 from taichi_ants.reference.geometry import existing_cells, neighbour
-from taichi_ants.reference.trail import Trail
+from taichi_ants.reference.world_state import Trail
 from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds import World
