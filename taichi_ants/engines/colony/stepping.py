@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -92,10 +93,9 @@ class Stepper:
     def launch(self, state: ColonyState, name: str) -> None:
         """Do the phases of this name of `kernels`, or its `ticks`."""
         runtime.start()  # the caller may have reset Taichi, or forked
-        values = {**kernel_numbers(state), **state.arrays}
         if name not in self._launches:
-            self._launches[name] = self._prepared(state, name, values)
-        self._launches[name](values)
+            self._launches[name] = self._prepared(state, name)
+        self._launches[name]({**kernel_numbers(state), **state.arrays})
 
     @staticmethod
     def _sort_at_times(state: ColonyState) -> int:
@@ -134,9 +134,9 @@ class Stepper:
         state.ticks += n
 
     @staticmethod
-    def _prepared(state: ColonyState, name: str, values: dict[str, Any]) -> Any:
+    def _prepared(state: ColonyState, name: str) -> Any:
         """Return a kernel that can be launched again and again."""
-        from taichi_ants.engines.arguments import Arguments, Launch
+        from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.colony import kernels
 
         variant = kernels.variant(
@@ -150,10 +150,9 @@ class Stepper:
             state.ants_change,
             state.food_changes,
         )
-        kind = Arguments.type_of(values)
         if name == "ticks":
-            return Launch(kernels.ticks(variant, state.schedule == "by_chunk", kind))
-        return Launch(kernels.loops(variant, getattr(kernels, name), kind))
+            return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))
+        return Launch(partial(kernels.loops, variant, getattr(kernels, name)))
 
 
 def _has_barrier(running: runtime.Runtime) -> bool:

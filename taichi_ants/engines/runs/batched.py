@@ -4,6 +4,7 @@ outside."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -118,13 +119,12 @@ class BatchedEnvironments:
 
     def _compiled(self) -> Any:
         runtime.start()  # Taichi is imported once it is configured
-        from taichi_ants.engines.arguments import Arguments, Launch
-        from taichi_ants.engines.runs.batched_kernel import step_kernel
+        from taichi_ants.engines.arguments import Launch
+        from taichi_ants.engines.runs.kernels import step_kernel
 
-        pheromone, kind = self.task.pheromone, Arguments.type_of(self.arrays)
+        pheromone, serial = self.task.pheromone, self.n <= _PER_CHUNK
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
-        serial = self.n <= _PER_CHUNK
-        return Launch(step_kernel(self.task.sees, deposits, half, serial, kind))
+        return Launch(partial(step_kernel, self.task.sees, deposits, half, serial))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what Taichi holds, which is made anew; so copies and pickles go on alike."""

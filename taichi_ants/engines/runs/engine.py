@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -152,19 +153,17 @@ class Launcher:
         self, world: World, task: Task, max_steps: int, runs: Runs, traced: bool = False
     ) -> None:
         # Taichi is imported once it is configured, see `runtime`.
-        from taichi_ants.engines.arguments import Arguments, compile_once
+        from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.runs.kernels import run_kernel
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
-        self._runs, self._arguments = runs, Arguments()
+        self._runs = runs
         self._cells, self._headings = first_starts(world, words_of(runs.seeds))
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
-        self._kernel = run_kernel(
-            *(runs.learner, task.sees, deposits, half, traced), self._arguments.type_of(_NO_WORK)
-        )
-        compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
+        self._launch = Launch(partial(run_kernel, runs.learner, task.sees, deposits, half, traced))
+        self._launch(_NO_WORK)  # which compiles it
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self._values = _NO_WORK | laid_out([world], task, falls)
         terminates = int(task.delivery != "truncates")
@@ -191,7 +190,7 @@ class Launcher:
             values["streams"] = np.ascontiguousarray(runs.streams[some, episodes]).reshape(-1)
         # An array of length 0 cannot be an argument; the single 0 stays.
         self._values.update({name: one for name, one in values.items() if getattr(one, "size", 1)})
-        self._kernel(self._arguments.pack(self._values))
+        self._launch(self._values)
 
 
 def do_episodes(
