@@ -67,19 +67,19 @@ class Launch:
         # Arrays of a pack are arguments of their own behind it, which the context lacks.
         arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
-        self._known = {name: None if name in arrays else value for name, value in values.items()}
+        self._known = dict.fromkeys(values)
         self._taichi = ref(taichi)
 
     def _set(self, name: str, value: Any) -> None:
         """Tell Taichi of a value that may have changed."""
-        if isinstance(value, np.ndarray):
+        # Each value that is told again would cost Taichi some bytes for good.
+        known = self._pack[name]
+        if known is not value and (isinstance(value, np.ndarray) or known != value):
             self._pack[name] = value
+        if isinstance(value, np.ndarray):
             self._context.set_arg_external_array_with_shape(
                 self._places[name], value.ctypes.data, value.nbytes, value.shape, 0
             )
-        elif self._known[name] != value:
-            # Each number that is told again would cost Taichi some bytes for good.
-            self._pack[name] = value
         self._known[name] = value
 
 

@@ -14,25 +14,11 @@ from taichi_ants import runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
 
-# Slots from which threads share the ants of a world: of a single one, and of each of many.
-_LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
-_CHUNKS_PER_THREAD = 2
 # Ants are sorted once they have taken so many steps together, but not too seldom nor too often.
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # of a thread at a barrier: half a second or more
 _LAUNCHES_BETWEEN_PROBES = 8  # and a probe has so many times fewer ticks
-
-
-def usual_schedule(n_worlds: int, capacity: int) -> str:
-    """Return the faster schedule for so many worlds of so many slots."""
-    large = capacity >= (_LARGE_ALONE if n_worlds == 1 else _LARGE_COLONY)
-    return "by_chunk" if large else "by_world"
-
-
-def chunks_of(schedule: str, threads: int) -> int:
-    """Return into how many chunks the ants of a world are divided."""
-    return _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1
 
 
 class ThreadChoice:
