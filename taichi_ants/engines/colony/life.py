@@ -91,7 +91,6 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
     c.cell[ant] = cell
     put(c.heading, ant, heading)
     put(c.carries, ant, 0)
-    c.carried[ant] = 0  # the last ant in the slot may have died with food
     put(c.stage, ant, Stage.NEWBORN)
     put(c.action, ant, -1)
     c.age[ant] = 0

@@ -26,7 +26,7 @@ from taichi_ants.engines.colony.layout import (
     chunks_of,
     usual_schedule,
 )
-from taichi_ants.engines.packing import compass_of, padded
+from taichi_ants.engines.layout import compass_of, padded
 from taichi_ants.engines.records import Record, Snapshot, same
 from taichi_ants.errors import (
     AntsError,

@@ -125,16 +125,11 @@ class Stepper:
         from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.colony import kernels
 
+        task, pheromone = state.task, state.pheromone
         variant = kernels.variant(
-            state.learner,
-            state.one_a_slot,
-            state.is_given_actions,
-            state.task.sees,
-            state.pheromone.dense,
-            state.pheromone.view,
-            state.task.traffic,
-            state.ants_change,
-            state.food_changes,
+            *(state.learner, state.one_a_slot, state.is_given_actions, task.sees),
+            *(pheromone.dense, pheromone.view, task.traffic),
+            *(state.ants_change, state.food_changes),
         )
         if name == "ticks":
             return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))

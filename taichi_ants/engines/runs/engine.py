@@ -15,8 +15,14 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners, runtime
-from taichi_ants.engines.layout import EPSILON_DECAY, N_SETTINGS, OUTCOMES, SETTINGS
-from taichi_ants.engines.packing import compass_of, pack_cells
+from taichi_ants.engines.layout import (
+    EPSILON_DECAY,
+    N_SETTINGS,
+    OUTCOMES,
+    SETTINGS,
+    compass_of,
+    pack_cells,
+)
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -37,7 +43,7 @@ _PARALLEL_RUNS_ON_GPU = 4096
 
 # The arguments of the kernel, n runs of one learner with tables of n_states rows. Arrays of runs
 # are flat, one run behind the other. Each has so many tables, and so many times 8 floats and
-# integers, see `packing.padded`.
+# integers, see `layout.padded`.
 _NO_WORK: dict[str, Any] = {
     "n_runs": 0,
     "n_episodes": 0,
@@ -216,15 +222,12 @@ def do_episodes(
     widest = max(array[0].size for array in vars(runs.state).values())
     size = size_of_launch(workers, episodes, max_steps, runs.cost, launcher.cells_of_a_run, widest)
     seconds = 0.0
-    for some, part in pieces(len(runs), episodes, *size):
+    for some, part in pieces(len(runs), episodes, *size, progress):
         block = np.empty((len(OUTCOMES), some.stop - some.start, part.stop - part.start), np.int32)
         began = clock()
         launcher.launch(some, part, outcomes=block)
         seconds += clock() - began
         outcomes[:, some, part] = block
-        if progress is not None:
-            done = some.start + (some.stop - some.start) * part.stop / episodes
-            progress(done / len(runs))
     return seconds
 
 
@@ -246,12 +249,17 @@ def size_of_launch(
 
 
 def pieces(
-    n_runs: int, n_episodes: int, runs_each: int, episodes_each: int
+    n_runs: int,
+    n_episodes: int,
+    runs_each: int,
+    episodes_each: int,
+    progress: Progress | None = None,
 ) -> Iterator[tuple[slice, slice]]:
-    """The runs and the episodes of all launches, the episodes of a run in order."""
+    """Yield the runs and the episodes of all launches, the episodes of a run in order."""
     for first in range(0, n_runs, runs_each):
+        end = min(first + runs_each, n_runs)
         for begin in range(0, n_episodes, episodes_each):
-            yield (
-                slice(first, min(first + runs_each, n_runs)),
-                slice(begin, min(begin + episodes_each, n_episodes)),
-            )
+            stop = min(begin + episodes_each, n_episodes)
+            yield slice(first, end), slice(begin, stop)
+            if progress is not None:
+                progress((first + (end - first) * stop / n_episodes) / n_runs)

@@ -54,7 +54,7 @@ def lay(kind: ti.template(), a: ti.template(), base, cell, clock, expiry, carrie
 
 @ti.func
 def ground_of(packed):
-    """What a packed cell holds, see `engines.packing`."""
+    """What a packed cell holds, see `engines.layout`."""
     return (packed >> 31) & packed & 15
 
 

@@ -86,7 +86,15 @@ def continue_training(
     if not isinstance(result, TrainingResult):
         raise AntsError(f"result is {shown(result)}; give what train has returned.")
     checks.checked_configs(result.configs)
-    _check_memory(result)
+    state = result.state
+    given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
+    for config in result.configs:
+        needed = astuple(memory_for([config], result.task.n_states))
+        if not all(map(operator.ge, given, needed)):  # kernels would write outside of it
+            raise AntsError(
+                f"learner {config.learner!r} has come to need more memory than when this training "
+                "began; train anew."
+            )
     kept = replace(result, state=copy.deepcopy(result.state))
     return _train(kept, episodes, threads, arch, progress)
 
@@ -139,19 +147,6 @@ def _place(group: list[int]) -> slice | list[int]:
 def _report(progress: Progress, done: float, share: float, part: float) -> None:
     """Report the progress of one part of the work as that of all."""
     progress(done + share * part)
-
-
-def _check_memory(result: TrainingResult) -> None:
-    """Refuse learners for whose memory there is no room; kernels would write outside of it."""
-    state = result.state
-    given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
-    for config in result.configs:
-        needed = astuple(memory_for([config], result.task.n_states))
-        if not all(map(operator.ge, given, needed)):
-            raise AntsError(
-                f"learner {config.learner!r} has come to need more memory than when this training "
-                "began; train anew."
-            )
 
 
 def evaluate(
