@@ -106,10 +106,7 @@ def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent
 
 
 def winners(
-    intents: Sequence[Intent],
-    tick: int,
-    index: Callable[[Cell], int],
-    carriers_first: bool = False,
+    intents: Sequence[Intent], tick: int, index: Callable[[Cell], int], carriers_first: bool = False
 ) -> set[int]:
     """The slots of the ants that win the cell, or the food, that they want.
 

@@ -51,8 +51,6 @@ class WorldRow(IntEnum):
     TICKS = auto()  # also the number of the present tick, from 0; its end adds 1
     DELIVERIES = auto()
     FIRST_DELIVERY = auto()
-    MOVES = auto()
-    BLOCKED = auto()
     BIRTHS = auto()
     DEATHS = auto()
     REGROWN = auto()
@@ -60,15 +58,19 @@ class WorldRow(IntEnum):
 
 
 class Tally(IntEnum):
-    """What is counted in a tick: `tallies` has TALLY_WIDTH numbers for each chunk, these first."""
+    """Counts of a tick: `tallies` has TALLY_WIDTH numbers for each chunk, these first.
+
+    Those of `TOTALS` are summed over the episode in 64 bits, rows of `totals` of these numbers.
+    """
 
     RETURNS = 0
-    DELIVERIES = auto()
     MOVES = auto()
     BLOCKED = auto()
+    DELIVERIES = auto()
     DEATHS = auto()
 
 
+TOTALS = (Tally.RETURNS, Tally.MOVES, Tally.BLOCKED)
 # Wide enough that no two chunks share a line of a cache: threads would fight for it.
 TALLY_WIDTH = 16
 

@@ -19,6 +19,7 @@ from taichi_ants.engines.colony.layout import (
     BYTE_COLUMNS,
     INTEGER_COLUMNS,
     TALLY_WIDTH,
+    TOTALS,
     Order,
     Stage,
     SumRow,
@@ -53,15 +54,11 @@ Arrays = dict[str, np.ndarray]
 Which = slice | np.ndarray
 ALL = slice(None)  # the worlds, where a bool (W,) would name some
 
-# Kernels count moves in 32 bits, which 10 000 ants fill in 200 000 ticks; so these counters start
-# again at `_ROUND`, and `rounds` holds how often they did.
-_LARGE = (WorldRow.MOVES, WorldRow.BLOCKED)
-_ROUND = 1 << 30
 _MOST_NUMBERS = 2**31 - 1  # kernels index arrays by 32 bits
 # Where actions are given, nobody chooses or learns, and none of these matters.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
-_KIND = Kind("colony", 10, "Colony.save")
+_KIND = Kind("colony", 11, "Colony.save")
 # What a file holds besides arrays: arguments of `Colony`, and the progress of the episode.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
@@ -175,7 +172,6 @@ class ColonyState:
         self.stored = (*self._changing, *lasting)
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
         self.length = self.ticks = 0
-        self.rounds = np.zeros((len(_LARGE), len(self.seeds)), np.int64)  # see `_LARGE`
         self.delivered = np.zeros(len(self.seeds), np.int64)
 
     @property
@@ -266,14 +262,10 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), see `check_finite`."""
         self.check_finite()
-        counts = {
-            row.name.lower(): self.arrays["worlds"][row][None].copy()
-            for row in WorldRow
-            if row >= WorldRow.TICKS
-        }
-        for rounds, row in zip(self.rounds, _LARGE, strict=True):
-            counts[row.name.lower()] = counts[row.name.lower()] + rounds * _ROUND
-        return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
+        totals, worlds = self.arrays["totals"], self.arrays["worlds"]
+        counts = {row.name: totals[row] for row in TOTALS}
+        counts |= {row.name: worlds[row] for row in WorldRow if row >= WorldRow.TICKS}
+        return ColonyEpisodes(**{name.lower(): one[None].copy() for name, one in counts.items()})
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return world number `world` as it is now; arrays are copies."""
@@ -339,7 +331,6 @@ class ColonyState:
     def begin(self, which: Which = ALL) -> None:
         """Set these worlds to the start of an episode; tables, memories and streams stay."""
         self.delivered[which] += self.deliveries[which]
-        self.rounds[:, which] = 0
         self.set_learning_rate(self.learning_rate)
         self._set_to_start(self.arrays, which)
         self._copy_worlds(self.arrays, {"streams": self.arrays["first_streams"]}, which)
@@ -366,14 +357,6 @@ class ColonyState:
         worlds, slots = np.nonzero(there & (self.numbers >= 0) & (self.numbers < self.ants))
         first_streams = self.arrays["first_streams"].reshape(self.numbers.shape)
         first_streams[worlds, self.numbers[worlds, slots]] = self.streams[worlds, slots]
-
-    def carry_counters(self) -> None:
-        """Move what the largest counters hold into `rounds` before they overflow."""
-        for rounds, row in zip(self.rounds, _LARGE, strict=True):
-            counter = self.arrays["worlds"][row]
-            if counter.max() >= _ROUND:
-                more, counter[:] = np.divmod(counter, _ROUND)
-                rounds += more
 
     def set_learning_rate(self, learning_rate: float) -> None:
         """Set the learning rate and the weights that follow from it."""
@@ -434,8 +417,8 @@ class ColonyState:
             # Integer trails: the clock at which a cell's trail has evaporated; dense: the levels.
             "level" if self.pheromone.dense else "trail": levels.reshape(-1),
             "worlds": rows,
-            # Rewards of all ants in this episode.
-            "returns": np.zeros(len(worlds), np.int64),
+            # Sums over all ants in this episode, see `Tally`.
+            "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, self.n_food_sources, self.grid.size),
         }
 
@@ -586,7 +569,6 @@ class ColonyState:
             "worlds": [world.as_dict() for world in numbers],
             "world_of": [numbers[world] for world in self.worlds],
             "one_a_slot": self.one_a_slot,
-            "rounds": self.rounds.tolist(),
             # Interventions can make more than there are at the start.
             "food_sources": self.n_food_sources,
             **{name: getattr(self, name) for name in (*_OPTIONS, *_PROGRESS)},
@@ -632,10 +614,6 @@ class ColonyState:
             colony.set_learning_rate(checks.checked_share("learning_rate", facts["learning_rate"]))
             colony.length = checked_whole("length", facts["length"], least=0)
             colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
-            rounds = np.array(facts["rounds"], np.int64)
-            if rounds.shape != colony.rounds.shape or rounds.min() < 0:
-                raise ValueError("rounds has another shape, or is below 0")
-            colony.rounds = rounds
             if facts["food_sources"] != colony.n_food_sources:
                 colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:

@@ -74,7 +74,6 @@ class Stepper:
             self._launch_ticks(state, n, parts=len(state.seeds))
         while state.ticks < end:
             self._share_ticks(state, min(end - state.ticks, self._sort_at_times(state)))
-        state.carry_counters()
 
     def launch(self, state: ColonyState, name: str) -> None:
         """Do the phases of this name of `kernels`, or its `ticks`."""
