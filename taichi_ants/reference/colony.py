@@ -184,7 +184,11 @@ class ReferenceColony:
         acting = [self.ants[slot] for slot in sorted(self.ants)]
         before = [copy.copy(ant) for ant in acting]
         traffic = self.task.traffic
-        intents = [intend(self.world, ant, self._choose(ant), traffic) for ant in acting]
+        intents = []
+        for ant in acting:
+            action = self._draw_action(ant) if ant.chosen is None else ant.chosen
+            ant.chosen = None
+            intents.append(intend(self.world, ant, action, traffic))
         events = carry_out(self.world, intents, tick, self.task)
         for intent, event in zip(intents, events, strict=True):
             if event is Event.PICKED_UP and intent.target is not None:
@@ -195,16 +199,16 @@ class ReferenceColony:
             self.store += events.count(Event.DELIVERED)
             self._births()
         dying = self._deaths(acting)
-        self._food(tick)
+        life = self.task.life
+        if life.regrowth is not None:
+            self.record.regrown += self.food_sources.regrow(self.world, life.regrowth, tick)
+        if life.wander is not None and (tick + 1) % life.wander == 0:
+            self.food_sources.wander(self.world, self.queen_stream)
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
         self._learn(before, acting, events, last or self.over)
         self.record.ticks += 1
-
-    def _choose(self, ant: Ant) -> int:
-        action, ant.chosen = ant.chosen, None
-        return self._draw_action(ant) if action is None else action
 
     def _draw_action(self, ant: Ant) -> int:
         values = self.minds.of(ant.slot).rows[ant.state]
@@ -263,13 +267,6 @@ class ReferenceColony:
             del self.ants[ant.slot]
         self.record.deaths += len(dying)
         return dying
-
-    def _food(self, tick: int) -> None:
-        life = self.task.life
-        if life.regrowth is not None:
-            self.record.regrown += self.food_sources.regrow(self.world, life.regrowth, tick)
-        if life.wander is not None and (tick + 1) % life.wander == 0:
-            self.food_sources.wander(self.world, self.queen_stream)
 
     def _learn(
         self, before: Sequence[Ant], after: Sequence[Ant], events: Sequence[Event], last: bool

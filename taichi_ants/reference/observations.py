@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, distance, neighbour
@@ -29,22 +30,13 @@ def cells_in_view(ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Cell]:
     return [neighbour(ant.cell, ant.heading + turn) for turn in turns]
 
 
-def levels_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Level]:
-    """The trail that can be seen of each cell: that of empty cells; 0 of all others."""
-    # A trail on food, or on the queen's cell, is not seen and does not count for the strongest.
-    return [
-        world.level(cell) if world.content(cell) == EMPTY else 0
-        for cell in cells_in_view(ant, turns)
-    ]
-
-
 def strongest_in_view(world: WorldState, ant: Ant) -> Level:
     """The largest trail level of the three cells ahead that count, 0 where none does."""
     counting = [cell for cell in cells_in_view(ant) if world.content(cell) == EMPTY]
     if world.pheromone.view == "strongest_under_carriers":
         others = [world.ants.get(cell) for cell in cells_in_view(ant)]
         counting += [other.cell for other in others if other is not None and other.carries]
-    return max((world.level(cell) for cell in counting), default=0)
+    return max((world.trail.level(cell) for cell in counting), default=0)
 
 
 def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
@@ -54,7 +46,7 @@ def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
     """
     if ant.carries:
         return distance(cell, world.queen) < distance(ant.cell, world.queen)
-    return bool(world.level(cell) > world.level(ant.cell))
+    return bool(world.trail.level(cell) > world.trail.level(ant.cell))
 
 
 def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
@@ -72,7 +64,7 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
     if ant.carries:
         lures = is_better(world, ant, cell)
     else:
-        level = world.level(cell)
+        level = world.trail.level(cell)
         enough = 2 * level if world.pheromone.view == "half" else level
         lures = bool(level >= 1 and enough >= strongest)
     return SEES_LURE if lures else SEES_EMPTY
@@ -89,14 +81,9 @@ def paper(world: WorldState, ant: Ant) -> int:
     return ant.percept
 
 
-def five_cells(world: WorldState, ant: Ant) -> int:
-    """The load, then the paper's codes from behind left to behind right."""
-    return _number([ant.carries, *codes_in_view(world, ant, (-2, -1, 0, 1, 2))], 4)
-
-
-def six_cells(world: WorldState, ant: Ant) -> int:
-    """The load, then the paper's codes from behind left to behind right, then behind."""
-    return _number([ant.carries, *codes_in_view(world, ant, (-2, -1, 0, 1, 2, 3))], 4)
+def more_cells(turns: tuple[int, ...], world: WorldState, ant: Ant) -> int:
+    """The load, then the paper's codes of the cells at these headings relative to the ant's."""
+    return _number([ant.carries, *codes_in_view(world, ant, turns)], 4)
 
 
 def ants_seen(world: WorldState, ant: Ant) -> int:
@@ -110,10 +97,9 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
 
 def trail_levels(world: WorldState, ant: Ant) -> int:
     """The load, then the cells ahead; trails in three levels: thirds of the strongest one."""
-    levels = levels_in_view(world, ant)
     strongest = strongest_in_view(world, ant)
     codes = []
-    for code, level in zip(codes_in_view(world, ant), levels, strict=True):
+    for code, cell in zip(codes_in_view(world, ant), cells_in_view(ant), strict=True):
         if code == SEES_GOAL:
             codes.append(GOAL)
         elif code == SEES_OBSTACLE:
@@ -121,6 +107,8 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
         elif ant.carries:
             codes.append(STRONG if code == SEES_LURE else NOTHING)
         else:
+            # A trail on food, or on the queen's cell, is not seen.
+            level = world.trail.level(cell) if world.content(cell) == EMPTY else 0
             codes.append(_share(level, strongest))
     return _number([ant.carries, *codes], 6)
 
@@ -167,8 +155,9 @@ def _number(digits: list[int], base: int) -> int:
 
 OBSERVATIONS: dict[str, Callable[[WorldState, Ant], int]] = {
     "paper": paper,
-    "five_cells": five_cells,
-    "six_cells": six_cells,
+    # From behind left to behind right; then behind.
+    "five_cells": partial(more_cells, (-2, -1, 0, 1, 2)),
+    "six_cells": partial(more_cells, (-2, -1, 0, 1, 2, 3)),
     "trail_levels": trail_levels,
     "ants_seen": ants_seen,
     "ants": ants,

@@ -108,10 +108,6 @@ class WorldState:
         """What a cell looks like: the ground, or an OBSTACLE where an ant stands."""
         return OBSTACLE if cell in self.ants else self.ground.get(cell, OBSTACLE)
 
-    def level(self, cell: Cell) -> Level:
-        """The trail level of a cell now."""
-        return self.trail.level(cell)
-
     def index(self, cell: Cell) -> int:
         """The number of a cell in the flat array with a border of one void cell.
 

@@ -277,4 +277,4 @@ def test_every_episode_starts_with_the_same_ants_in_the_same_places():
         assert (again.number, again.cell, again.heading) == (ant.number, ant.cell, ant.heading)
         assert (again.age, again.action, again.state) == (0, -1, ant.state)
     assert colony.world.ground == ground
-    assert all(colony.world.level(cell) == trail.level(cell) for cell in ground)
+    assert all(colony.world.trail.level(cell) == trail.level(cell) for cell in ground)

@@ -28,7 +28,7 @@ from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Learner
-from taichi_ants.task import Pheromone, Task
+from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.starts import first_starts
 from taichi_ants.worlds.world import World
@@ -41,26 +41,13 @@ _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # of one array in a launch, which kernels index by 32 bits
 _PARALLEL_RUNS_ON_GPU = 4096
 
-# The arguments of the kernel, n runs of one learner with tables of n_states rows. Arrays of runs
-# are flat, one run behind the other. Each has so many tables, and so many times 8 floats and
-# integers, see `layout.padded`.
+# The arguments of the kernel besides those of world and task: of n runs of one learner with tables
+# of n_states rows. Arrays of runs are flat, one run behind the other. Each has so many tables, and
+# so many times 8 floats and integers, see `layout.padded`.
 _NO_WORK: dict[str, Any] = {
     "n_runs": 0,
     "n_episodes": 0,
-    "max_steps": 0,
-    "size": 0,  # cells of the world
-    # The task.
-    **Pheromone().numbers,
-    "turns_at_queen": 0,
     "regrows": 0,  # 1 if food grows back at once; not while an episode ends at a delivery
-    "delivery_terminates": 0,  # 1 if a delivery is a terminal state
-    "rewards": np.zeros(1, np.int32),  # (8,) by `Event`
-    # The world.
-    "world": np.zeros(1, np.int32),  # (size,) packed cells at the start of an episode
-    "trails": np.zeros(1, np.int32),  # (size,) trails at the start, under food too
-    "closer": np.zeros(1, np.uint8),  # (size,) a bit for each heading that leads nearer the queen
-    "compass": np.zeros(1, np.int32),  # see `rules.actions`
-    # The runs.
     "start_cells": np.zeros(1, np.int32),  # (n,)
     "start_headings": np.zeros(1, np.int32),  # (n,)
     "settings": np.zeros(1, np.float64),  # `layout.SETTINGS`, then the hyperparameters
@@ -76,7 +63,6 @@ _NO_WORK: dict[str, Any] = {
     "integers": np.zeros(1, np.int32),
     "cells": np.zeros(1, np.int32),  # the packed cells of each run, see `step`
     "keeps_tables": 0,  # 1 to write the table after each step
-    # What comes out.
     "outcomes": np.zeros((1, 1, 1), np.int32),  # (3, n, n_episodes): `layout.OUTCOMES`
     "trace": np.zeros((1, 1), np.int32),  # (n * n_episodes * max_steps, columns): `layout.TRACE`
     "trace_chances": np.zeros(1, np.float64),  # the probability with which the action was chosen
@@ -145,10 +131,12 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
         **(task.pheromone if falls else task.pheromone.lasting).numbers,
         "turns_at_queen": int(task.turns_at_queen),
         "rewards": task.rewards.by_event(),
+        # Of the cells of each world: packed at the start of an episode; trails then, under food
+        # too; a bit for each heading that leads nearer to the queen.
         "world": np.concatenate([pack_cells(world) for world in worlds]),
         "trails": np.concatenate([world.trail_levels() for world in worlds]),
         "closer": np.concatenate([world.closer() for world in worlds]),
-        "compass": compass_of(grid),
+        "compass": compass_of(grid),  # see `rules.actions`
     }
 
 
@@ -169,11 +157,11 @@ class Launcher:
         learns, pheromone = runs.learner is not None, task.pheromone
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
         self._launch = Launch(partial(run_kernel, runs.learner, task.sees, deposits, half, traced))
-        self._launch(_NO_WORK)  # which compiles it
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self._values = _NO_WORK | laid_out([world], task, falls)
         terminates = int(task.delivery != "truncates")
         self._values |= {"max_steps": max_steps, "delivery_terminates": terminates}
+        self._launch(self._values)  # which compiles it
 
     def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
         """Do some episodes of some runs; what comes out is written into the arrays."""
