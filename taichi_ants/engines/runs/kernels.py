@@ -80,14 +80,12 @@ def run_kernel(
 
     @ti.func
     def decide(a: ti.template(), begin, ant, state, explore_below):
-        """The ant's next action, and its stream after the draw."""
-        rng = advance(ant.random_state)
-        return choose(values_of(a.q, begin, state), bits_of(rng), explore_below), rng
-
-    @ti.func
-    def chance(a: ti.template(), begin, state, action, explore_below):
-        """The probability of an action that was chosen so."""
-        return chance_of(values_of(a.q, begin, state), action, explore_below)
+        """The ant's next action, its stream after the draw, and, if traced, the probability."""
+        rng, values = advance(ant.random_state), values_of(a.q, begin, state)
+        action, chance = choose(values, bits_of(rng), explore_below), ti.f64(0.0)
+        if ti.static(traced):
+            chance = chance_of(values, action, explore_below)
+        return action, rng, chance
 
     @ti.func
     def record(a: ti.template(), n, episode, step, before, percept, taken, after, seen):
@@ -133,19 +131,17 @@ def run_kernel(
                 percept = percept_of(half, a, base, ant, clock)
                 state = state_of(a, base, ant, clock, percept)
                 if ti.static(on_policy):
-                    next_action, ant.random_state = decide(a, at.table, ant, state, explore_below)
-                    if ti.static(traced):
-                        next_chance = chance(a, at.table, state, next_action, explore_below)
+                    next_action, ant.random_state, next_chance = decide(
+                        a, at.table, ant, state, explore_below
+                    )
                 while step < a.max_steps and ant.event != Event.DELIVERED:
-                    action = next_action
+                    action, chance = next_action, next_chance
                     if ti.static(not on_policy):
-                        action, ant.random_state = decide(a, at.table, ant, state, explore_below)
+                        action, ant.random_state, chance = decide(
+                            a, at.table, ant, state, explore_below
+                        )
                     if ti.static(traced):
-                        a.trace_chances[n_recorded] = next_chance
-                        if ti.static(not on_policy):
-                            a.trace_chances[n_recorded] = chance(
-                                a, at.table, state, action, explore_below
-                            )
+                        a.trace_chances[n_recorded] = chance
                     before = ant
                     ant = act(deposit, a, base, ant, percept, action, clock)
                     clock += a.evaporates
@@ -158,13 +154,9 @@ def run_kernel(
                     if ti.static(on_policy):
                         next_action = -1
                         if terminated == 0:
-                            next_action, ant.random_state = decide(
+                            next_action, ant.random_state, next_chance = decide(
                                 a, at.table, ant, next_state, explore_below
                             )
-                            if ti.static(traced):
-                                next_chance = chance(
-                                    a, at.table, next_state, next_action, explore_below
-                                )
                     taken = Transition(
                         state=state,
                         action=action,
