@@ -141,8 +141,8 @@ def _has_barrier(running: runtime.Runtime) -> bool:
 
 
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
-    """Return what kernels know besides arrays; -1 stands for an option that is off."""
-    life, memory, off = state.task.life, state.memory, -1
+    """Return the numbers that kernels read besides arrays."""
+    memory = state.memory
     return {
         "n_worlds": len(state.seeds),
         "n_ants": state.ants,  # that start an episode
@@ -152,13 +152,8 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "size": state.grid.size,
         "length": state.length,
         **state.pheromone.numbers,
-        "turns_at_queen": int(state.task.turns_at_queen),
-        "births": int(life.births),
-        "lifespan": life.lifespan or off,
-        "regrowth": off if life.regrowth is None else life.regrowth,
-        "wander": life.wander or off,
+        **state.task.numbers,
         "ends_at_delivery": int(state.ends_at_delivery),
-        "delivery_terminates": int(state.task.delivery != "truncates"),
         "initial_q": state.training.initial_q,
         "discount": state.training.discount,
         "epsilon": state.epsilon,

@@ -129,7 +129,7 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
     return {
         "size": grid.size,
         **(task.pheromone if falls else task.pheromone.lasting).numbers,
-        "turns_at_queen": int(task.turns_at_queen),
+        **task.numbers,
         "rewards": task.rewards.by_event(),
         # Of the cells of each world: packed at the start of an episode; trails then, under food
         # too; a bit for each heading that leads nearer to the queen.
@@ -158,9 +158,7 @@ class Launcher:
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
         self._launch = Launch(partial(run_kernel, runs.learner, task.sees, deposits, half, traced))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
-        self._values = _NO_WORK | laid_out([world], task, falls)
-        terminates = int(task.delivery != "truncates")
-        self._values |= {"max_steps": max_steps, "delivery_terminates": terminates}
+        self._values = {**_NO_WORK, **laid_out([world], task, falls), "max_steps": max_steps}
         self._launch(self._values)  # which compiles it
 
     def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
