@@ -220,7 +220,9 @@ class UtilityColony:
         free = {}  # the utility at each heading that can be taken
         for heading in range(N_HEADINGS):
             cell = neighbour(ant.cell, heading)
-            if cell in self.utilities[goal] and self._has_room(cell):
+            inside = sum(other.cell == cell for other in self._ants)
+            has_room = cell == self._nest or inside < self._capacity
+            if cell in self.utilities[goal] and has_room:
                 free[heading] = self.utilities[goal][cell]
         if not free:
             return None
@@ -234,10 +236,6 @@ class UtilityColony:
             if best == 0 and chance < self._momentum and ant.heading in options:
                 options = [ant.heading]
         return options[pick(low, len(options))]
-
-    def _has_room(self, cell: Cell) -> bool:
-        inside = sum(ant.cell == cell for ant in self._ants)
-        return cell == self._nest or inside < self._capacity
 
     def path_length(self) -> int:
         """Steps to food and back by the highest utilities; 0 if there is no such way."""

@@ -113,17 +113,11 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
     return _number([ant.carries, *codes], 6)
 
 
-def ants(world: WorldState, ant: Ant) -> int:
-    """The load, then the codes of the cells ahead; ants with the other load have their own."""
-    return _number([ant.carries, *_crowd(world, ant, queue=False)], 6)
+def crowd(queue: bool, world: WorldState, ant: Ant) -> int:
+    """The load, then the codes of the cells ahead; ants with the other load have their own.
 
-
-def queues(world: WorldState, ant: Ant) -> int:
-    """As `ants`; ants with the same load on a better cell have a code of their own, too."""
-    return _number([ant.carries, *_crowd(world, ant, queue=True)], 7)
-
-
-def _crowd(world: WorldState, ant: Ant, queue: bool) -> list[int]:
+    In a `queue`, ants with the same load on a better cell have a code of their own, too.
+    """
     codes = codes_in_view(world, ant)
     for side, cell in enumerate(cells_in_view(ant)):
         there = world.ants.get(cell)
@@ -134,7 +128,7 @@ def _crowd(world: WorldState, ant: Ant, queue: bool) -> list[int]:
             codes[side] = BETTER if better else OTHER
         elif queue and better:
             codes[side] = IN_QUEUE
-    return codes
+    return _number([ant.carries, *codes], 7 if queue else 6)
 
 
 def _share(level: Level, strongest: Level) -> int:
@@ -160,6 +154,6 @@ OBSERVATIONS: dict[str, Callable[[WorldState, Ant], int]] = {
     "six_cells": partial(more_cells, (-2, -1, 0, 1, 2, 3)),
     "trail_levels": trail_levels,
     "ants_seen": ants_seen,
-    "ants": ants,
-    "queues": queues,
+    "ants": partial(crowd, False),
+    "queues": partial(crowd, True),
 }

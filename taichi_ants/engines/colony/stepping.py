@@ -72,8 +72,12 @@ class Stepper:
         end = state.ticks + n
         if state.schedule == "by_world":
             self._launch_ticks(state, n, parts=len(state.seeds))
+        usual = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
+        interval = max(_FEWEST_TICKS, min(_MOST_TICKS, usual))
         while state.ticks < end:
-            self._share_ticks(state, min(end - state.ticks, self._sort_at_times(state)))
+            if state.ticks % interval == 0:
+                state.sort_ants()
+            self._share_ticks(state, min(end - state.ticks, interval - state.ticks % interval))
 
     def launch(self, state: ColonyState, name: str) -> None:
         """Do the phases of this name of `kernels`, or its `ticks`."""
@@ -81,15 +85,6 @@ class Stepper:
         if name not in self._launches:
             self._launches[name] = self._prepared(state, name)
         self._launches[name]({**kernel_numbers(state), **state.arrays})
-
-    @staticmethod
-    def _sort_at_times(state: ColonyState) -> int:
-        """Sort the ants if it is time; return the number of ticks until it is again."""
-        ticks = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
-        ticks = max(_FEWEST_TICKS, min(_MOST_TICKS, ticks))
-        if state.ticks % ticks == 0:
-            state.sort_ants()
-        return ticks - state.ticks % ticks
 
     def _share_ticks(self, state: ColonyState, n: int) -> None:
         """Let up to n ticks pass, each shared by all threads."""

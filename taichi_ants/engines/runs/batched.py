@@ -109,17 +109,14 @@ class BatchedEnvironments:
         self.arrays["same_step"] = int(same_step)
         with runtime.alone:
             if self._launch is None:
-                self._launch = self._compiled()
+                runtime.start()  # Taichi is imported once it is configured
+                from taichi_ants.engines.arguments import Launch
+                from taichi_ants.engines.runs.kernels import step_kernel
+
+                half, serial = self.task.pheromone.view == "half", self.n <= _PER_CHUNK
+                rules = self.task.sees, self.arrays["deposits"], half, serial
+                self._launch = Launch(partial(step_kernel, *rules))
             self._launch(self.arrays)
-
-    def _compiled(self) -> Any:
-        runtime.start()  # Taichi is imported once it is configured
-        from taichi_ants.engines.arguments import Launch
-        from taichi_ants.engines.runs.kernels import step_kernel
-
-        pheromone, serial = self.task.pheromone, self.n <= _PER_CHUNK
-        deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
-        return Launch(partial(step_kernel, self.task.sees, deposits, half, serial))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what Taichi holds, which is made anew; so copies and pickles go on alike."""

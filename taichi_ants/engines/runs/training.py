@@ -122,7 +122,10 @@ def _train(
         costs.append(learner.cost(learner.settings(result.configs[group[0]])) * len(group))
     done, seconds = 0.0, 0.0
     for group, cost in zip(groups.values(), costs, strict=True):
-        chosen, where = [result.configs[c] for c in group], _place(group)
+        chosen = [result.configs[c] for c in group]
+        # A slice copies nothing.
+        in_a_row = group[-1] + 1 - group[0] == len(group)
+        where = slice(group[0], group[-1] + 1) if in_a_row else group
         runs = Runs.learning(chosen, result.seeds, state.part(where))
         share = cost / sum(costs)
         part = progress and partial(_report, progress, done, share)
@@ -136,12 +139,6 @@ def _train(
     if result.episodes:
         joined = {n: np.concatenate([getattr(result, n), a], axis=2) for n, a in joined.items()}
     return replace(result, **joined, seconds=seconds)
-
-
-def _place(group: list[int]) -> slice | list[int]:
-    """Where configurations are: a slice, which copies nothing, if one follows the other."""
-    first, end = group[0], group[-1] + 1
-    return slice(first, end) if end - first == len(group) else group
 
 
 def _report(progress: Progress, done: float, share: float, part: float) -> None:
