@@ -88,9 +88,18 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
         wanted = Runtime(arch or "cpu", threads or available_threads())
     else:
         wanted = Runtime(arch or running.arch, threads or running.threads)
-    if wanted != running:
-        _check_restart(ti, running, wanted)
-        _init(ti, wanted)
+    if wanted == running:
+        return wanted
+    if running is not None:
+        ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
+        if not ours or holds_data():
+            why = "holds fields or arrays" if ours else "was not started by taichi_ants"
+            raise AntsError(
+                f"arch {wanted.arch!r} with threads {wanted.threads} needs a restart of Taichi, "
+                f"which runs with {running.arch!r} and {running.threads} and {why}; leave out "
+                "threads and arch, or call ti.reset() first, which destroys all fields and arrays."
+            )
+    _init(ti, wanted)
     return wanted
 
 
@@ -170,21 +179,6 @@ def _running(ti: ModuleType) -> Runtime | None:
             "and let taichi_ants start Taichi; both destroy the fields and arrays that it holds."
         )
     return Runtime(arch, int(config.cpu_max_num_threads))
-
-
-def _check_restart(ti: ModuleType, running: Runtime | None, wanted: Runtime) -> None:
-    """Refuse to restart what somebody else has started, or what holds somebody else's data."""
-    if running is None:
-        return
-    ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
-    if ours and not holds_data():
-        return
-    why = "holds fields or arrays" if ours else "was not started by taichi_ants"
-    raise AntsError(
-        f"arch {wanted.arch!r} with threads {wanted.threads} needs a restart of Taichi, which runs "
-        f"with {running.arch!r} and {running.threads} and {why}; leave out threads and arch, or "
-        "call ti.reset() first, which destroys all fields and arrays."
-    )
 
 
 def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:

@@ -59,7 +59,7 @@ class ColonyWorlds(Ants):
             seeds=range(n_worlds),
             ants=ants,
             capacity=capacity,
-            start=start,  # type: ignore[arg-type]  # the colony checks it
+            start=start,
             sharing="frozen",
         )
         shape = n_worlds, self.colony.capacity

@@ -26,7 +26,7 @@ from command_lines import (
 )
 
 from taichi_ants import TrainingConfig, reference, worlds
-from taichi_ants.reference.learners.q_learning import QLearning
+from taichi_ants.reference.learners import QLearning
 
 LONG = [
     *("--seeds", 4, "--episodes", 500, "--learners", "q_learning", "dyna_q"),

@@ -20,7 +20,7 @@ from taichi_ants import (
     train,
 )
 from taichi_ants.learners import registry, td_learner
-from taichi_ants.reference.learners.sarsa import Sarsa
+from taichi_ants.reference.learners import Sarsa
 from taichi_ants.task import Task
 from taichi_ants.worlds import paper
 

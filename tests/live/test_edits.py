@@ -13,7 +13,7 @@ from random_edits import apply_to_both, random_edit
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
-from taichi_ants.engines.colony import stepping
+from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.layout import Stage, WorldRow
 from taichi_ants.live import edits
@@ -102,7 +102,7 @@ def test_edits_keep_colony_and_reference_equal(kernel):
 
 def test_schedules_do_not_matter_to_edits(monkeypatch):
     """Many chunks; where no slot is vacant, ants are sorted now and then."""
-    monkeypatch.setattr(stepping, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
     for name in ("_FEWEST_TICKS", "_MOST_TICKS"):  # between two sorts
         monkeypatch.setattr(stepping, name, 2)
     world, training = worlds.open_world(5, (9, 8, 7)), TRAINING

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from taichi_ants import Colony, TrainingConfig, runtime, train, worlds
-from taichi_ants.engines.colony import stepping
+from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.layout import Order
 from taichi_ants.engines.colony.stepping import ThreadChoice
 from taichi_ants.task import Life, Pheromone, Task
@@ -45,7 +45,7 @@ def assert_same(first: dict, second: dict) -> None:
 
 def test_threads_and_schedules_give_the_same(monkeypatch):
     """Sixteen chunks of a world for two threads, so that their sums are joined."""
-    monkeypatch.setattr(stepping, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
     monkeypatch.setattr(ThreadChoice, "plan", all_threads)
     expected = history(threads=1)
     assert_same(expected, history(threads=1, schedule="by_chunk"))
@@ -59,7 +59,7 @@ def test_threads_and_schedules_give_the_same(monkeypatch):
 @pytest.mark.parametrize("learner", ["dyna_q", "q_learning"])
 def test_threads_that_do_not_come_are_not_waited_for_without_end(learner, monkeypatch):
     """Seven parts for two threads: the first two leave the barrier, the rest is done by one."""
-    monkeypatch.setattr(stepping, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
     monkeypatch.setattr(stepping, "_SPINS", 1000)
     monkeypatch.setattr(ThreadChoice, "plan", lambda choice, ticks, most: (ticks, 7))
     training, given_up = TrainingConfig(learner, 0.2, 0.9, 0.4, 0.9), 0

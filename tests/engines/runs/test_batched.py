@@ -77,7 +77,7 @@ def check_equal(ants: BatchedEnvironments, i: int, colony: ReferenceColony, worl
         place = world.grid.index(cell)
         assert now.ground[place] == ground
         if ground == 0:
-            assert now.trail[place] == colony.world.level(cell)
+            assert now.trail[place] == colony.world.trail.level(cell)
 
 
 @pytest.mark.parametrize("kernel", KERNELS, ids="-".join)
