@@ -59,10 +59,6 @@ def test_trails_and_distances_are_seen():
     assert set(nearer[trace.percepts < 64].tolist()) == {0, 1, 2}  # without food too
 
 
-def load(view):
-    return view.carries
-
-
 def own_trail(view):
     on_trail = 0
     if view.own_level >= 1:
@@ -79,7 +75,7 @@ def lesser_trail(view):
 
 @pytest.mark.parametrize(
     ("encode", "n_states"),
-    [(load, 2), (own_trail, 4), pytest.param(lesser_trail, 256, marks=pytest.mark.slow)],
+    [(own_trail, 4), pytest.param(lesser_trail, 256, marks=pytest.mark.slow)],
 )
 def test_a_row_may_leave_any_part_of_a_look_unread(encode, n_states):
     """Taichi's compiler drops what computes the parts that nobody reads."""
