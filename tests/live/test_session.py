@@ -537,10 +537,10 @@ def test_a_policy_is_a_training_or_one_table(table):
 
 def test_what_a_hand_has_set_stays_in_later_episodes():
     session = Session(SETUPS["foraging"])
-    session.apply({"kind": "set", "name": "epsilon", "value": 0.0})
+    session.apply({"kind": "set", "name": "epsilon", "value": 0.25})
     for _ in range(3):
         session.apply({"kind": "episode"})
-    assert session.colony.epsilon == 0.0
+    assert session.colony.epsilon == 0.25  # though it decays if nobody sets it
     assert session.colony.learning_rate < LEARNS.learning_rate  # which nobody has set
     session.apply({"kind": "set", "name": "learning_rate", "value": 0.0})
     tables = session.colony.q_values
