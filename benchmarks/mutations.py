@@ -24,6 +24,7 @@ TIMEOUT = 300.0  # seconds; a mutation that makes a test wait that long is notic
 RUNS = "tests/engines/runs/test_against_reference.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
+SCHEDULES = "tests/engines/colony/test_schedules.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
 FINDINGS = "tests/analysis/test_findings.py"
@@ -55,7 +56,7 @@ MUTATIONS = [
         "level + p.deposit_level",
         COLONY,
     ),
-    ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", COLONY),
+    ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", CONFLICTS),
     ("task/rules/pheromone.py", "if after < 1.0:", "if after < 0.5:", COLONY),
     ("task/rules/pheromone.py", "levels[neighbour] * share", "level * share", COLONY),
     ("task/rules/policy.py", "larger(values[2], values[3])", "values[2]", RUNS),
@@ -80,7 +81,7 @@ MUTATIONS = [
         "task/observations/trail_levels.py",
         "level < view.strongest -",
         "level <= view.strongest -",
-        COLONY,
+        "tests/engines/test_views.py",
     ),
     ("task/observations/ants_seen.py", "view.ants[k] != 0", "view.ants[k] == 1", COLONY),
     ("task/rewards.py", "[[Event.ENTERED_EMPTY, Event.PUSHED]]", "[Event.ENTERED_EMPTY]", TRAFFIC),
@@ -104,7 +105,7 @@ MUTATIONS = [
     ("engines/colony/learning.py", "* _ONE + 0.5)", "* _ONE)", COLONY),
     ("engines/colony/learning.py", "shape[0] - 1)]  #", "shape[0] - 2)]  #", COLONY),
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
-    ("engines/colony/learning.py", "if number > c.sums_of", "if number >= c.sums_of", COLONY),
+    ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
     ("engines/colony/steps.py", "moves & (not enters), ti", "moves & enters, ti", COLONY),
     ("engines/colony/steps.py", "clock) > level_of", "clock) >= level_of", TRAFFIC),
     ("engines/colony/steps.py", "c.carried[ant] = 1", "c.carried[ant] = 0", COLONY),
