@@ -59,7 +59,7 @@ class ColonyWorlds(Ants):
             seeds=range(n_worlds),
             ants=ants,
             capacity=capacity,
-            start=start,
+            start=start,  # type: ignore[arg-type]  # the colony checks it
             sharing="frozen",
         )
         shape = n_worlds, self.colony.capacity

@@ -78,13 +78,13 @@ def replayed(content: bytes) -> Session:
 
 @pytest.fixture(scope="module")
 def edited() -> dict[str, Session]:
-    return {name: with_edits(setup, 200) for name, setup in SETUPS.items()}
+    return {name: with_edits(setup, 90) for name, setup in SETUPS.items()}
 
 
 @pytest.mark.parametrize("name", SETUPS)
-def test_two_hundred_edits_are_replayed_to_the_bit(edited, name, tmp_path):
+def test_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     session = edited[name]
-    assert session.colony.episode > 3 or not session.setup.ticks_per_episode
+    assert session.colony.episode > 2 or not session.setup.ticks_per_episode
     assert {edit["kind"] for _, edit in session.edits} == {
         *("ground", "trail", "add_ants", "remove_ants", "queen", "set", "episode")
     }
@@ -534,10 +534,10 @@ def test_a_policy_is_a_training_or_one_table(table):
 
 def test_what_a_hand_has_set_stays_in_later_episodes():
     session = Session(SETUPS["foraging"])
-    session.apply({"kind": "set", "name": "epsilon", "value": 0.0})
+    session.apply({"kind": "set", "name": "epsilon", "value": 0.25})
     for _ in range(3):
         session.apply({"kind": "episode"})
-    assert session.colony.epsilon == 0.0
+    assert session.colony.epsilon == 0.25  # though it decays if nobody sets it
     assert session.colony.learning_rate < LEARNS.learning_rate  # which nobody has set
     session.apply({"kind": "set", "name": "learning_rate", "value": 0.0})
     tables = session.colony.q_values
