@@ -1,14 +1,13 @@
 """The reference: the rules of the world in plain Python, to test the fast kernels against.
 
-It is an oracle, not a simulator to use: every rule is written down a second time, as directly as it
-reads, with a geometry of its own (tuples of cube coordinates in normal form), its own random
-streams, its own vision, observations and learners. Tests compare each step of the engines with it,
-for equality to the bit. To keep the two independent, this package imports nothing of `taichi_ants`
-but constants, errors, and the types `Task`, `TrainingConfig` (with `update_weights`) and `World`;
-of a world it reads only the fields (ranges, queen, foods, obstacles, trails, ants).
+The reference is for tests, not for simulations. It implements every rule a second time, as directly
+as possible: geometry (tuples of cube coordinates), random streams, vision, observations, learners.
+Tests compare each step of the engines with it, for equality to the bit. To stay independent, this
+package imports only constants, errors, and the types `Task`, `TrainingConfig` (with
+`update_weights`) and `World` from `taichi_ants`. It reads only the fields of a world.
 
-Read `colony.py` first: `ReferenceColony.tick` is a tick. One ant that learns, or that follows a
-table, is a colony of one: `beginner`, `follower`.
+Read `ReferenceColony.tick` in `colony.py` first. `beginner` and `follower` make colonies of one ant
+that learns or follows a table.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the ants want to do in a tick, who wins where they want one cell, and what comes of it."""
+"""The actions of a tick: intents of the ants, conflicts over cells, and results."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from taichi_ants.task.events import Event
 if TYPE_CHECKING:
     from taichi_ants.task import Task, Traffic
 
-# The field of `Rewards` that pays for an event.
+# The field of `Rewards` for each event.
 PAID = {
     Event.ENTERED_EMPTY: "empty",
     Event.PUSHED: "empty",
@@ -41,9 +41,9 @@ PAID = {
 
 
 def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomStream) -> int:
-    """With probability epsilon any action, else one with the largest of these 5 values.
+    """Return an action: any with probability epsilon, else one with the largest of these 5 values.
 
-    It makes one draw: the high word decides whether to explore, the low word which action it is.
+    It makes one draw: the high word decides whether to explore, the low word chooses the action.
     """
     high, low = stream.draw()
     if high < int(epsilon * 4294967296.0):
@@ -55,14 +55,14 @@ def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomSt
 
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """The action that an ant is about to do, 0 to 4.
+    """An ant's action, 0 to 4, and its effect if the ant prevails.
 
     Attributes:
-        heading: Of a move or a pick-up, towards its target.
-        target: The cell that it wants to enter or whose food it wants to take. None if the way is
-            closed, no food is in view, or the action is to give.
-        lured: Whether the cell looks T or S, or is better than the ant's own if an ant is there.
-        gives: Whether it can give.
+        heading: The heading of a move or a pick-up, towards its target.
+        target: The cell to enter, or whose food to take. None if the way is closed, no food is in
+            view, or the action is to give.
+        lured: Whether the target looks T or S or, with an ant on it, is better than the own cell.
+        gives: Whether the ant delivers.
     """
 
     ant: Ant
@@ -74,14 +74,14 @@ class Intent:
 
     @property
     def enters(self) -> bool:
-        """Whether it wants to enter a cell."""
+        """Whether the ant tries to enter a cell."""
         return self.action < PICK_UP and self.target is not None
 
 
 def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent:
-    """What the ant wants by an action, from its percept.
+    """Return the intent of an ant's action, from its percept.
 
-    It draws from its stream where a pick-up has several foods to choose from.
+    If a pick-up can choose between several food items, the ant draws from its random stream.
     """
     codes = (ant.percept >> 4 & 3, ant.percept >> 2 & 3, ant.percept & 3)
     if action == GIVE:
@@ -108,12 +108,12 @@ def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent
 def winners(
     intents: Sequence[Intent], tick: int, index: Callable[[Cell], int], carriers_first: bool = False
 ) -> set[int]:
-    """The slots of the ants that win the cell, or the food, that they want.
+    """Return the slots of the ants that win the cell or food they want.
 
-    Of those that want one cell, it is the one whose own cell (its `index`) has the smallest hash
-    with the tick; of equal ones, the one with the smaller heading towards the cell. So neither
-    numbers of ants nor their order matter, and no place in the world wins for ever. With
-    `carriers_first` an ant with food wins against all without.
+    If several ants want one cell, the ant wins whose own cell (its `index`) has the smallest hash
+    with the tick; among equal hashes, the smaller heading towards the cell. So the numbers and
+    order of ants do not matter, and no place always wins. With `carriers_first`, carriers win
+    against foragers.
     """
     best: dict[Cell, tuple[bool, int, int, int]] = {}
     for intent in intents:
@@ -129,14 +129,14 @@ def winners(
 def settle(
     intents: Sequence[Intent], winning: set[int], traffic: Traffic
 ) -> tuple[dict[int, Cell], dict[int, Cell]]:
-    """Return, by slot, the cells that ants enter, and those onto which others are pushed.
+    """Return two dictionaries by slot: cells that ants enter, and cells onto which ants are pushed.
 
-    `winning` are the slots of the ants that win what they want.
+    `winning` are the slots that `winners` returns.
     """
     standing: dict[Cell | None, Intent] = {intent.ant.cell: intent for intent in intents}
 
     def moves(intent: Intent) -> bool:
-        """Return whether an ant enters its cell, which is empty or which another one leaves."""
+        """Return whether an ant enters its target, which is empty or which another ant leaves."""
         one = intent
         while one.enters and one.ant.slot in winning:
             ahead = standing.get(one.target)
@@ -165,10 +165,10 @@ def settle(
 
 
 def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Task) -> list[Event]:
-    """Resolve the conflicts, let all ants act at once, and lay their trails: change them all.
+    """Return the event of each intent, after all ants have acted at once.
 
-    All wishes are from the start of the tick, so no ant's deed can change another's; and no cell is
-    entered, emptied or marked by two.
+    All intents are from the start of the tick, so no ant's action changes that of another ant. No
+    two ants enter a cell, empty it, or deposit on it.
     """
     winning = winners(intents, tick, world.index, task.traffic.carriers_first)
     entered, pushed = settle(intents, winning, task.traffic)
@@ -177,7 +177,7 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
         ant, slot = intent.ant, intent.ant.slot
         ant.action = intent.action
         if intent.action < PICK_UP:
-            # The turn is made even if the way is blocked: so an ant gets out of a dead end.
+            # Ants turn even if the way is blocked, so that they get out of dead ends.
             ant.heading = intent.heading
         if slot in pushed:
             ant.cell, event = pushed[slot], Event.PUSHED
@@ -203,7 +203,7 @@ def _move(world: WorldState, intent: Intent, destination: Cell | None) -> Event:
 
 
 def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
-    """Do a pick-up or a delivery, if it can be done."""
+    """Do a pick-up or a delivery if it is possible, and return the event."""
     ant = intent.ant
     if intent.gives:
         ant.carries, ant.carried = False, 0

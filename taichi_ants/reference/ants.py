@@ -1,4 +1,4 @@
-"""An ant, where ants start, and what one does in a tick."""
+"""An ant, the start of ants, and the transition of an ant in a tick."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ class Ant:
     """An ant.
 
     Attributes:
-        slot: Its place in the colony, 0 .. slots - 1; free again after its death.
-        number: The initial ants are 0 .. n - 1, those born in an episode n, n + 1, ...
-        age, carried: Ticks that it has lived, if there is a lifespan, and carried its food.
-        percept: Load and looks of the three cells ahead, 0 to 127, by which it acts.
-        state: The state index, by which it chooses and learns.
-        action, reward: The last ones; -1 and 0 before its first tick.
-        chosen: The action that it has drawn already for its next tick, if any.
+        slot: The ant's place in the colony, 0 .. slots - 1; free again after its death.
+        number: 0 .. n - 1 for the initial ants; n, n + 1, ... for ants born in the episode.
+        age: Ticks since the ant was born, if there is a lifespan.
+        carried: Ticks since the ant picked up its food.
+        percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
+        state: The state index, by which the ant chooses and learns.
+        action, reward: The last ones; -1 and 0 before the first tick.
+        chosen: The action already drawn for the next tick, if any.
     """
 
     cell: Cell
@@ -50,17 +51,16 @@ class Ant:
 
 @dataclass(kw_only=True, slots=True)
 class Transition:
-    """One ant in one tick, from which it learns.
+    """The transition of one ant in one tick, from which it learns.
 
     Attributes:
         episode, step: The episode in the run and the tick in the episode, from 0.
-        cell, heading, state: Before the tick.
-        next_state, next_action: After it; the action if it was drawn.
-        terminated: Whether it delivered and this is a terminal state: the update does not
-            bootstrap.
-        truncated: Whether this was the ant's last update in the episode all the same: its last
-            tick, its death, or a delivery that ends the episode and is not terminal.
-        td_error: Of the update from this step (planning is not recorded); None without learning.
+        cell, heading, state: Values before the tick.
+        next_state, next_action: Values after the tick; the action is None if none was drawn.
+        terminated: Whether the ant delivered into a terminal state: the update does not bootstrap.
+        truncated: Whether this is the ant's last update of the episode without `terminated`: the
+            last tick, the ant's death, or a delivery that ends the episode but is not terminal.
+        td_error: The error of this step's update, without planning; None without learning.
     """
 
     slot: int
@@ -85,11 +85,11 @@ class Transition:
 
 
 def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tuple[Cell, int]]:
-    """Return cell and heading of each of n ants; AntsError if the world has too few free cells.
+    """Return the start cell and heading of n ants; AntsError if the world has too few free cells.
 
-    The ants that the world lists come first. The others take free cells, those nearest to the
-    queen if `where` is "nest", any if it is "spread", otherwise in an order that depends on the
-    seed; and a heading that depends on the seed.
+    The ants listed by the world are first. The seed decides the headings of the others, and the
+    order in which they take free cells: those nearest to the queen first if `where` is "nest",
+    cells anywhere if it is "spread".
     """
     listed = [((x, y, z), heading) for x, y, z, heading in world.ants.tolist()]
     if n <= len(listed):
@@ -101,8 +101,8 @@ def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tup
     missing = n - len(listed)
     if missing > len(free):
         raise AntsError(
-            f"n is {n}; the world lists {len(listed)} ants and has {len(free)} free cells, "
-            "so take fewer ants or a larger world."
+            f"n is {n}; the world lists {len(listed)} ants and has {len(free)} free cells; "
+            "choose fewer ants or a larger world."
         )
     return listed + [
         (cell, pick(stream_state(seed, STREAM_START_HEADING, ant) >> 32, N_HEADINGS))
@@ -111,7 +111,7 @@ def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tup
 
 
 def start_order(world: World, queen: Cell, seed: int, where: str) -> list[Cell]:
-    """Return all cells in the order in which ants take those that are free, see `starts`."""
+    """Return all cells, in the order in which ants take the free ones; see `starts`."""
     numbers = {cell: number for number, cell in enumerate(existing_cells(world.ranges))}
 
     def key(cell: Cell) -> tuple[int, int]:

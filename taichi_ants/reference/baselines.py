@@ -1,7 +1,7 @@
-"""The published models of `taichi_ants.baselines`, one colony each, as their rules read.
+"""The published models of `taichi_ants.baselines`, written directly from their rules.
 
-The double bridge of Goss, Aron, Deneubourg and Pasteels, Naturwissenschaften 76 (1989); ant colony
-optimisation; and ants that back up utilities.
+They are the double bridge of Goss, Aron, Deneubourg and Pasteels, Naturwissenschaften 76 (1989);
+ant colony optimisation; and ants that back up utilities. Each model simulates one colony.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ def bridge_choices(
     n: int = 2,
     opens: int = 0,
 ) -> list[bool]:
-    """Return for each ant if it takes the short branch; ants choose in turn at nest and food.
+    """Return whether each ant takes the short branch; ants choose in turn at nest and food.
 
-    `short` and `long` are the steps to cross a branch, `k` and `n` the offset and the exponent of
-    the choice function; the first `opens` ants choose while only the long branch exists.
+    `short` and `long` are the steps to cross a branch; `k` and `n` are the offset and exponent of
+    the choice function. The short branch opens after `opens` ants.
     """
     stream = RandomStream(stream_state(seed, STREAM_BRIDGE, colony))
     marks = {(end, takes_short): 0 for end in (NEST, FOOD) for takes_short in (True, False)}
-    arrivals: dict[int, list[tuple[int, bool]]] = {}  # by step: where, and by which branch
+    arrivals: dict[int, list[tuple[int, bool]]] = {}  # by step: end, and whether by the short one
     taken: list[bool] = []
     for step in range(ants // 2):
         for arrived in arrivals.pop(step, []):
@@ -71,7 +71,7 @@ def tours(
     alpha: int = 1,
     max_steps: int = 100_000,
 ) -> list[list[list[Arc]]]:
-    """The tours of all ants in each iteration; empty for an ant that gave up."""
+    """Return the tours of all ants in each iteration; empty for an ant that gave up."""
     foods = set(listed_cells(world.foods))
     cells = set(existing_cells(world.ranges)) - set(listed_cells(world.obstacles))
     arcs = [(c, h) for c in cells for h in range(N_HEADINGS) if neighbour(c, h) in cells]
@@ -113,7 +113,7 @@ def _tour(
     max_steps: int,
     stream: RandomStream,
 ) -> list[Arc]:
-    """A walk to food without its loops; empty if it takes too long."""
+    """Return a walk to food without its loops; empty if it takes more than `max_steps`."""
     cell, back = queen, -1
     tour: list[Arc] = []
     for _ in range(max_steps):
@@ -156,8 +156,8 @@ class _Ant:
 class UtilityColony:
     """A colony that backs up utilities.
 
-    `utilities` are, by goal "nest" or "food", those of each open cell; `deliveries` the food items
-    that came to the nest in each tick so far.
+    `utilities` has a dictionary by open cell for each of the goals "nest" and "food".
+    `deliveries` are the food items delivered in each tick so far.
     """
 
     def __init__(
@@ -189,7 +189,7 @@ class UtilityColony:
         self.deliveries: list[int] = []
 
     def tick(self) -> None:
-        """Every ant backs up and takes a step, then utilities evaporate."""
+        """Let every ant back up and take a step, then let utilities evaporate."""
         self.deliveries.append(sum(self._step(ant) for ant in self._ants))
         for levels in self.utilities.values():
             for cell in levels:
@@ -217,7 +217,7 @@ class UtilityColony:
         """Return the heading of the ant's step, None if it has to stay."""
         high, low = ant.stream.draw()
         chance = high / 2**32
-        free = {}  # the utility at each heading that can be taken
+        free = {}  # the utility at each heading that the ant can take
         for heading in range(N_HEADINGS):
             cell = neighbour(ant.cell, heading)
             inside = sum(other.cell == cell for other in self._ants)
@@ -238,7 +238,7 @@ class UtilityColony:
         return options[pick(low, len(options))]
 
     def path_length(self) -> int:
-        """Steps to food and back by the highest utilities; 0 if there is no such way."""
+        """Return the steps to food and back by the highest utilities; 0 if there is no such way."""
         cell, total = self._nest, 0
         for goal in ("food", "nest"):
             levels, been = self.utilities[goal], {cell}
@@ -250,7 +250,7 @@ class UtilityColony:
                     return 0
                 if cell in self._goals[goal]:
                     break
-                if cell in been:  # and so again, for ever
+                if cell in been:  # an endless loop
                     return 0
                 been.add(cell)
         return total

@@ -1,4 +1,4 @@
-"""The simulator of the reference: ants in one world, tick by tick."""
+"""The simulator of the reference: a colony of ants in one world, tick by tick."""
 
 from __future__ import annotations
 
@@ -40,39 +40,40 @@ class EpisodeRecord:
     episode_return: int = 0
     ticks: int = 0
     deliveries: int = 0
-    moves: int = 0  # tried
-    blocked: int = 0  # of them
-    first_delivery: int = -1  # ticks passed when the first food item had been delivered
+    moves: int = 0  # attempted
+    blocked: int = 0  # moves that failed
+    first_delivery: int = -1  # number of ticks up to the first delivery; -1 if there is none
     births: int = 0
     deaths: int = 0
     regrown: int = 0
 
 
 class ReferenceColony:
-    """Ants in one world: `begin_episode`, any number of `tick`s, `end_episode`, and again.
+    """A colony in one world. An episode is `begin_episode`, calls of `tick`, and `end_episode`.
 
-    Arguments are those of `Colony`. An ant that is born with a table of its own begins with the
-    initial values, whatever `q_values` are.
+    The arguments are those of `Colony`. If ants have independent tables, a newborn ant starts with
+    the initial value, not with `q_values`.
 
     Attributes:
-        world: The present state of the world, which begins each episode as `start_world`.
-        n_ants: The number of ants that start an episode.
-        pheromone: That of the task; where the task says so, it does not evaporate.
-        ants: The living ants by slot, of which there are `slots`.
-        streams: Of the initial ants; they run on through all episodes.
-        next_number: Of the next ant that comes to those that started.
-        store: Food items that wait with the queen to become ants.
-        queen_stream: Her random stream, which runs on; food that wanders draws from it as well.
+        world: The present state of the world; each episode starts from `start_world`.
+        n_ants: The number of ants at the start of an episode.
+        pheromone: The task's pheromone, without evaporation where the task switches it off.
+        ants: The living ants by slot, 0 to `slots` - 1.
+        streams: The random streams of the initial ants, which continue through all episodes.
+        next_number: The number of the next ant that is added.
+        store: Food items that the queen will turn into ants.
+        queen_stream: The queen's random stream, which continues; wandering food also uses it.
         minds: The tables; see `sharing`.
-        epsilon, learning_rate: Of the present episode, float64.
-        episode: Its number in the run, from 0; -1 before the first.
-        record: Of the present episode, or of the last one between two; `records`: of finished ones.
-        transitions: Of each ant that acted in the last tick, by ascending slot.
-        over: Whether the episode has ended at a delivery; it then takes no further tick.
+        epsilon, learning_rate: Values in the present episode, float64.
+        episode: The number of the episode in the run, from 0; -1 before the first.
+        record: The sums of the present or latest episode.
+        records: The sums of the finished episodes.
+        transitions: The transition of each ant that acted in the last tick, by slot.
+        over: Whether the episode has ended at a delivery; no further tick is possible.
 
     Raises:
-        AntsError: The learner, one of its hyperparameters, the sharing or the observation is
-            unknown, the learner cannot share a table, or the world has too few cells for the ants.
+        AntsError: The learner, a hyperparameter, the sharing or the observation is unknown, the
+            learner cannot share a table, or the world has too few cells for the ants.
     """
 
     def __init__(
@@ -111,7 +112,7 @@ class ReferenceColony:
         self._set_up()
 
     def _set_up(self) -> None:
-        """Put everything that does not outlive an episode where it starts."""
+        """Reset everything that lasts for one episode."""
         self.world = WorldState(self.start_world, self.pheromone)
         self.food_sources = FoodSources(self.start_world)
         self.store = 0
@@ -133,17 +134,17 @@ class ReferenceColony:
 
     @property
     def q_values(self) -> np.ndarray:
-        """A copy of the table, float32 (n_states, 5), or of all, (slots, n_states, 5)."""
+        """A copy of the table, float32 (n_states, 5), or of all tables, (slots, n_states, 5)."""
         tables = np.array([learner.table() for learner in self.minds.tables])
         return tables if self.sharing == "independent" else tables[0]
 
     def observe(self, ant: Ant) -> None:
-        """Let an ant see what is around it now."""
+        """Update the percept and the state index of an ant."""
         ant.percept = observe(self.world, ant)
         ant.state = self._row(self.world, ant)
 
     def begin_episode(self, world: World | None = None) -> None:
-        """Start an episode, in another world if one is given; all else that was learned goes on."""
+        """Start an episode, in another world if one is given; the ants keep what they learned."""
         self.start_world = world or self.start_world
         self.episode += 1
         self._set_up()
@@ -153,7 +154,7 @@ class ReferenceColony:
     def end_episode(self) -> None:
         """End the episode: epsilon and the learning rate decay."""
         training = self._training
-        least = min(training.min_epsilon, training.epsilon)  # a bound never raises what it bounds
+        least = min(training.min_epsilon, training.epsilon)  # the bound never raises epsilon
         self.epsilon = max(least, self.epsilon * training.epsilon_decay)
         least = min(training.min_learning_rate, training.learning_rate)
         self.learning_rate = max(least, self.learning_rate * training.learning_rate_decay)
@@ -161,10 +162,7 @@ class ReferenceColony:
         self.records.append(self.record)
 
     def run_episode(self, ticks: int) -> Iterator[list[Transition]]:
-        """Run an episode of so many ticks, fewer where it ends at a delivery.
-
-        Yield the transitions of each tick.
-        """
+        """Yield the transitions of each tick of an episode of `ticks`, or less if it ends early."""
         self.begin_episode()
         while self.record.ticks < ticks and not self.over:
             self.tick(last=self.record.ticks == ticks - 1)
@@ -172,14 +170,14 @@ class ReferenceColony:
         self.end_episode()
 
     def run(self, episodes: int, ticks: int) -> list[Transition]:
-        """Run episodes, see `run_episode`; return all of their transitions."""
+        """Return all transitions of some episodes; see `run_episode`."""
         ticked = (steps for _ in range(episodes) for steps in self.run_episode(ticks))
         return [step for steps in ticked for step in steps]
 
     def tick(self, last: bool = False) -> None:
-        """Let one tick pass for all; `last` tells whether the episode ends with it."""
+        """Advance the colony by one tick, after which the episode ends if `last`."""
         if self.episode < 0 or self.over:
-            raise AssertionError("there is no episode to go on with; begin one")
+            raise AssertionError("no episode is running; call begin_episode first")
         tick = self.record.ticks
         acting = [self.ants[slot] for slot in sorted(self.ants)]
         before = [copy.copy(ant) for ant in acting]
@@ -227,7 +225,7 @@ class ReferenceColony:
             record.first_delivery = record.ticks + 1
 
     def _births(self) -> None:
-        """Let the queen turn food into ants that face away from her, while slots and cells last."""
+        """Turn stored food into ants that face away from the queen, while there is room."""
         free_slots = (slot for slot in range(self.slots) if slot not in self.ants)
         while self.store > 0:
             around = [neighbour(self.world.queen, heading) for heading in range(N_HEADINGS)]
@@ -242,7 +240,7 @@ class ReferenceColony:
             self.record.births += 1
 
     def new_ant(self, cell: Cell, heading: int, slot: int) -> None:
-        """Put an ant that there was not yet into a slot."""
+        """Add a new ant to a slot and a cell."""
         number = self.next_number
         state = stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number)
         self.add(Ant(cell, heading, slot=slot, number=number, stream=RandomStream(state)))
@@ -250,9 +248,9 @@ class ReferenceColony:
         self.next_number += 1
 
     def _deaths(self, acting: Sequence[Ant]) -> list[Ant]:
-        """Take out the ants that die of age; they observe and learn once more.
+        """Remove and return the ants that die of age, which still observe and learn in this tick.
 
-        A dying ant leaves the food that it carries on its cell.
+        A dying ant leaves its food on its cell.
         """
         lifespan = self.task.life.lifespan
         if lifespan is None:
@@ -271,11 +269,11 @@ class ReferenceColony:
     def _learn(
         self, before: Sequence[Ant], after: Sequence[Ant], events: Sequence[Event], last: bool
     ) -> None:
-        """Draw a' where the learner wants it, by the tables as they stand; then learn."""
+        """Draw the next actions if the learner needs them, by the present tables; then learn."""
         self.transitions = []
         for was, ant, event in zip(before, after, events, strict=True):
             terminated = event is Event.DELIVERED and self.task.delivery == "terminates"
-            # After a delivery that terminates the ant goes on with a choice of its own.
+            # After a delivery that terminates, the ant chooses at the start of its next tick.
             if self.minds.draws_next_action and not terminated:
                 ant.chosen = self._draw_action(ant)
             self.transitions.append(
@@ -302,7 +300,7 @@ class ReferenceColony:
 def beginner(
     world: World, config: TrainingConfig, seed: int, task: Task | None = None
 ) -> ReferenceColony:
-    """Return one ant before its training: the first that the world lists, else by the seed."""
+    """Return a colony of one ant before its training."""
     return ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="independent")
 
 
@@ -314,7 +312,7 @@ def follower(
     task: Task | None = None,
     epsilon: float = 0.0,
 ) -> ReferenceColony:
-    """Return one ant that goes by a table (n_states, 5), before rollout `number` of the seed."""
+    """Return a colony of one ant that follows a table (n_states, 5) in rollout `number`."""
     training = TrainingConfig("q_learning", 1.0, 1.0, epsilon, 1.0)
     colony = ReferenceColony(
         world, task, training, seed, ends_at_delivery=True, sharing="frozen", q_values=q_values

@@ -1,4 +1,4 @@
-"""Where the food of a world belongs: it grows back there, and its piles wander."""
+"""Food sources: cells in which food lies or grows back, in piles that wander."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class FoodSource:
-    """The present place of one food of the start."""
+    """A food source and its present cell."""
 
     cell: Cell
-    waiting_since: int | None = None  # the tick in which the food was taken; None: it is there
+    waiting_since: int | None = None  # the tick in which its food was taken; None if it has food
 
 
 class FoodSources:
-    """The places of all foods of the start, in lexicographic order of their first cells.
+    """The food sources of a world, in lexicographic order of their first cells.
 
-    Food that lies elsewhere, since a dying ant dropped it, has no food source. At most one full
-    food source is on a cell; waiting ones may share it, with each other or with a full one.
+    Food dropped by a dying ant has no food source. A cell has at most one food source with food,
+    and any number of waiting ones.
     """
 
     def __init__(self, world: World) -> None:
@@ -37,9 +37,9 @@ class FoodSources:
     def give(self, cell: Cell) -> None:
         """Note that an intervention put food on a cell.
 
-        The first food source that waits there has its food again. Where there is none, a new food
-        source comes last; it joins the pile of the first food source beside it, else it is a pile
-        of its own.
+        The first waiting food source of the cell gets its food back. If the cell has no food
+        source, a new one is appended. It joins the pile of the first adjacent food source, or
+        forms a new pile.
         """
         here = [source for source in self.food_sources if source.cell == cell]
         if not here:
@@ -56,19 +56,19 @@ class FoodSources:
             here[0].waiting_since = None
 
     def end(self, cell: Cell) -> None:
-        """Note that an intervention put something else on a cell: nothing grows back there."""
+        """Note that an intervention removed the food source of a cell."""
         self.food_sources = [source for source in self.food_sources if source.cell != cell]
         piles = [[source for source in pile if source.cell != cell] for pile in self._piles]
         self._piles = [pile for pile in piles if pile]
 
     def taken(self, cell: Cell, tick: int) -> None:
-        """Note that food was taken from a cell: a full food source there waits from now on."""
+        """Note that food was taken from a cell; its full food source waits from now on."""
         for source in self.food_sources:
             if source.cell == cell and source.waiting_since is None:
                 source.waiting_since = tick
 
     def regrow(self, world: WorldState, delay: int, tick: int) -> int:
-        """Let food grow back on the empty cells of food sources that have waited `delay` ticks.
+        """Let food grow back on empty cells of food sources that have waited `delay` ticks.
 
         Returns:
             The number of food items that grew back.
@@ -84,11 +84,11 @@ class FoodSources:
         return regrown
 
     def wander(self, world: WorldState, stream: RandomStream) -> None:
-        """Move each pile by one cell, in a direction drawn for it.
+        """Move each pile by one cell, in a random direction.
 
-        Foods go one after the other, those in front first, and stay where the cell ahead is not
-        empty. Food sources whose food is missing go along over everything but rocks, queen and the
-        end of the world.
+        Food items move one by one, those in front first, each only if the cell ahead is empty. A
+        food source without food moves too, unless a rock, the queen or the edge of the world is
+        ahead.
         """
         for pile in self._piles:
             high, _ = stream.draw()
@@ -105,14 +105,14 @@ class FoodSources:
 
 
 def _connected(food_sources: list[FoodSource]) -> list[list[FoodSource]]:
-    """The piles: food sources that hang together, in the order of the first of each."""
+    """Return the piles, which are connected food sources, in the order of the first of each."""
     missing = {source.cell: source for source in food_sources}
     piles = []
     for source in food_sources:
         if source.cell not in missing:
             continue
         found = [missing.pop(source.cell)]
-        for member in found:  # grows while it is walked along
+        for member in found:  # the list grows during this loop
             around = (neighbour(member.cell, heading) for heading in range(N_HEADINGS))
             found += [missing.pop(cell) for cell in around if cell in missing]
         piles.append(sorted(found, key=food_sources.index))
@@ -120,7 +120,7 @@ def _connected(food_sources: list[FoodSource]) -> list[list[FoodSource]]:
 
 
 def _front_first(pile: list[FoodSource], heading: int) -> list[FoodSource]:
-    """The food sources of a pile, the foremost in the direction of `heading` first."""
+    """Return the food sources of a pile, the foremost in the direction of `heading` first."""
     dx, dy, dz = HEADING_STEPS[heading]
 
     def progress(source: FoodSource) -> int:

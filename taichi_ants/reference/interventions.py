@@ -1,4 +1,4 @@
-"""Interventions: changes of a world between two ticks."""
+"""Interventions: changes of a colony between two ticks."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from taichi_ants.reference.world_state import Trail
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds.world import World
 
-REACH = 8  # cells that an ant is moved aside at most
+REACH = 8  # the most cells by which an ant is moved aside
 
 
 class Interventions:
-    """Changes a colony that is in an episode; ants look around again after each change.
+    """Changes of a colony during an episode; ants observe again after each change.
 
-    A cell that cannot take what is put there is left as it is. An ant still does the action that it
-    has drawn already. `ants` start each later episode.
+    A cell on which something cannot be placed stays as it is. Actions already drawn are still
+    done. `ants` is the number of ants at the start of later episodes.
     """
 
     def __init__(self, colony: ReferenceColony) -> None:
         self.colony, self.ants = colony, colony.n_ants
         self._stream = RandomStream(stream_state(colony.seed, STREAM_INTERVENTION, 0))
-        self._epsilon: float | None = None  # as they were set
+        self._epsilon: float | None = None  # as an intervention has set them
         self._learning_rate: float | None = None
         self._first = colony.start_world
         self._pheromone = colony.task.pheromone
         self._falls = colony.pheromone.evaporation == self._pheromone.evaporation
         world = colony.start_world
-        # What stands on the cells that are not empty when later episodes begin.
+        # The content of the cells that are not empty when later episodes start.
         self._start: dict[Cell, int] = {world.queen: QUEEN}
         self._start |= dict.fromkeys(listed_cells(world.foods), FOOD)
         self._start |= dict.fromkeys(listed_cells(world.obstacles), OBSTACLE)
@@ -44,9 +44,9 @@ class Interventions:
             self.colony.observe(ant)
 
     def put(self, cells: Sequence[Cell], what: int) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD, now and later, but none with an ant or the queen.
+        """Make cells EMPTY, OBSTACLE or FOOD, now and later, except those of ants and the queen.
 
-        Rock and food move the ants in their way aside first.
+        Rock and food first move ants on these cells aside.
         """
         world = self.colony.world
         if what != EMPTY:
@@ -63,7 +63,7 @@ class Interventions:
         self._observe()
 
     def _move_aside(self, cells: Sequence[Cell]) -> None:
-        """Move the ants on cells to empty ones next to them, where there are any."""
+        """Move the ants on these cells to the nearest empty cells, within REACH."""
         world = self.colony.world
         for x, y, z in sorted(existing_cells((REACH + 1,) * 3)[1:], key=max):
             for cell in cells:
@@ -75,7 +75,7 @@ class Interventions:
                     ant.cell = there
 
     def move_queen(self, cell: Cell) -> None:
-        """Let the queen stand on an empty cell, now and later."""
+        """Move the queen to an empty cell, now and later."""
         world = self.colony.world
         assert world.content(cell) == EMPTY
         for ground in (world.ground, self._start):
@@ -85,7 +85,7 @@ class Interventions:
         self._observe()
 
     def _new_trail(self) -> None:
-        """The same levels, where the rocks are now, under the pheromone that there is now."""
+        """Make a new trail with the same levels, for the present rocks and pheromone."""
         world = self.colony.world
         rocks = [cell for cell, held in world.ground.items() if held == OBSTACLE]
         bare = World(self._first.ranges, world.queen, obstacles=rocks)
@@ -96,7 +96,7 @@ class Interventions:
         world.trail = trail
 
     def lay_trail(self, cells: Sequence[Cell], level: int) -> None:
-        """Set the trail of cells that are no rocks."""
+        """Set the trail of cells other than rocks."""
         world = self.colony.world
         for cell in cells:
             if world.ground[cell] != OBSTACLE:
@@ -104,7 +104,7 @@ class Interventions:
         self._observe()
 
     def add_ants(self, cells: Sequence[Cell], heading: int | None = None) -> None:
-        """Put ants on those cells that are empty; a heading that is not given is drawn."""
+        """Put ants on those of the cells that are empty; draw each heading if none is given."""
         colony = self.colony
         for cell in cells:
             if colony.world.content(cell) != EMPTY:
@@ -118,7 +118,7 @@ class Interventions:
         self._observe()
 
     def remove_ants(self, cells: Sequence[Cell]) -> None:
-        """Take the ants on these cells away, with their food."""
+        """Remove the ants on these cells, with their food."""
         for cell in cells:
             ant = self.colony.world.ants.pop(cell, None)
             if ant is not None:
@@ -126,9 +126,9 @@ class Interventions:
         self._observe()
 
     def set_ants(self, n: int) -> None:
-        """Let n ants live now, and start each later episode.
+        """Set the number of ants, now and at the start of later episodes.
 
-        New ones stand on free cells near the queen, as in `ants.starts`; the latest ones go.
+        New ants take free cells as in `ants.starts`; the highest numbers are removed first.
         """
         colony, world = self.colony, self.colony.world
         self.ants = n
@@ -139,14 +139,14 @@ class Interventions:
         self.add_ants(free[: max(0, n - len(by_number))])
 
     def set_evaporation(self, falls: bool) -> None:
-        """Whether trails evaporate: as the task says, by 1 a tick if it says nothing."""
+        """Switch evaporation on (that of the task, or 1 per tick if it has none) or off."""
         self._falls = falls
         if falls and self._pheromone.evaporation == "none":
             self.set_pheromone(evaporation="linear")
         self.set_pheromone()
 
     def set_pheromone(self, **numbers: Any) -> None:
-        """Other numbers of the pheromone; trails stay as dense as before."""
+        """Change numbers of the pheromone; it stays dense, or not dense."""
         self._pheromone = replace(self._pheromone, **numbers)
         still: dict[str, Any] = {} if self._falls else {"evaporation": "none", "half_life": None}
         now = replace(self._pheromone, **still)
@@ -154,16 +154,16 @@ class Interventions:
         self._new_trail()
 
     def set_epsilon(self, epsilon: float) -> None:
-        """The epsilon of this episode and of all that follow."""
+        """Set epsilon for this and all later episodes."""
         self._epsilon = self.colony.epsilon = epsilon
 
     def set_learning_rate(self, learning_rate: float) -> None:
-        """The learning rate of this episode and of all that follow."""
+        """Set the learning rate for this and all later episodes."""
         self._learning_rate = self.colony.learning_rate = learning_rate
         self.colony.minds.pace(learning_rate)
 
     def begin_episode(self) -> None:
-        """End the episode, and begin the next one as the interventions left the world."""
+        """End the episode, and start the next one in the world as interventions have changed it."""
         colony, first = self.colony, self._first
         colony.end_episode()
         if self._epsilon is not None:

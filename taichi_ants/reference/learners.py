@@ -1,7 +1,6 @@
-"""The twins of the package's learners.
+"""The learners of the package, implemented a second time in plain Python.
 
-All numbers are np.float32, with one rounding per operation; the order of the operations is part of
-the rules.
+All numbers are np.float32, with one rounding per operation; the order of operations matters.
 """
 
 from __future__ import annotations
@@ -21,18 +20,18 @@ if TYPE_CHECKING:
 
 
 class Learner:
-    """A learner, its table of action values, and the memory of its kind.
+    """A learner with its table of action values and its memory.
 
-    A simple learner has its own `next_value`; one with a memory overrides `learn`, and `begin_run`
-    or `begin`.
+    A simple learner overrides `next_value`; a learner with a memory also overrides `learn`, and
+    `begin_run` or `begin`.
 
     Attributes:
-        draws_next_action: Whether a' is drawn before the update, and executed (as SARSA does).
+        draws_next_action: Whether the next action is drawn before the update, as in SARSA.
         shares: Whether all ants of a world can learn into one table: the update is `error` alone.
-        hyperparameters: Those that only this learner has, with their defaults.
-        rows: The table, n_states lists of 5 np.float32, several times faster here than an array.
-        model: The last transition of each visited pair, in the order of first visit; of learners
-            that plan.
+        hyperparameters: The settings that only this learner has, with their defaults.
+        rows: The table, n_states lists of 5 np.float32, which are faster here than an array.
+        model: For learners that plan, the last transition of each visited pair, in the order of
+            first visits.
     """
 
     draws_next_action = False
@@ -42,11 +41,11 @@ class Learner:
     def __init__(
         self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
     ) -> None:
-        """Begin with a copy of a table (n_states, 5) or with `initial_q`; without memories."""
+        """Start with a copy of a table (n_states, 5), or with `initial_q`, and without memories."""
         self.name = config.learner
         given = dict(config.hyperparameters)
         for name in given.keys() - self.hyperparameters.keys():
-            raise AntsError(f"{name!r} is no hyperparameter of the learner {self.name!r}.")
+            raise AntsError(f"{name!r} is not a hyperparameter of {self.name!r}; leave it out.")
         self.settings = {**self.hyperparameters, **given}
         self.learning_rate = np.float32(config.learning_rate)
         self.discount = np.float32(config.discount)
@@ -62,13 +61,13 @@ class Learner:
         return np.array(self.rows, np.float32)
 
     def begin_run(self) -> None:
-        """Make the memory that lives through all episodes."""
+        """Reset the memory that lasts through all episodes."""
 
     def begin(self) -> None:
-        """Make the memory of an episode, at its start."""
+        """Reset the memory that lasts for one episode."""
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        """Learn from a transition, with draws of the ant's stream; return its TD error."""
+        """Return the TD error of a transition, and learn from it; `stream` is that of the ant."""
         error = self.error(step, epsilon)
         self.update(step.pair, self.learning_rate, error)
         return error
@@ -84,7 +83,7 @@ class Learner:
         raise NotImplementedError
 
     def discount_of(self, step: Transition) -> np.float32:
-        """Return the discount of what comes after a step: 0 where it terminated."""
+        """Return the discount of the next state's value, which is 0 if the step terminated."""
         return np.float32(0) if step.terminated else self.discount
 
     def update(self, pair: Pair, weight: np.float32, error: np.float32) -> None:
@@ -94,23 +93,23 @@ class Learner:
 
 
 class QLearning(Learner):
-    """Q-learning (Watkins 1989): the next state is worth its best action's value."""
+    """Q-learning (Watkins 1989): the next state has the value of its best action."""
 
     def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
         return max(self.rows[step.next_state])
 
 
 class Sarsa(Learner):
-    """SARSA (Rummery and Niranjan 1994): the next state is worth the value of the action there."""
+    """SARSA (Rummery and Niranjan 1994): the next state has the value of the next action."""
 
     draws_next_action = True
 
     def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
-        return self.rows[step.next_state][step.next_action or 0]  # none where it terminated
+        return self.rows[step.next_state][step.next_action or 0]  # None if the step terminated
 
 
 class ExpectedSarsa(Learner):
-    """Expected SARSA (van Seijen et al. 2009): the next state is worth the policy's expectation."""
+    """Expected SARSA (van Seijen et al. 2009): the next state has the policy's expected value."""
 
     def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
         q0, q1, q2, q3, q4 = self.rows[step.next_state]
@@ -120,7 +119,7 @@ class ExpectedSarsa(Learner):
 
 
 class DynaQ(QLearning):
-    """Dyna-Q (Sutton 1990): Q-learning, and `planning_steps` updates from pairs of the model."""
+    """Dyna-Q (Sutton 1990): Q-learning, and `planning_steps` updates from its model."""
 
     hyperparameters: ClassVar = {"planning_steps": 5}
 
@@ -133,11 +132,11 @@ class DynaQ(QLearning):
         return error
 
     def remember(self, step: Transition) -> None:
-        """Store a transition; it replaces the one of this pair that was seen before."""
+        """Store a transition, which replaces the previous one of its pair."""
         self.model[step.pair] = step
 
     def draw_seen(self, stream: RandomStream) -> Transition:
-        """Draw one of the transitions of the model."""
+        """Return a random transition of the model."""
         high, _ = stream.draw()
         return list(self.model.values())[pick(high, len(self.model))]
 
@@ -145,7 +144,7 @@ class DynaQ(QLearning):
 class DoubleQ(Learner):
     """Double Q-learning (van Hasselt 2010): one table chooses the best action, the other values it.
 
-    The ants act by the mean of the two.
+    Ants act by the mean of both tables.
     """
 
     shares = False
@@ -170,10 +169,7 @@ class DoubleQ(Learner):
 
 
 class SarsaLambda(Sarsa):
-    """SARSA(lambda) with replacing traces (Singh and Sutton 1996), of which a short list is kept.
-
-    Hence it updates the last pairs of the episode too.
-    """
+    """SARSA(lambda) with replacing traces (Singh and Sutton 1996) for the most recent pairs."""
 
     shares = False
     hyperparameters: ClassVar = {"trace_decay": 0.9, "trace_length": 32}
@@ -194,7 +190,7 @@ class SarsaLambda(Sarsa):
 
 
 class NStepSarsa(Sarsa):
-    """n-step SARSA (Sutton and Barto, chapter 7): targets of n rewards, and a value after them.
+    """SARSA with targets of n rewards and the value after them (Sutton and Barto, chapter 7).
 
     A pair is updated n steps later, or at the end of the episode.
     """
@@ -203,10 +199,10 @@ class NStepSarsa(Sarsa):
     hyperparameters: ClassVar = {"n_steps": 4}
 
     def begin(self) -> None:
-        self._waiting: list[Transition] = []  # for their update, oldest first
+        self._waiting: list[Transition] = []  # transitions without an update yet, oldest first
 
     def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
-        # The error returned is that of one-step SARSA, before the update.
+        # As in the package, the returned error is that of one-step SARSA before the update.
         error = self.error(step, epsilon)
         self._waiting.append(step)
         ends = step.terminated or step.truncated
@@ -220,9 +216,9 @@ class NStepSarsa(Sarsa):
 
 
 class PrioritizedSweeping(DynaQ):
-    """Prioritized sweeping (Moore and Atkeson 1993): plans first where the error is largest.
+    """Prioritized sweeping (Moore and Atkeson 1993): updates pairs with the largest errors first.
 
-    All updates come from the model, that of the present step too.
+    All updates use the model, also the update of the present step.
     """
 
     shares = False
@@ -247,7 +243,7 @@ class PrioritizedSweeping(DynaQ):
         return bool(abs(error) > np.float32(self.settings["threshold"]))
 
     def _sweep(self, pair: Pair, epsilon: float) -> None:
-        """Update a pair; pairs that lead to its state may have got an error by this."""
+        """Update a pair, and the priorities of the pairs that lead to its state."""
         self._priorities[pair] = np.float32(0)
         self.update(pair, self.learning_rate, self.error(self.model[pair], epsilon))
         for before, seen in self.model.items():

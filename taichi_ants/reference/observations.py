@@ -1,4 +1,4 @@
-"""What an ant sees of the cells around it, and the twins of the package's observations."""
+"""The view of an ant, and the observations of the package, implemented a second time."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from taichi_ants.task.constants import (
 )
 
 AHEAD = (-1, 0, 1)  # headings relative to the ant's: left, forward, right
-ANOTHER_ANT = 4  # a code of its own, beside the paper's four
-# Another ant: with the other load on a better cell or not, with the same load on a better one.
+ANOTHER_ANT = 4  # in addition to the paper's four codes
+# Codes of ants: other load on a better cell, other load elsewhere, same load on a better cell.
 BETTER, OTHER, IN_QUEUE = 4, 5, 6
 NOTHING, OBSTACLE, WEAK, MIDDLE, STRONG, GOAL = range(6)
 
 
 def cells_in_view(ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Cell]:
-    """The cells at these headings relative to the ant's."""
+    """Return the cells at these headings relative to the ant's."""
     return [neighbour(ant.cell, ant.heading + turn) for turn in turns]
 
 
 def strongest_in_view(world: WorldState, ant: Ant) -> Level:
-    """The largest trail level of the three cells ahead that count, 0 where none does."""
+    """Return the largest trail level among the cells ahead that count, 0 if none does."""
     counting = [cell for cell in cells_in_view(ant) if world.content(cell) == EMPTY]
     if world.pheromone.view == "strongest_under_carriers":
         others = [world.ants.get(cell) for cell in cells_in_view(ant)]
@@ -40,9 +40,9 @@ def strongest_in_view(world: WorldState, ant: Ant) -> Level:
 
 
 def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
-    """Whether a cell is better than the ant's own for what the ant is about.
+    """Return whether a cell is better for an ant than its own.
 
-    With food that is nearer to the queen, without food a stronger trail.
+    A better cell is nearer to the queen for a carrier, and has a stronger trail for a forager.
     """
     if ant.carries:
         return distance(cell, world.queen) < distance(ant.cell, world.queen)
@@ -50,7 +50,7 @@ def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
 
 
 def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
-    """What each cell looks like, SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
+    """Return the code of each cell: SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
     strongest = 0 if ant.carries else strongest_in_view(world, ant)
     return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
 
@@ -59,7 +59,7 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
     content = world.content(cell)
     if content == (QUEEN if ant.carries else FOOD):
         return SEES_GOAL
-    if content != EMPTY:  # without food the queen too, with food other food
+    if content != EMPTY:  # also the queen for foragers, and food for carriers
         return SEES_OBSTACLE
     if ant.carries:
         lures = is_better(world, ant, cell)
@@ -71,23 +71,23 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
 
 
 def observe(world: WorldState, ant: Ant) -> int:
-    """The percept, the paper's state: load, left, forward, right as a number, 0..127."""
+    """Return the percept, the paper's state: load, left, forward and right as a number, 0..127."""
     left, forward, right = codes_in_view(world, ant)
     return 64 * ant.carries + 16 * left + 4 * forward + right
 
 
 def paper(world: WorldState, ant: Ant) -> int:
-    """The percept itself."""
+    """Return the percept."""
     return ant.percept
 
 
 def more_cells(turns: tuple[int, ...], world: WorldState, ant: Ant) -> int:
-    """The load, then the paper's codes of the cells at these headings relative to the ant's."""
+    """Return the state index of the load and the paper's codes of the cells at these headings."""
     return _number([ant.carries, *codes_in_view(world, ant, turns)], 4)
 
 
 def ants_seen(world: WorldState, ant: Ant) -> int:
-    """The load, then the codes of the cells ahead; another ant is a code of its own."""
+    """Return the state index of the load and the cells ahead; other ants have their own code."""
     codes = [
         ANOTHER_ANT if cell in world.ants else code
         for cell, code in zip(cells_in_view(ant), codes_in_view(world, ant), strict=True)
@@ -96,7 +96,7 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
 
 
 def trail_levels(world: WorldState, ant: Ant) -> int:
-    """The load, then the cells ahead; trails in three levels: thirds of the strongest one."""
+    """Return the state index of the load and the cells ahead; trails have three levels."""
     strongest = strongest_in_view(world, ant)
     codes = []
     for code, cell in zip(codes_in_view(world, ant), cells_in_view(ant), strict=True):
@@ -107,16 +107,16 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
         elif ant.carries:
             codes.append(STRONG if code == SEES_LURE else NOTHING)
         else:
-            # A trail on food, or on the queen's cell, is not seen.
+            # Ants do not see trails under food or the queen.
             level = world.trail.level(cell) if world.content(cell) == EMPTY else 0
             codes.append(_share(level, strongest))
     return _number([ant.carries, *codes], 6)
 
 
 def crowd(queue: bool, world: WorldState, ant: Ant) -> int:
-    """The load, then the codes of the cells ahead; ants with the other load have their own.
+    """Return the state index of the load and the cells ahead; ants with the other load have codes.
 
-    In a `queue`, ants with the same load on a better cell have a code of their own, too.
+    If `queue`, ants with the same load on a better cell have a code, too.
     """
     codes = codes_in_view(world, ant)
     for side, cell in enumerate(cells_in_view(ant)):
@@ -140,7 +140,7 @@ def _share(level: Level, strongest: Level) -> int:
 
 
 def _number(digits: list[int], base: int) -> int:
-    """The number of these digits, the first one the most significant."""
+    """Return the number with these digits, the most significant first."""
     value = 0
     for digit in digits:
         value = base * value + digit
@@ -149,7 +149,7 @@ def _number(digits: list[int], base: int) -> int:
 
 OBSERVATIONS: dict[str, Callable[[WorldState, Ant], int]] = {
     "paper": paper,
-    # From behind left to behind right; then behind.
+    # From back left to back right, in `six_cells` then back.
     "five_cells": partial(more_cells, (-2, -1, 0, 1, 2)),
     "six_cells": partial(more_cells, (-2, -1, 0, 1, 2, 3)),
     "trail_levels": trail_levels,

@@ -1,7 +1,7 @@
-"""Offline learning and off-policy evaluation, plain.
+"""Offline learning and off-policy evaluation in plain Python.
 
-Data are lists of episodes, an episode a list of steps (state, action, reward, next state,
-terminated), all of them Python numbers.
+Data are a list of episodes. An episode is a list of steps (state, action, reward, next state,
+terminated) of Python numbers.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def batch_q_learning(
     sweeps: int,
     initial_q: float,
 ) -> np.ndarray:
-    """Q-learning over all steps in order, some times; float32 (n_states, 5)."""
+    """Return a table of Q-learning, `sweeps` times over all steps; float32 (n_states, 5)."""
     q = np.full((n_states, N_ACTIONS), initial_q, np.float32)
     for _ in range(sweeps):
         for episode in episodes:
@@ -47,7 +47,7 @@ def q_iteration(
     penalty: float = 0.0,
     lowest: float = -np.inf,
 ) -> np.ndarray:
-    """The values of a policy (n_states, 5), or the best ones, in the model of the data; float64."""
+    """Return float64 values (n_states, 5) of a policy, or the best ones, in the data's model."""
     led_to: defaultdict[tuple[int, int], Counter[int]] = defaultdict(Counter)
     rewards: Counter[tuple[int, int]] = Counter()
     counts: Counter[tuple[int, int]] = Counter()
@@ -86,10 +86,10 @@ def importance_sampling(
     discount: float,
     weighted: bool,
 ) -> float:
-    """The per-decision estimate of the value of a policy (n_states, 5).
+    """Return the per-decision estimate of the value of a policy (n_states, 5).
 
-    `behaviour` has the probability of each action that was taken. Once an episode has ended, there
-    is no reward any more, and its weight stays.
+    `behaviour` has the probability of each action that was taken. An episode that has ended has no
+    further rewards, and keeps its weight.
     """
     weights = []
     for episode, chances in zip(episodes, behaviour, strict=True):

@@ -1,6 +1,6 @@
-"""Random streams: splitmix64 in Python's integers.
+"""Random streams: splitmix64 in Python integers.
 
-A stream depends on (seed, purpose, number) alone, so no run disturbs the draws of another.
+A stream depends only on (seed, purpose, number), so runs do not change each other's draws.
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ def _mix(z: int) -> int:
 
 
 def hash_of(*numbers: int) -> int:
-    """A hash of integers, in their order, in 0 .. 2**64 - 1; each is taken modulo 2**64."""
+    """Return a hash of integers in this order, in 0 .. 2**64 - 1; each is taken modulo 2**64."""
     state = 0
     for number in numbers:
         state = _mix(((state ^ number) + _GAMMA) & _MASK_64)
     return state
 
 
-# The first state of a stream, of its seed, its purpose (one of the constants STREAM_*) and number.
+# The first state of a stream, from its seed, purpose (a constant STREAM_*) and number.
 stream_state = hash_of
 
 
 @dataclass(slots=True)
 class RandomStream:
-    """A stream of draws; its state, in 0 .. 2**64 - 1, is all that it is."""
+    """A stream of random draws, defined by its state in 0 .. 2**64 - 1."""
 
     state: int
 
     def draw(self) -> tuple[int, int]:
-        """The high and the low word of the next draw, each in 0 .. 2**32 - 1."""
+        """Return the high and the low word of the next draw, each in 0 .. 2**32 - 1."""
         self.state = (self.state + _GAMMA) & _MASK_64
         bits = _mix(self.state)
         return bits >> 32, bits & _MASK_32
 
 
 def pick(word: int, n: int) -> int:
-    """Turn a random 32-bit word into a choice among 0 .. n - 1."""
+    """Return a choice among 0 .. n - 1 from a random 32-bit word."""
     return (word * n) >> 32

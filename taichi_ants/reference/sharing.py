@@ -1,4 +1,4 @@
-"""How the ants of a world learn: into one table, each into its own, or not at all."""
+"""Sharing: the ants of a world learn into one table, each into its own, or not at all."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from taichi_ants.reference.ants import Pair, Transition
 from taichi_ants.reference.learners import DynaQ, Learner
 from taichi_ants.reference.random_stream import RandomStream
 
-# A table (n_states, 5), or None for zeros -> a learner that begins with a copy of it.
+# Makes a learner from a table (n_states, 5), which it copies; None: the initial value.
 Make = Callable[[np.ndarray | None], Learner]
 
 _ONE = 1 << 32  # TD errors are summed in units of 2**-32
 
 
 class FrozenTable:
-    """One table for all ants, that stays as it is.
+    """One table for all ants, which does not change.
 
-    `tables` are the learners: one, or one for each slot. If it `draws_next_action`, a' is drawn at
-    the end of a tick.
+    `tables` are the learners: one, or one for each slot. If `draws_next_action`, ants draw their
+    next action at the end of a tick.
     """
 
     draws_next_action = False
@@ -32,33 +32,33 @@ class FrozenTable:
         self.tables = [make(q_values)]
 
     def of(self, slot: int) -> Learner:
-        """The learner of the ant in a slot."""
+        """Return the learner of the ant in a slot."""
         return self.tables[0]
 
     def born(self, slot: int) -> None:
         """Note that an ant was born into a slot."""
 
     def pace(self, learning_rate: float) -> None:
-        """Learn at this rate from now on."""
+        """Set the learning rate."""
         for table in self.tables:
             table.learning_rate = np.float32(learning_rate)
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
     ) -> None:
-        """Learn from all transitions of a tick, and note in each its TD error.
+        """Learn from all transitions of a tick, and set the `td_error` of each.
 
-        `streams` are those of the ants, for what learners draw.
+        `streams` are the random streams of the ants, from which learners draw.
         """
 
 
 class SharedTable(FrozenTable):
     """One table into which all ants learn.
 
-    All errors of a tick, and of a round of planning, are errors by the table as it stood before.
-    The n errors of a pair are rounded to multiples of 2**-32, so that their sum is exact, and move
-    its value by 1 - (1 - alpha)**n of their mean: as far as n updates in turn go towards one
-    target. One error alone counts as for a single ant, unrounded.
+    All TD errors of a tick, or of a round of planning, use the table from before it. The n errors
+    of a pair are rounded to multiples of 2**-32, so that their sum is exact. They move the value by
+    1 - (1 - alpha)**n of their mean, as n successive updates towards one target would. A single
+    error is not rounded.
     """
 
     def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
@@ -66,8 +66,8 @@ class SharedTable(FrozenTable):
         [self._common] = self.tables
         if not self._common.shares:
             raise AntsError(
-                f"the learner {self._common.name!r} has no TD error that can be summed over ants, "
-                'so they cannot share its table; make sharing "independent".'
+                f"the ants cannot share the table of the learner {self._common.name!r}, because it "
+                'has no TD error to sum over ants; choose sharing="independent".'
             )
         self.draws_next_action = self._common.draws_next_action
         self._slots = slots
@@ -83,7 +83,7 @@ class SharedTable(FrozenTable):
         for step, error in zip(steps, self._update(steps, epsilon), strict=True):
             step.td_error = error
         if isinstance(self._common, DynaQ):
-            # Of several transitions of one pair the last stored counts: the highest ant number's.
+            # If several ants have the same pair, the model keeps that of the highest number.
             for step in sorted(steps, key=lambda step: (step.pair, step.number)):
                 self._common.remember(step)
             for _ in range(int(self._common.settings["planning_steps"])):
@@ -102,7 +102,7 @@ class SharedTable(FrozenTable):
 
 
 def mean_error(errors: Sequence[np.float32]) -> np.float32:
-    """The mean of TD errors, each rounded to a multiple of 2**-32, rounded once at the end.
+    """Return the mean of TD errors, each rounded to a multiple of 2**-32, rounded once at the end.
 
     The sum must fit into a signed 64-bit integer.
     """
@@ -113,7 +113,7 @@ def mean_error(errors: Sequence[np.float32]) -> np.float32:
 
 
 class IndependentTables(FrozenTable):
-    """A table for each slot, into which the ant in it learns as if alone."""
+    """A table for each slot, into which its ant learns as if it were alone."""
 
     def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
         if q_values is None or q_values.ndim == 2:
@@ -128,7 +128,7 @@ class IndependentTables(FrozenTable):
 
     def born(self, slot: int) -> None:
         learning_rate = self.tables[slot].learning_rate
-        self.tables[slot] = self._make(None)  # initial values, and no memories
+        self.tables[slot] = self._make(None)  # the initial value, and no memory
         self.tables[slot].learning_rate = learning_rate
 
     def learn(

@@ -1,4 +1,4 @@
-"""A world in motion: the ground, the positions of ants, the trails."""
+"""The changing state of a world: ground, positions of ants, and trails."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ Level = int | np.integer | np.float32
 class Trail:
     """The trail of each cell.
 
-    Levels that only fall by 1 per tick, or do not fall, are integers. Those that halve or spread
-    are float32, with every operation rounded.
+    With linear or no evaporation, levels are integers. With exponential evaporation or diffusion,
+    they are float32, and every operation rounds.
     """
 
     def __init__(self, world: World, pheromone: Pheromone) -> None:
@@ -35,7 +35,7 @@ class Trail:
         for x, y, z, level in world.trails.tolist():
             self._levels[self._place[x, y, z]] = level
         if pheromone.diffusion > 0:
-            # Rocks and the outside are walls: all of them stand at one place behind the last cell.
+            # Rocks and the outside are walls, which all have the index behind the last cell.
             wall = len(self._cells)
             around = [
                 [self._place.get(neighbour(cell, heading), wall) for heading in range(N_HEADINGS)]
@@ -45,16 +45,16 @@ class Trail:
             self._n_open = np.count_nonzero(self._around != wall, axis=1).astype(np.float32)
 
     def level(self, cell: Cell) -> Level:
-        """The level of a cell now, 0 where there can be none."""
+        """Return the level of a cell, 0 for a rock."""
         place = self._place.get(cell)
         return 0 if place is None else self._levels[place]
 
     def lay(self, cell: Cell, level: Level) -> None:
-        """Set the level of a cell that is no rock."""
+        """Set the level of a cell other than a rock."""
         self._levels[self._place[cell]] = level
 
     def deposit(self, cell: Cell, carried: int) -> None:
-        """Lay the trail of an ant that has carried its food for so many ticks."""
+        """Deposit the pheromone of an ant that has carried its food for `carried` ticks."""
         place, rule = self._place[cell], self._pheromone
         if rule.deposit == "set":
             self._levels[place] = rule.level
@@ -66,7 +66,7 @@ class Trail:
             )
 
     def tick(self) -> None:
-        """Let one tick pass: the trails evaporate, then spread."""
+        """Let trails evaporate, then spread, for one tick."""
         if self._pheromone.evaporation == "linear":
             self._levels = np.maximum(self._levels - 1, 0)
         elif self._pheromone.evaporation == "exponential":
@@ -77,20 +77,20 @@ class Trail:
 
     def _diffuse(self) -> None:
         shares = self._levels * self._pheromone.share
-        given = shares * self._n_open  # nothing to walls
+        given = shares * self._n_open  # nothing diffuses into walls
         shares_and_wall = np.append(shares, np.float32(0))
         got = np.zeros_like(shares)
         for heading in range(N_HEADINGS):
             got = got + shares_and_wall[self._around[:, heading]]
-        # At rate 1 all is given away, and rounding could leave less than nothing.
+        # With diffusion 1 a cell loses its whole level, and rounding could leave less than 0.
         self._levels = np.maximum((self._levels - given) + got, 0)
 
 
 class WorldState:
-    """The state of a world that ants change, made anew for each episode.
+    """The state of a world in an episode.
 
-    `ground` is EMPTY, OBSTACLE, FOOD or QUEEN for each cell, and EMPTY under `ants`, which are by
-    cell.
+    `ground` maps each cell to EMPTY, OBSTACLE, FOOD or QUEEN; it is EMPTY under ants. `ants` maps
+    cells to ants.
     """
 
     def __init__(self, world: World, pheromone: Pheromone) -> None:
@@ -105,11 +105,11 @@ class WorldState:
         self.trail = Trail(world, pheromone)
 
     def content(self, cell: Cell) -> int:
-        """What a cell looks like: the ground, or an OBSTACLE where an ant stands."""
+        """Return the content of a cell: its ground, or OBSTACLE for an ant or the outside."""
         return OBSTACLE if cell in self.ants else self.ground.get(cell, OBSTACLE)
 
     def index(self, cell: Cell) -> int:
-        """The number of a cell in the flat array with a border of one void cell.
+        """Return the index of a cell in the flat array with a border of one void cell.
 
         The array holds q = x - z from -Z to X and r = y - z from -Z to Y, row by row (r).
         """
