@@ -1,1 +1,1 @@
-"""The engines: they allocate memory, hold the kernels and turn rules into runs."""
+"""The engines, which compile the rules into kernels and run ants."""

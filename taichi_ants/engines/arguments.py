@@ -1,4 +1,4 @@
-"""Launches of kernels on argument packs: arrays and numbers as one argument."""
+"""Kernel launches with argument packs: arrays and numbers as one argument."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from taichi_ants import runtime
 
 
 class Launch:
-    """A kernel whose one argument is a pack, in which it finds values by their names.
+    """A kernel whose one argument is a pack of named values.
 
-    For each launch Taichi looks at every array anew, 10 microseconds each; here, on the CPU, once.
-    It takes over a millisecond to make a pack, so that it is kept until its Taichi ends.
+    Taichi spends 10 microseconds per array on each launch. On the CPU this class spends them once.
+    A pack takes over a millisecond to make, so it is reused until Taichi is reset.
 
-    `kernel_of` returns the kernel of a type of pack: with NumPy arrays, on which kernels work in
-    place; whole numbers, i32, or u64 if they are `np.uint64`; and floats, f32.
+    `kernel_of` returns the kernel for a pack type. Packs contain NumPy arrays, which kernels change
+    in place; whole numbers, as i32, or u64 for `np.uint64`; and floats, as f32.
     """
 
     def __init__(self, kernel_of: Callable[[Any], Callable[[Any], None]]) -> None:
         self._kernel_of = kernel_of
-        self._taichi: Any = lambda: None  # in which the launch was prepared
-        # No reference to its program, which would outlive a reset of Taichi.
+        self._taichi: Any = lambda: None  # the Taichi runtime for which the launch was prepared
+        # Not a reference to its program, which would outlive a reset of Taichi.
         self._compiled: Any = None
         self._kernel: Any
         self._context: Any
         self._pack: Any
-        self._known: dict[str, Any] = {}  # the values that the pack and the context have
+        self._known: dict[str, Any] = {}  # the present values of the pack and the context
 
     def __call__(self, values: Mapping[str, Any]) -> None:
-        """Launch on these values, arrays C-contiguous; names and types stay the same."""
+        """Launch with these values; names and types are always the same, arrays C-contiguous."""
         if self._taichi() is not ti.lang.impl.get_runtime():
-            runtime.start()  # somebody may have reset Taichi
+            runtime.start()  # the caller may have reset Taichi
             self._prepare(values)
         for name, value in values.items():
             if self._known[name] is not value:
@@ -48,12 +48,12 @@ class Launch:
             ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
-        """Compile the kernel, as Taichi would; elsewhere than on the CPU Taichi launches it."""
+        """Compile the kernel and make its pack, as Taichi would; on a GPU Taichi launches it."""
         kind = _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
         self._kernel = self._kernel_of(kind)
         taichi = ti.lang.impl.get_runtime()
         program, kernel = taichi.prog, self._kernel._primal
-        # As `kind(**values)`, which makes two packs.
+        # `kind(**values)` would make two packs.
         self._pack = pack = _Pack(kind.members, kind.dtype, dict(values))
         memory = pack._ArgPack__argpack
         finalize(pack, _delete, ref(taichi), memory).atexit = False
@@ -63,16 +63,16 @@ class Launch:
         self._context = one.make_launch_context()
         self._context.set_arg_argpack((0,), memory)
         on_cpu = program.config().arch in (ti.x64, ti.arm64)
-        self._compiled = compiled if on_cpu else None  # else arrays move for each launch
-        # Arrays of a pack are arguments of their own behind it, which the context lacks.
+        self._compiled = compiled if on_cpu else None  # a GPU copies arrays at each launch
+        # The context needs the arrays as further arguments after the pack.
         arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
         self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
         self._known = dict.fromkeys(values)
         self._taichi = ref(taichi)
 
     def _set(self, name: str, value: Any) -> None:
-        """Tell Taichi of a value that may have changed."""
-        # Each value that is told again would cost Taichi some bytes for good.
+        """Pass a value to Taichi that may have changed."""
+        # Taichi leaks some bytes for each value that is set again.
         known = self._pack[name]
         if known is not value and (isinstance(value, np.ndarray) or known != value):
             self._pack[name] = value
@@ -87,11 +87,11 @@ class _Pack(ArgPack):
     """A pack whose memory is deleted by `_delete`."""
 
     def __del__(self) -> None:
-        """Not as Taichi, which would delete that of a program that is gone, and end the process."""
+        """Do nothing; Taichi would crash if its program no longer exists."""
 
 
 def _delete(taichi: ref, memory: Any) -> None:
-    """Delete the memory of a pack, if the Taichi that it was made in still runs."""
+    """Delete the memory of a pack if its Taichi runtime is still active."""
     running = ti.lang.impl.get_runtime()
     program = getattr(running, "prog", None)
     if taichi() is running and program is not None:
@@ -99,7 +99,7 @@ def _delete(taichi: ref, memory: Any) -> None:
 
 
 def _kind(value: Any) -> tuple[str, int]:
-    """The name of a type of Taichi's, and the dimensions of an array, 0 for a number."""
+    """Return the name of a Taichi type, and the number of dimensions, 0 for a number."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype.kind}{8 * value.dtype.itemsize}", value.ndim
     if isinstance(value, np.uint64):

@@ -1,8 +1,8 @@
-"""The memory layout that engines and kernels share: names of columns and rows, and cells packed.
+"""The memory layout of engines and kernels: names of columns and rows, and packed cells.
 
-A packed cell is one i32, so that one load tells all of it: the stored trail (0 or more) if it is
-empty, else its ground less 16, which is negative; its lower four bits still show how the cell
-looks. No Taichi here.
+A packed cell is one i32, so that kernels load it at once. An empty cell stores its trail, 0 or
+more. Other cells store their ground - 16, which is negative and has the ground in its lower four
+bits. This module does not import Taichi.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from taichi_ants.learners.learner import Memory
 from taichi_ants.task.constants import EMPTY, N_ACTIONS
 from taichi_ants.worlds.world import World
 
-# The settings of a run, columns in front of the hyperparameters of its learner.
+# The settings of a run: columns before the hyperparameters of its learner.
 SETTINGS = (
     *("discount", "epsilon_decay", "least_epsilon"),
     *("learning_rate_decay", "least_learning_rate"),
@@ -26,11 +26,11 @@ SETTINGS = (
 N_SETTINGS = len(SETTINGS)
 DISCOUNT, EPSILON_DECAY, MIN_EPSILON, LEARNING_RATE_DECAY, MIN_LEARNING_RATE = range(N_SETTINGS)
 
-# What the episodes of a run give.
+# The outcomes of an episode.
 OUTCOMES = ("returns", "steps", "deliveries")
 RETURNS, STEPS, DELIVERIES = range(len(OUTCOMES))
 
-# The columns of a trace, one row a step; the fields of `Trace` of these names.
+# The columns of a trace, which has one row per step, by the names of fields of `Trace`.
 TRACE = (
     *("episodes", "steps", "cells", "headings", "percepts", "states", "actions", "rewards"),
     *("next_percepts", "next_states", "terminated", "events"),
@@ -38,10 +38,10 @@ TRACE = (
 
 
 class Command(IntEnum):
-    """What an ant of a batch is told to do."""
+    """The command to an ant of batched environments."""
 
     STEP = 0
-    BEGIN = auto()  # an episode
+    BEGIN = auto()  # start an episode
     WAIT = auto()
 
 
@@ -49,20 +49,20 @@ _OCCUPIED = 16
 
 
 def pack_cells(world: World) -> np.ndarray:
-    """The cells of a world at the start of an episode, i32 (grid.size,)."""
+    """Return the packed cells of a world at the start of an episode, i32 (grid.size,)."""
     ground = world.ground()
     packed = np.where(ground == EMPTY, world.trail_levels(), ground.astype(np.int32) - _OCCUPIED)
     return np.ascontiguousarray(packed, dtype=np.int32)
 
 
 def unpack_cells(packed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What packed cells (n,) hold, uint8 (n,), and the trails that are stored there, int32 (n,)."""
+    """Return the ground, uint8 (n,), and the stored trails, int32 (n,), of packed cells (n,)."""
     ground = np.where(packed >= 0, EMPTY, packed + _OCCUPIED).astype(np.uint8)
     return ground, np.maximum(packed, 0)
 
 
 def compass_of(grid: AxialGrid) -> np.ndarray:
-    """Index steps and turns by heading, and set bits, i32 (294,); laid out as `rules.actions`."""
+    """Return index steps and turns by heading, and set bits, i32 (294,); see `rules.actions`."""
     headings = np.arange(N_HEADINGS)
     steps = grid.offsets[(np.arange(N_HEADINGS + 2) - 1) % N_HEADINGS]
     turns = [(headings + by) % N_HEADINGS for by in (-1, 0, 1, 0, 0)]
@@ -74,8 +74,8 @@ def compass_of(grid: AxialGrid) -> np.ndarray:
 
 
 def padded(memory: Memory) -> Memory:
-    """A memory of which kernels can address many, one behind the other.
+    """Return a memory with sizes rounded up to multiples of 8, for kernels with an array of them.
 
-    Counted by 8: compilers then know that neighbouring addresses differ in their last bits alone.
+    Compilers then know that neighbouring addresses differ only in their last bits.
     """
     return replace(memory, floats=-(-memory.floats // 8) * 8, integers=-(-memory.integers // 8) * 8)

@@ -1,7 +1,7 @@
-"""Checks learners from outside of the package before a kernel takes them up.
+"""The plugin check: tests of learners from outside the package before kernels include them.
 
-Taichi's compiler ends the process at what it does not expect, and compiled code where it reads
-outside an array. So a learner is compiled, and learns a thousand steps, in a forked process first.
+Taichi's compiler can crash on unexpected code, and compiled code can crash when it reads outside an
+array. So a new learner is first compiled in a forked process, in which it learns for 1000 steps.
 """
 
 import faulthandler
@@ -20,19 +20,19 @@ from taichi_ants.learners import registry
 from taichi_ants.learners.learner import Learner
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
-_SECONDS = 30  # until a check is stopped; it takes less than one
+_SECONDS = 30  # time limit of a check, which takes less than one second
 _UPDATES = 1000
-_STATES = 128  # rows of the tables of a check
+_STATES = 128
 
 
 @cache
 def checked_plugin(learner: Learner) -> Learner:
-    """The learner; AntsError if one from outside of the package does not pass the plugin check."""
+    """Return the learner; AntsError if it does not pass the plugin check."""
     if learner.name in registry.BUILT_IN:
         return learner
     arch = runtime.start().arch
-    # A forked process has neither the GPU nor the fields of this one. That macOS lets a fork go on
-    # is not sure, and Windows has none.
+    # A forked process cannot use the GPU or the fields of this one. Forks are unreliable on macOS
+    # and missing on Windows.
     apart = sys.platform == "linux" and arch == "cpu" and not runtime.holds_data()
     fault = _fault_apart(learner) if apart else _fault_of(learner, False)
     if fault:
@@ -41,10 +41,10 @@ def checked_plugin(learner: Learner) -> Learner:
 
 
 def _fault_apart(learner: Learner) -> str:
-    """What is wrong, found out in a forked process; empty if nothing is."""
+    """Return the fault that a check in a forked process finds, or an empty string."""
     reader, writer = os.pipe()
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # Python's, of a fork beside threads
+        warnings.simplefilter("ignore", DeprecationWarning)  # Python warns of forks with threads
         child = os.fork()
     if child == 0:
         _check_in_child(learner, writer)
@@ -59,12 +59,12 @@ def _fault_apart(learner: Learner) -> str:
         _, status = os.waitpid(child, 0)
     code = os.waitstatus_to_exitcode(status)
     if code == -signal.SIGALRM:
-        return f"it does not come to an end within {_SECONDS} seconds"
-    return fault if code == 0 else "it ends the process, as an index outside of an array does"
+        return f"it does not finish within {_SECONDS} seconds"
+    return fault if code == 0 else "it crashes, for example with an index outside an array"
 
 
 def _check_in_child(learner: Learner, writer: int) -> None:
-    """Write what is wrong and end, with 0 if it came to that; whatever happens, do it silently."""
+    """Write the fault and end the process silently, with exit status 0 if the check completed."""
     import resource
 
     try:
@@ -82,10 +82,10 @@ def _check_in_child(learner: Learner, writer: int) -> None:
 
 
 def _fault_of(learner: Learner, wide: bool) -> str:
-    """Learn from a thousand steps with the memory of a second run; that of the first must stay.
+    """Return the fault of a learner that learns for 1000 steps, or an empty string.
 
-    If `wide`, action values are up to ten thousand of either sign at the start, to find an index
-    that depends on them and is right only while they are small.
+    The learner uses the memory of the second of two runs; that of the first must not change. If
+    `wide`, initial action values range from -10 000 to 10 000, to find indices that depend on them.
     """
     import taichi as ti
 
@@ -102,17 +102,17 @@ def _fault_of(learner: Learner, wide: bool) -> str:
     try:
         _learn_by(learner, [array.reshape(-1) for array in arrays], more, sizes)
     except Exception as error:
-        # Assertions of the user's own hold in Taichi's debug mode only, not where it trains.
+        # Only Taichi's debug mode checks the user's own assertions; training ignores them.
         theirs = isinstance(error, ti.TaichiAssertionError) and "Out of bound" not in str(error)
         return "" if theirs else last_line(error)
     stays = all(map(np.array_equal, before, [array[0] for array in arrays]))
-    return "" if stays else "it writes outside of the memory of its run, which begins at `at`"
+    return "" if stays else "it writes outside the memory of its run, which begins at `at`"
 
 
 def _learn_by(
     learner: Learner, arrays: list[np.ndarray], hyperparameters: np.ndarray, sizes: tuple
 ) -> None:
-    """Many steps of the second of two runs, in episodes of fifty or less."""
+    """Learn for 1000 steps of the second of two runs, in episodes of at most 50 steps."""
     import taichi as ti
 
     from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates
@@ -156,15 +156,15 @@ def _learn_by(
 
 
 def last_line(error: Exception) -> str:
-    """What Taichi says, without the place in the source around it."""
+    """Return Taichi's error message in one line, without the place in the source."""
     lines = str(error).splitlines()
     for line in lines:
         outside = re.search(
             r"Out of bound access to a \[(\d+)\] matrix with index \[(-?\d+)\]", line
         )
         if outside:
-            return "it takes entry {1} of a vector of {0}".format(*outside.groups())
+            return "it uses index {1} of a vector of length {0}".format(*outside.groups())
         if "Out of bound" in line:
-            return "it uses an index outside of an array"
+            return "it uses an index outside an array"
     said = [line for line in lines if line.strip()] or [type(error).__name__]
     return said[-1].strip().rstrip(".?").rsplit("Error: ", 1)[-1]

@@ -1,4 +1,4 @@
-"""What the engines return: named arrays that print on one screen and can be compared."""
+"""Records: named arrays that the engines return, with short output and comparison by content."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from taichi_ants.grid.hexgrid import AxialGrid
 
 
 class Record:
-    """Base of dataclasses of arrays; to be used with `eq=False, repr=False`.
+    """Base of dataclasses of arrays, which use `eq=False, repr=False`.
 
-    Two are equal if all their fields are that are not marked `compare=False`: arrays by type, shape
-    and content, where NaN equals NaN. Arrays can be written to, so records have no hash.
+    Two records are equal if all fields without `compare=False` are equal: arrays by type, shape and
+    content, where NaN equals NaN. Records have no hash, because their arrays are writable.
     """
 
     __hash__ = None  # type: ignore[assignment]
@@ -33,13 +33,13 @@ class Record:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Snapshot(Record):
-    """One world at one moment, as `taichi_ants.rendering` draws it.
+    """The state of one world at one time, which `taichi_ants.rendering` draws.
 
     Attributes:
         ground: uint8 (grid.size,), EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
         trail: int32 or float32 (grid.size,), trail levels.
-        ant_cells, ant_headings: int32 (n,), flat indices of the living ants, and 0 to 5.
-        ant_carries: bool (n,).
+        ant_cells, ant_headings: int32 (n,), flat cell indices and headings of the living ants.
+        ant_carries: bool (n,), whether each ant carries food.
     """
 
     grid: AxialGrid
@@ -51,7 +51,7 @@ class Snapshot(Record):
 
 
 def same(one: object, other: object) -> bool:
-    """Whether two values, arrays or not, are equal; NaN equals NaN in arrays."""
+    """Return whether two values, arrays or not, are equal; NaN equals NaN in arrays."""
     if not isinstance(one, np.ndarray) or not isinstance(other, np.ndarray):
         return not isinstance(one, np.ndarray) and type(one) is type(other) and one == other
     floats = one.dtype.kind == "f"
@@ -59,7 +59,7 @@ def same(one: object, other: object) -> bool:
 
 
 def _described(value: object) -> str:
-    """An array by its type, shape and range; a record indented; all else as messages show it."""
+    """Return a summary of an array, an indented record, or another value as messages show it."""
     if isinstance(value, Record):
         return repr(value).replace("\n", "\n    ")
     if not isinstance(value, np.ndarray):

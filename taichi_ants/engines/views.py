@@ -1,4 +1,4 @@
-"""The view of an ant, as observations read it, in kernels."""
+"""The view of an ant in kernels, from which observations compute state indices."""
 
 from collections.abc import Callable
 from functools import cache
@@ -16,7 +16,7 @@ from taichi_ants.task.rules.vision import see_carrying, see_foraging, state_inde
 
 @cache
 def view_type(observation: Observation, dense: bool) -> Any:
-    """The struct that `encode` reads, levels as f32 if dense; vectors go by the cells in view."""
+    """Return the struct type for `encode`: vectors over cells in view, levels f32 if dense."""
     n = len(observation.cells)
     level = ti.f32 if dense else ti.i32
     of_cells = ti.types.vector(n, ti.i32)
@@ -34,11 +34,10 @@ def view_type(observation: Observation, dense: bool) -> Any:
 
 @ti.func
 def judge(half: ti.template(), view: ti.template(), observation: ti.template()):
-    """Complete a view, whose codes say what the cells hold so far."""
+    """Complete a view: replace the ground in `codes` by the paper's codes, and set the percept."""
     left, forward, right = ti.static(observation.ahead)
     for k in ti.static(range(len(observation.cells))):
-        # No branch: Taichi cannot compile one that is of no use, where an observation reads no
-        # codes.
+        # Not a branch: Taichi cannot compile an unused one, if an observation reads no codes.
         view.codes[k] = ti.select(
             view.carries == 1,
             see_carrying(view.codes[k], view.nearer[k]),
@@ -56,7 +55,7 @@ def judge(half: ti.template(), view: ti.template(), observation: ti.template()):
 
 @cache
 def encode_function(observation: Observation) -> Callable[..., Any]:
-    """`encode` of an observation for kernels; AntsError if Taichi cannot compile it."""
+    """Return an observation's `encode` for kernels; AntsError if Taichi cannot compile it."""
     encode, view_of = ti.func(observation.encode), view_type(observation, False)
 
     @ti.kernel

@@ -241,12 +241,12 @@ REFUSED = [
     (of_nothing, "returns nothing"),
     (of_a_truth, "returns a value of the type bool where"),
     (of_an_expression_in_integers, "returns a number of the type i32"),
-    (of_a_constant_too_far, "it ends the process"),
-    (of_an_action_too_far, "used: it takes entry 5 of a vector of 5; see"),
-    (of_one_too_low, "used: it takes entry -1 of a vector of 5; see"),
-    (of_its_own_value, "as an index outside of an array does"),
-    (of_a_large_next_value, "of a vector of 5; see"),
-    (of_a_division_by_zero, "it ends the process"),
+    (of_a_constant_too_far, "it crashes, for example with"),
+    (of_an_action_too_far, "used: it uses index 5 of a vector of length 5; see"),
+    (of_one_too_low, "used: it uses index -1 of a vector of length 5; see"),
+    (of_its_own_value, "with an index outside an array; see"),
+    (of_a_large_next_value, "of a vector of length 5; see"),
+    (of_a_division_by_zero, "it crashes, for example with"),
     (of_itself, "recursion"),
     (of_a_global_array, "valid indices"),
     (of_round, "round"),
@@ -282,7 +282,7 @@ def that_never_ends(value, reward, discount, next_values, next_action, epsilon):
 def test_one_that_never_ends_is_stopped(monkeypatch):
     monkeypatch.setattr(plugin_check, "_SECONDS", 2)
     register(td_learner("mine", that_never_ends))
-    with pytest.raises(AntsError, match="'mine' cannot be used: it does not come to an end within"):
+    with pytest.raises(AntsError, match="'mine' cannot be used: it does not finish within"):
         in_runs()
 
 
@@ -400,8 +400,8 @@ def of_one_value(memory: ti.template(), at, step, rates, random_state):
 @pytest.mark.parametrize(
     ("function", "says"),
     [
-        (that_forgets_at, "it writes outside of the memory of its run"),
-        (beyond_its_memory, "it uses an index outside of an array"),
+        (that_forgets_at, "it writes outside the memory of its run"),
+        (beyond_its_memory, "it uses an index outside an array"),
         (of_one_value, "Cannot unpack"),
     ],
 )
@@ -468,7 +468,7 @@ def test_a_learner_that_has_come_to_need_more_memory(tmp_path):
     train(paper(), with_momentum(0.5), 0, 2, 50).save(tmp_path / "x.npz")
     registry._LEARNERS.clear()
     register(with_memory(memory=lambda settings, n_states: Memory(floats=9, integers=1)))
-    with pytest.raises(AntsError, match="'mine' has come to need more memory than when"):
+    with pytest.raises(AntsError, match="'mine' needs more memory than when"):
         continue_training(TrainingResult.load(tmp_path / "x.npz"), 1)
 
 

@@ -1,1 +1,1 @@
-"""Worlds of many ants that act and learn in lockstep, tick by tick."""
+"""The engine of colonies: many ants in one or many worlds, tick by tick."""

@@ -1,4 +1,4 @@
-"""The colony: many ants in one world, in many worlds at once."""
+"""The colony: many ants in one world, or in each of many worlds."""
 
 from __future__ import annotations
 
@@ -20,37 +20,37 @@ Progress = Callable[[float], None]
 
 
 class Colony(ColonyState):
-    """Colonies of ants, one in each of W worlds, that act and learn in lockstep.
+    """Colonies of ants, one in each of W worlds, that act and learn tick by tick.
 
-    A colony depends on its world, its configurations and its seed alone: not on the other worlds,
-    the number of threads or the schedule.
+    A colony depends only on its world, configuration and seed, not on the other worlds, the number
+    of threads or the schedule.
 
     Args:
-        world: One world for all seeds, or one for each, of the same ranges.
-        task: The rules of the game; None is the paper's. Colonies that learn have its evaporation
-            in training, others that in evaluation.
-        training: The learner and its settings. None, with sharing "frozen": ants do what `act` is
-            given, and there are no action values.
+        world: One world for all seeds, or one per seed, all with the same ranges.
+        task: The rules; None for those of the paper. Colonies that learn use its evaporation in
+            training, others its evaporation in evaluation.
+        training: The learner and its settings. None, with sharing "frozen": you give the actions
+            with `act`, and there are no action values.
         seeds: One seed for each of the W worlds.
-        ants: How many start each episode, 1 to 2**24: the listed ants of the World first.
-        capacity: How many ants can live at once. None: `ants` if none are born, else 2 * `ants` +
-            64.
-        start: Where ants start that the World does not list: "nest", on the free cells nearest to
-            the queen; "spread", on free cells anywhere. The seed decides which, and the headings.
+        ants: Number of ants at the start of an episode, 1 to 2**24. The ants that the world lists
+            are the first.
+        capacity: Largest number of living ants. None: `ants` without births, else 2 * `ants` + 64.
+        start: Start cells of ants that the world does not list: "nest" for the free cells nearest
+            to the queen, "spread" for free cells anywhere. The seed decides ties and headings.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
-            alone. Only for one ant, without births.
-        sharing: "shared": one table for all ants of a world, for learners with a TD error.
-            "independent": one, and a memory of the learner, for each slot. "frozen": nobody learns.
-        q_values: Action values to start from, float (n_states, 5) or (W, n_states, 5); None: zeros,
-            but if nobody learns they must be given, unless `training` is None. If tables are not
-            shared, (W, slots, n_states, 5) too.
+            alone. Requires one ant and no births.
+        sharing: "shared" for one table per world, for learners with a TD error; "independent" for
+            one table and memory per slot; "frozen" for no learning.
+        q_values: Initial action values, float (n_states, 5), (W, n_states, 5) or, without sharing,
+            (W, slots, n_states, 5). None: the initial value of `training`. Required for sharing
+            "frozen" with a `training`.
         threads, arch: As in `train`.
-        schedule: "by_world" hands worlds to threads, "by_chunk" groups of ants; None chooses by
-            size. Both give the same numbers; by chunk, ants are stored in another order.
+        schedule: "by_world" distributes worlds to threads, "by_chunk" groups of ants; None chooses
+            by size. Both give the same numbers, with ants stored in different orders.
 
     Raises:
-        AntsError: An argument is not allowed; the learner needs what a colony, or a shared table,
-            does not have; or a world has too few free cells for the ants.
+        AntsError: An argument is not allowed, the learner does not work in a colony or with a
+            shared table, or a world has too few free cells for the ants.
     """
 
     @cached_property
@@ -60,12 +60,11 @@ class Colony(ColonyState):
     def begin_episode(
         self, length: int | None = None, world: World | Sequence[World] | None = None
     ) -> None:
-        """Set worlds and ants to their start; the ants look around.
+        """Reset worlds and ants to the start of an episode, and let the ants observe.
 
         Args:
-            length: How many ticks there will be, for learners that need to know which tick is the
-                last.
-            world: As of the class: where the colonies live from now on. None: where they are.
+            length: Number of ticks of the episode, for learners that update at the last tick.
+            world: The new worlds, as in the class; None keeps the present ones.
 
         Raises:
             AntsError: A world is not allowed.
@@ -80,15 +79,15 @@ class Colony(ColonyState):
         self._stepper.launch(self, "begin_phases")
 
     def begin_some(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
-        """Let some worlds, bool (W,), begin their next episode, while the others go on with theirs.
+        """Start the next episode of some worlds, bool (W,), while the others continue.
 
-        For these it is as `end_episode` and `begin_episode`; epsilon and the learning rate stay.
-        With `seeds`, one for each of these worlds, they begin a new life, as in a new `Colony`;
-        tables and memories of learners go on. Such seeds may repeat, but then `save` refuses the
-        colony.
+        For these worlds it does the same as `end_episode` and `begin_episode`, but does not change
+        epsilon and the learning rate. With `seeds`, one for each of these worlds, they restart as
+        in a new `Colony`, except that tables and memories of learners are kept. Seeds may repeat,
+        but then `save` raises an error.
 
         Raises:
-            AntsError: There are other numbers of worlds or seeds, or a seed is not allowed.
+            AntsError: The number of worlds or seeds is wrong, or a seed is not allowed.
         """
         which = array_of("which", which)
         if which.dtype != bool or which.shape != (len(self.seeds),):
@@ -102,43 +101,44 @@ class Colony(ColonyState):
             checked = [seed for one in listed for seed in checks.checked_seeds(one)]
             if len(checked) != np.count_nonzero(which):
                 n = np.count_nonzero(which)
-                raise AntsError(f"there are {len(checked)} seeds for {n} worlds.")
+                raise AntsError(f"there are {len(checked)} seeds for {n} worlds; give {n}.")
             self.reseed(which, checked)
         self.begin(which)
         self._stepper.launch(self, "begin_phases")
 
     def observe(self) -> None:
-        """Let the ants see what interventions have changed since the last tick."""
+        """Let all ants observe again, after interventions since the last tick."""
         self.check_begun()
         self._stepper.launch(self, "intervention_phases")
 
     def tick(self, n: int = 1) -> None:
-        """Let n ticks pass; worlds whose episode has ended stand still."""
+        """Advance by n ticks, except worlds whose episode has ended."""
         self.check_begun()
         if self.is_given_actions:
             raise AntsError(
-                "training is None, so nobody chooses; give the actions of each tick to act."
+                "training is None, so ants do not choose actions; call act with the actions of "
+                "each tick instead."
             )
         for _ in self._stepper.pieces(self, checked_whole("n", n)):
             pass
 
     def act(self, actions: np.ndarray) -> None:
-        """Let one tick pass in which each ant does what is given; for colonies without training.
+        """Advance by one tick in which ants take given actions; for colonies without a training.
 
-        Actions are whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give; those
-        of vacant slots, and of worlds whose episode has ended, are ignored. AntsError if no episode
-        has begun, the colony has a training, or an action is not allowed.
+        Actions are whole numbers 0 to 4 (W, capacity): left, forward, right, pick up, give. Those
+        of vacant slots and of worlds whose episode has ended are ignored. AntsError if no episode
+        has started, the colony has a training, or an action is not allowed.
         """
         self.check_begun()
         if not self.is_given_actions:
             raise AntsError(
-                "this colony has a training by which ants choose; call tick, or make it with "
-                'training=None and sharing="frozen".'
+                "the ants of this colony choose actions by its training; call tick instead, or "
+                'make a colony with training=None and sharing="frozen".'
             )
         given, shape = array_of("actions", actions), (len(self.seeds), self.capacity)
         if given.dtype.kind not in "iu" or given.shape != shape:
             raise AntsError(
-                f"actions is {shown(given)}; give whole numbers of shape {shape}, one a slot."
+                f"actions is {shown(given)}; give whole numbers of shape {shape}, one per slot."
             )
         if given.min() < 0 or given.max() >= N_ACTIONS:
             given = np.where(self.living, given, 0)
@@ -152,7 +152,7 @@ class Colony(ColonyState):
         self._stepper.advance(self, 1)
 
     def end_episode(self) -> None:
-        """Keep the streams of the ants that start an episode; epsilon and learning rate decay."""
+        """End the episode: save random streams for the next one, and decay epsilon and the rate."""
         self.check_finite()
         self.keep_streams()
         self.epsilon = self.training.next_epsilon(self.epsilon)
@@ -165,12 +165,11 @@ class Colony(ColonyState):
         progress: Progress | None = None,
         worlds: Sequence[World | Sequence[World]] | None = None,
     ) -> ColonyEpisodes:
-        """Whole episodes of a fixed number of ticks.
+        """Return the results of whole episodes with a fixed number of ticks.
 
         Args:
-            progress: Called now and then with the share of the work that is done.
-            worlds: Of each episode, see `begin_episode`; None: all take place where the colonies
-                are.
+            progress: A function that is called with the share of the work done, 0 to 1.
+            worlds: The `world` of `begin_episode` for each episode; None keeps the present worlds.
         """
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
@@ -192,7 +191,7 @@ class Colony(ColonyState):
         )  # fmt: skip
 
     def _checked_places(self, worlds: Any, episodes: int) -> Sequence[Any]:
-        """The worlds of each episode, all of them allowed; None where the colonies stay."""
+        """Return the worlds of each episode after checks; None to keep the present ones."""
         if worlds is None:
             return [None] * episodes
         if not isinstance(worlds, (list, tuple)) or len(worlds) != episodes:
@@ -203,11 +202,11 @@ class Colony(ColonyState):
         for place in worlds:
             several = checked_worlds(place, len(self.seeds), self.learns)
             for one, seed in dict.fromkeys(zip(several, self.seeds, strict=True)):
-                one.start(seed, self.ants, self.start)  # whether there is room
+                one.start(seed, self.ants, self.start)  # raises an error if there is no room
         return worlds
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return all but what belongs to the Taichi that runs: copies and pickles go on alike."""
+        """Return the state without Taichi's objects, so that copies and pickles work."""
         return {name: value for name, value in vars(self).items() if name != "_stepper"}
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-"""Arrays of the food sources of worlds in which food grows back or wanders."""
+"""Arrays of food sources, for worlds in which food grows back or wanders."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from taichi_ants.worlds.world import World
 def arrays(
     sources: Iterable[np.ndarray], rows: np.ndarray, room: int, size: int
 ) -> dict[str, np.ndarray]:
-    """Make the arrays of the food sources of all worlds, with `room` in each, and of their piles.
+    """Return the arrays of food sources and piles of all worlds, with `room` sources in each.
 
-    `sources` are, of each world, FoodSourceRow.CELL, TAKEN and PILE (3, n). Their numbers and those
-    of piles are written into `rows`, (WorldRow, W). `size` is the number of cells of a world.
+    `sources` has for each world the rows CELL, TAKEN and PILE of `FoodSourceRow`, (3, n). Write the
+    numbers of sources and piles into `rows`, (WorldRow, W). A world has `size` cells.
     """
     n_worlds = rows.shape[1]
     food_sources = np.zeros((len(FoodSourceRow), max(1, n_worlds * room)), np.int32)
@@ -37,17 +37,17 @@ def arrays(
         source_of[w * size + cells[full]] = w * room + full
     return {
         "food_sources": food_sources,
-        # By world: where each pile begins in the row FoodSourceRow.LISTED.
+        # By world: the first place of each pile in the row FoodSourceRow.LISTED.
         "piles": begins.reshape(-1),
-        # The column in `food_sources` whose food lies in a cell, -1.
+        # By cell: the column in `food_sources` of the food in it, or -1.
         "source_of": source_of,
     }
 
 
 def at_start(world: World) -> np.ndarray:
-    """Return what `arrays` needs of a world: a source for each of its foods.
+    """Return the food sources of a world for `arrays`, int (3, n), one per food item.
 
-    A pile is connected cells; piles are numbered in order of their first.
+    A pile consists of connected cells. Piles are numbered in the order of their first cells.
     """
     from scipy.sparse import coo_array  # takes a while to import
     from scipy.sparse.csgraph import connected_components

@@ -1,12 +1,11 @@
 """Interventions: changes of a colony of one world between two ticks.
 
-Rocks, food and the queen stay for the episodes that follow; trails, and ants that are added or
-removed one by one, are of this one. After each change the ants look around again. What an ant has
-drawn to do already, it still does.
+Changes of rocks, food and the queen persist in later episodes. Changes of trails and of single ants
+last for the present episode. After each change the ants observe again. Actions already drawn are
+still done.
 
-Rock and food move the ants in their way aside. The steps of at most `REACH` cells are tried in
-order of their length, then of their cube coordinates; an ant takes the first one that leads to an
-empty cell. If there is none, the ant and its cell stay as they are.
+Rock and food move ants aside to empty cells up to `REACH` steps away. Candidate cells are tried by
+distance, then by cube coordinates. If none is empty, the ant and its cell do not change.
 """
 
 from __future__ import annotations
@@ -36,22 +35,22 @@ from taichi_ants.worlds.world import World
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-REACH = 8  # cells; twice the radius of the largest brush of the page
+REACH = 8  # cells; twice the radius of the largest brush on the live page
 
 
 _GRID = AxialGrid((REACH + 1,) * 3)
 _CELLS = _GRID.cells(np.flatnonzero(_GRID.exists))
 _ORDER = np.lexsort((*_CELLS.T[::-1], _CELLS.max(axis=1)))
-# The steps of 1 to `REACH` cells, in the order in which they are tried, axial (n, 2).
+# The offsets of 1 to `REACH` cells, in the order in which they are tried, axial (n, 2).
 _STEPS = axial(_CELLS[_ORDER[1:]])
 
 
 class Interventions:
-    """Changes of a colony of one world, and how its later episodes begin.
+    """Changes of a colony of one world, and of the start of its later episodes.
 
-    Cells are flat indices of cells of the world, int (n,), each once. A cell that cannot take what
-    is put there, because an ant, a rock or the queen is on it, is left as it is. A method that
-    raises an error has changed nothing. `ants` is how many start each later episode.
+    Cells are flat indices, int (n,), without duplicates. A cell on which something cannot be
+    placed, because an ant, a rock or the queen is on it, does not change. A method that raises an
+    error changes nothing. `ants` is the number of ants at the start of later episodes.
 
     Raises:
         AntsError: The colony has several worlds.
@@ -60,25 +59,25 @@ class Interventions:
     def __init__(self, colony: Colony) -> None:
         if len(colony.worlds) != 1:
             raise AntsError(
-                f"the colony has {len(colony.worlds)} worlds; interventions need one; make "
-                "the colony with one seed."
+                f"the colony has {len(colony.worlds)} worlds, but interventions require a colony "
+                "of one world; pass a single seed."
             )
         self.colony, self.ants = colony, colony.ants
         (self._first,) = colony.worlds
         self._start = self._first.ground()
         self._stream = Stream(colony.seeds[0], STREAM_INTERVENTION)
-        self._changed = False  # whether the next episode begins otherwise than the present one
+        self._changed = False  # whether the start of the next episode differs from the present one
 
     @property
     def living(self) -> int:
-        """How many ants live now."""
+        """The number of living ants."""
         return int(self.colony.arrays["worlds"][WorldRow.LIVING, 0])
 
     def put(self, cells: np.ndarray, what: int) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD, except the queen's and those of ants that stay.
+        """Make cells EMPTY, OBSTACLE or FOOD, except those of the queen and of ants that stay.
 
-        Rock and food move ants aside, and rocks hold no trail. A food has its source where it is
-        put: it grows back and wanders with the foods next to it. AntsError if later episodes would
+        Rock and food move ants aside, and rocks remove trails. Each new food item gets a food
+        source: it grows back, and wanders with adjacent food. AntsError if later episodes would
         have no room for the ants, or no food to learn from.
         """
         arrays = self.colony.arrays
@@ -99,7 +98,7 @@ class Interventions:
         self.colony.observe()
 
     def _aside(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The slots of the ants on cells that can be moved aside, and the cells to move them to."""
+        """Return the slots of the ants on cells that can move aside, and their new cells."""
         colony, grid = self.colony, self.colony.grid
         free = (colony.arrays["ground"] == EMPTY) & grid.exists
         free[cells] = False
@@ -119,12 +118,12 @@ class Interventions:
         return slots[to >= 0], to[to >= 0]
 
     def move_queen(self, cell: int) -> None:
-        """Let the queen stand on an empty cell; AntsError if it is not, or held the last food."""
+        """Move the queen; AntsError if the cell is not empty, or had the last food of the start."""
         arrays, grid = self.colony.arrays, self.colony.grid
         if arrays["ground"][cell] != EMPTY:
             raise AntsError(
-                f"cell {tuple(grid.cells(cell).tolist())} is not empty, so the queen cannot move "
-                "there; choose an empty cell."
+                f"the queen cannot move to cell {tuple(grid.cells(cell).tolist())}, because it is "
+                "not empty; choose an empty cell."
             )
         old = arrays["worlds"][WorldRow.QUEEN_CELL, 0]
         start = self._start.copy()
@@ -137,7 +136,7 @@ class Interventions:
         self.colony.observe()
 
     def lay_trail(self, cells: np.ndarray, level: int) -> None:
-        """Set the trail of cells that are no rocks."""
+        """Set the trail of cells other than rocks."""
         self._lay(cells[self.colony.arrays["walls"][cells] == 0], level)
         self.colony.observe()
 
@@ -149,9 +148,9 @@ class Interventions:
             arrays["trail"][cells] = level + self.colony.trail_clock(0) if level else 0
 
     def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
-        """Put newborn ants on those cells that are empty; without a heading, one is drawn.
+        """Put newborn ants on those of the cells that are empty, with random headings by default.
 
-        AntsError if the colony has no room for so many.
+        AntsError if the capacity of the colony is too small.
         """
         colony, arrays = self.colony, self.colony.arrays
         world = arrays["worlds"][:, 0]
@@ -159,8 +158,8 @@ class Interventions:
         n, living = len(cells), self.living
         if living + n > colony.capacity:
             raise AntsError(
-                f"{count(n, 'ant')} cannot join {count(living, 'ant')}; the capacity of this "
-                f"colony is {colony.capacity}, so remove ants, or begin with a larger one."
+                f"{count(n, 'ant')} cannot join {count(living, 'ant')}, because the capacity of "
+                f"this colony is {colony.capacity}; remove ants, or start with a larger capacity."
             )
         slots = np.flatnonzero(arrays["stage"] == Stage.VACANT)[:n]
         numbers = world[WorldRow.NEXT_NUMBER] + np.arange(n)
@@ -184,14 +183,14 @@ class Interventions:
         colony.observe()
 
     def remove_ants(self, cells: np.ndarray) -> None:
-        """Take the ants on these cells away, with the food that they carry."""
+        """Remove the ants on these cells, with the food that they carry."""
         colony = self.colony
         self._remove(np.flatnonzero(colony.living[0] & np.isin(colony.cells[0], cells)))
 
     def _remove(self, slots: np.ndarray) -> None:
         arrays = self.colony.arrays
         numbers = arrays["number"][slots]
-        first = numbers < self.colony.ants  # their streams go on in the next episode
+        first = numbers < self.colony.ants  # their streams continue in the next episode
         arrays["first_streams"][numbers[first]] = arrays["streams"][slots[first]]
         arrays["ground"][arrays["cell"][slots]] = EMPTY
         arrays["stage"][slots] = Stage.VACANT
@@ -206,10 +205,10 @@ class Interventions:
         world[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
 
     def set_ants(self, n: int) -> None:
-        """Set the number of ants, now and at the start of later episodes; AntsError if no room.
+        """Set the number of ants, now and at the start of later episodes.
 
-        New ones stand on the free cells where ants of a World start, see `World.start`; those of
-        the highest numbers are removed.
+        New ants take free cells in the order of `World.start`; ants with the highest numbers are
+        removed. AntsError if there is too little room.
         """
         colony = self.colony
         (slots,) = np.nonzero(colony.living[0])
@@ -217,11 +216,11 @@ class Interventions:
         later = int(np.count_nonzero(self._start == EMPTY))
         room = min(colony.capacity, len(free) + len(slots), later)
         if n > room:
-            raise AntsError(f"ants is {n}; there is room for {room}, so take fewer.")
+            raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
         self._changed |= n != self.ants
         self.ants = n
         if missing > 0:
-            # In the order in which ants would start there.
+            # The order in which ants would start there.
             grid = colony.grid
             words = stream_state(colony.seeds[0], STREAM_START_CELL, grid.number(grid.cells(free)))
             queen = grid.cells(colony.arrays["worlds"][WorldRow.QUEEN_CELL, 0])
@@ -232,26 +231,26 @@ class Interventions:
             self._remove(slots[np.argsort(colony.numbers[0, slots])[missing:]])
 
     def set_task(self, task: Task) -> None:
-        """Set a task that differs in numbers of its pheromone and in whether trails evaporate."""
+        """Set a task that differs only in numbers of the pheromone and in evaporation."""
         colony, arrays = self.colony, self.colony.arrays
         levels = np.maximum(arrays["trail"] - colony.trail_clock(0), 0)
         colony.task, colony.pheromone = task, task.pheromone_while(colony.learns)
         arrays["trail"][:] = np.where(levels > 0, levels + colony.trail_clock(0), 0)
 
     def set_epsilon(self, epsilon: float) -> None:
-        """Set the epsilon from now on; it decays no more."""
+        """Set epsilon, which no longer decays."""
         colony = self.colony
         colony.epsilon = epsilon
         colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
 
     def set_learning_rate(self, learning_rate: float) -> None:
-        """Set the learning rate from now on; it decays no more."""
+        """Set the learning rate, which no longer decays."""
         colony = self.colony
         colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
         colony.set_learning_rate(learning_rate)
 
     def state(self) -> str:
-        """Return a hash of all that goes on: if it is equal, all that follows is equal."""
+        """Return a hash of the whole state; colonies with equal hashes behave identically."""
         colony = self.colony
         moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
         rest = (self.ants, self._stream.state, colony.task.as_dict(), colony.training.as_dict())
@@ -263,7 +262,7 @@ class Interventions:
         return digest.hexdigest()
 
     def world(self) -> World:
-        """Return the world in which later episodes begin."""
+        """Return the world in which later episodes start."""
         first, grid, start = self._first, self.colony.grid, self._start
         trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
         return World(
@@ -276,7 +275,7 @@ class Interventions:
         )
 
     def begin_episode(self, length: int | None) -> None:
-        """End the episode that there is, and begin the next one, see `Colony.begin_episode`."""
+        """End the present episode, if any, and start the next one, see `Colony.begin_episode`."""
         colony = self.colony
         if colony.episode >= 0:
             colony.end_episode()
@@ -285,22 +284,22 @@ class Interventions:
         self._changed = False
 
     def _begin_with(self, start: np.ndarray) -> None:
-        """Let later episodes begin with this ground, if they can."""
+        """Set the ground at the start of later episodes; AntsError if it is not allowed."""
         ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
         if ants > room:
             raise AntsError(
-                f"{count(ants, 'ant')} start each episode, but this would leave {room} free cells; "
-                "leave more cells free."
+                f"{count(ants, 'ant')} start each episode, but this change would leave "
+                f"{count(int(room), 'free cell')}; leave more cells free."
             )
         if self.colony.learns and not (start == FOOD).any():
-            raise AntsError("this would take the last food, but ants learn from it; leave some.")
+            raise AntsError("this would remove the last food, but ants learn from it; leave some.")
         self._start, self._changed = start, True
 
     def _change_food_sources(self, cells: np.ndarray, what: int) -> None:
-        """Give food that was put on cells a source there; where anything else is put, none is left.
+        """Add food sources for FOOD on cells, or remove the sources of cells with anything else.
 
-        A source that waits there has its food again. A new one belongs to the pile of the first
-        source beside it; if there is none, it is a pile of its own.
+        A waiting source of a cell gets its food back. A new source joins the pile of the first
+        adjacent source, or forms a new pile.
         """
         colony, arrays = self.colony, self.colony.arrays
         if not colony.food_changes:
@@ -325,7 +324,7 @@ class Interventions:
                 pile.append(max(pile, default=-1) + 1 if first is None else pile[first])
             if all(taken[source] >= 0 for source in here):
                 taken[here[0]] = -1
-        _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without those that are gone
+        _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
         colony.n_food_sources = max(len(at), int(np.count_nonzero(self._start == FOOD)))
         sources = [np.array([at, taken, pile], int).reshape(3, -1)]
         arrays |= food_sources.arrays(

@@ -1,9 +1,9 @@
-"""The kernels of a colony: the phases of a tick, in order, and how threads share them.
+"""The kernels of a colony: the phases of a tick, in order, and the sharing of work among threads.
 
-Many small worlds: each is a part of the work by itself. Few large worlds: all threads share each
-phase by chunks, which are ranges of the ants, or of the cells, of one world. On the CPU they wait
-for each other at a barrier; on a GPU each group of phases is a parallel loop. All do the same
-phases in the same order, so that they give the same numbers. The order is that of
+If worlds are many and small, each world is one part of the work. If they are few and large, all
+threads share each phase by chunks, which are ranges of the ants or cells of one world. Then threads
+on the CPU wait for each other at a barrier; on a GPU each group of phases is a parallel loop. All
+variants do the same phases in the same order and give the same numbers. The order is that of
 `taichi_ants.reference.ReferenceColony.tick`.
 """
 
@@ -29,10 +29,10 @@ ANTS, CELLS, WORLD = "ants", "cells", "world"
 
 
 class Phase(NamedTuple):
-    """A step of all ants, cells or worlds (`of`: ANTS, CELLS, WORLD) before the next phase begins.
+    """A part of a tick that all ants, cells or worlds (`of`: ANTS, CELLS, WORLD) finish together.
 
-    It must not read what another chunk writes in the same phase. `do` is a `ti.func` (c, v, w,
-    chunk, ant, tick) of one ant, (c, place) of one cell, or (c, v, w, tick) of one world.
+    It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
+    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, place) for CELLS, (c, v, w, tick) for WORLD.
     """
 
     of: str
@@ -40,11 +40,11 @@ class Phase(NamedTuple):
 
 
 class Variant:
-    """The properties compiled into a kernel; all functions of the colony call it `v`.
+    """The properties compiled into a kernel, `v` in the functions of the colony.
 
-    With `own_tables` there is a table for each slot, not one for each world; the others are as in
-    `ColonyState` and `Pheromone`. To leave out what comes and goes saves time, more so while
-    compiling.
+    With `own_tables` there is a table for each slot, not one for each world; for the others, see
+    `ColonyState` and `Pheromone`. Kernels without births, deaths or food that changes are faster,
+    and compile much faster.
     """
 
     def __init__(
@@ -62,12 +62,12 @@ class Variant:
         self.own_tables, self.dense = own_tables, dense
         self.is_given_actions = is_given_actions
         self.view, self.half, self.traffic = view, view == "half", traffic
-        # The mark of an ant that wants nothing.
+        # The mark of an ant that wants no other cell.
         self.idle = STANDS if traffic.shared else 0
         self.ants_change, self.food_changes = ants_change, food_changes
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
-        # Each ant learns into a table of its own, or all ants of a world into one.
+        # Each ant learns into its own table, or all ants of a world into one table.
         self.alone = learner is not None and own_tables
         self.together = learner is not None and not own_tables
         self.begins = self.alone and learner.begin is not None
@@ -77,9 +77,9 @@ class Variant:
         if self.together:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
-        self.n_pairs = observation.n_states * ROW  # of a row and an action, and some of no meaning
-        self.sees_percept = observation.name == "paper"  # so that no view is needed
-        # Whether the cell of an ant has to tell what the ant carries.
+        self.n_pairs = observation.n_states * ROW  # state-action pairs, and unused numbers
+        self.sees_percept = observation.name == "paper"  # the percept is the state index
+        # Whether the cell of an ant must show that the ant carries food.
         self.sees_ants = not self.sees_percept or view == "strongest_under_carriers"
         if not self.sees_percept:
             self.encode = views.encode_function(observation)
@@ -90,17 +90,17 @@ variant = cache(Variant)
 
 
 def begin_phases(v: Variant) -> Iterator[Phase]:
-    """The beginning of an episode."""
+    """Yield the phases at the start of an episode."""
     yield Phase(ANTS, learning.begin)
 
 
 def intervention_phases(v: Variant) -> Iterator[Phase]:
-    """What follows an intervention, between two ticks."""
+    """Yield the phases after an intervention, between two ticks."""
     yield Phase(ANTS, learning.see_interventions)
 
 
 def tick_phases(v: Variant) -> Iterator[Phase]:
-    """A tick; rounds of `planning_phases` and the `last_phases` follow."""
+    """Yield the phases of a tick before rounds of `planning_phases` and the `last_phases`."""
     yield Phase(ANTS, steps.want)
     if v.traffic.shared:
         yield Phase(ANTS, steps.resolve)
@@ -124,13 +124,13 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
 
 
 def planning_phases(v: Variant) -> Iterator[Phase]:
-    """One round of updates from the models that ants share."""
+    """Yield the phases of one round of updates from the models that ants share."""
     yield Phase(ANTS, learning.draw_pair)
     yield Phase(WORLD, learning.plan_together)
 
 
 def last_phases(v: Variant) -> Iterator[Phase]:
-    """What ends a tick."""
+    """Yield the phases at the end of a tick."""
     if v.ants_change:
         yield Phase(ANTS, life.retire)
     yield Phase(WORLD, life.end_tick)
@@ -138,7 +138,7 @@ def last_phases(v: Variant) -> Iterator[Phase]:
 
 @ti.func
 def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
-    """A phase of a chunk, or of the world of that number; nothing if its episode has ended."""
+    """Do a phase for a chunk, or for the world `chunk`, unless its episode has ended."""
     w = chunk
     if ti.static(phase.of != WORLD):
         w = chunk // c.n_chunks
@@ -159,14 +159,14 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
 
 @ti.func
 def share_of(c: ti.template(), chunk, n):
-    """Which of n ants or cells of a world are those of a chunk."""
+    """Return the range of a chunk among n ants or cells of a world."""
     each = (n + c.n_chunks - 1) // c.n_chunks
     first = chunk % c.n_chunks * each
     return first, ti.min(first + each, n)
 
 
 def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
-    """Phases in groups that need no barrier inside: of single worlds, all that follow."""
+    """Return phases in groups without barriers inside; successive WORLD phases form one group."""
     groups: list[tuple[Phase, ...]] = []
     for of_worlds, some in groupby(phases, lambda phase: phase.of == WORLD):
         several = tuple(some)
@@ -178,7 +178,7 @@ def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
 def loops(
     v: Variant, phases_of: Callable[[Variant], Iterator[Phase]], arguments: Any
 ) -> Callable[..., None]:
-    """A kernel of some phases, each a parallel loop over chunks or worlds."""
+    """Return a kernel of some phases, with a parallel loop over chunks or worlds for each group."""
     groups = shared_out(phases_of(v))
 
     @ti.kernel
@@ -196,16 +196,16 @@ def loops(
 
 @ti.func
 def wait_for_all(c: ti.template(), part, parts, number):
-    """Wait until all parts have come to barrier `number`; returns 0 if one does not come.
+    """Wait until all parts arrive at barrier `number`; return 0 if one does not arrive, else 1.
 
-    The first part that starts decides for all: it opens the barrier once the others have arrived,
-    or gives up. Whoever waits for it has arrived itself; so when it gives up, all parts that have
-    started are at this barrier, and one that starts later leaves at its first, which is this one.
+    The first part that starts decides: it opens the barrier once the others have arrived, or gives
+    up. If it gives up, all parts that have started wait at this barrier and leave. A part that
+    starts later leaves at its first barrier, which is the same one.
     """
     goes_on = 1
     if part == 0:
         wanted, spins = (number + 1) * (parts - 1), 0
-        # Atomic, since a mere read could be done once for all.
+        # Atomic, because the compiler could move a plain read out of the loop.
         arrived = ti.atomic_add(c.barrier[Barrier.ARRIVED], 0)
         while arrived < wanted and spins < c.orders[Order.SPINS]:
             arrived = ti.atomic_add(c.barrier[Barrier.ARRIVED], 0)
@@ -225,13 +225,13 @@ def wait_for_all(c: ti.template(), part, parts, number):
 
 @cache
 def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
-    """A kernel of whole ticks, as many as ordered, whose work is divided into parts.
+    """Return a kernel of whole ticks whose work is divided into parts, see `Order`.
 
-    Unless it `waits`, each part is a world of a single chunk, and goes through all ticks by itself.
-    Else each part has its share of the chunks, and after each group of phases it waits for the
-    others at a barrier. To begin a parallel loop for each group would take 20 to 200 microseconds,
-    because threads are put to sleep and woken. If a part does not come, all leave, and another
-    launch begins with the group that follows, see `Order.FIRST`.
+    Without `waits`, each part is a world of a single chunk, and does all ticks independently. With
+    `waits`, each part does its share of the chunks, and waits for the others at a barrier after
+    each group of phases. A parallel loop per group would take 20 to 200 microseconds more, because
+    threads would sleep and wake up. If a part does not arrive, all parts leave, and another launch
+    starts with the next group, see `Order.FIRST`.
     """
     groups, planning = shared_out(tick_phases(v)), shared_out(planning_phases(v))
     last = shared_out(last_phases(v))
@@ -240,7 +240,7 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
 
     @ti.func
     def share(group: ti.template(), c: ti.template(), part, parts, at):
-        """Do a part's share of group number `at`, and wait; returns the next, -1 to leave."""
+        """Do a part's share of group `at`, and wait; return the next group, or -1 to leave."""
         following = at
         if ti.static(not waits):
             for phase in ti.static(group):

@@ -1,9 +1,9 @@
-"""How the ants of a colony learn: one table for all, or one each.
+"""Learning in a colony: with one table for all ants, or one table per ant.
 
-One shared table: all ants choose and compute their TD errors by the table as it stood at the start
-of the tick. For each pair the n errors are summed as 64-bit fixed-point numbers, so that their
-order does not matter, and the value moves by weights[n] times their mean, which is what n updates
-in turn towards one target would give. Every chunk of ants sums for itself; nothing is atomic.
+With a shared table, all ants choose and compute their TD errors by the table at the start of the
+tick. The n errors of a pair are summed as 64-bit fixed-point numbers, so that their order does not
+matter. The value moves by weights[n] times their mean, as n successive updates towards one target
+would move it. Each chunk of ants has its own sums, without atomic operations.
 """
 
 import taichi as ti
@@ -21,14 +21,14 @@ _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 
 @ti.func
 def see_anew(c: ti.template(), v: ti.template(), w, ant, clock):
-    """Note what an ant sees."""
+    """Update the percept and the state index of an ant."""
     percept, state = steps.observe(c, v, w, ant, clock)
     note_seen(c, v, ant, percept, state)
 
 
 @ti.func
 def note_seen(c: ti.template(), v: ti.template(), ant, percept, state):
-    """Note what an ant has seen."""
+    """Store the percept and the state index of an ant."""
     steps.put(c.percept, ant, percept)
     if ti.static(not v.sees_percept):
         c.state[ant] = state
@@ -36,7 +36,7 @@ def note_seen(c: ti.template(), v: ti.template(), ant, percept, state):
 
 @ti.func
 def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """An ant looks around, and its learner begins an episode; worlds in the midst of one go on."""
+    """Let an ant observe and its learner start an episode, unless its world is within one."""
     if tick == 0:
         see_anew(c, v, w, ant, 0)
         begin_to_learn(c, v, ant)
@@ -44,7 +44,7 @@ def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Let an ant see what interventions changed; a newly placed ant begins its life."""
+    """Let an ant observe after interventions; an ant that was just added becomes living."""
     if steps.trait(c.stage, ant) == Stage.NEWBORN:
         steps.put(c.stage, ant, Stage.LIVING)
         if ti.static(v.alone):
@@ -54,7 +54,7 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Observe, choose the next action where the learner asks for it, and learn."""
+    """Observe, choose the next action if the learner needs it, and learn."""
     percept, state = steps.observe(c, v, w, ant, (tick + 1) * c.evaporates)
     next_action = -1
     if steps.trait(c.stage, ant) != Stage.NEWBORN:
@@ -74,19 +74,19 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def memory_of(c: ti.template(), v: ti.template(), owner):
-    """Where the tables, and what else the learner keeps, of an ant or a world begin."""
+    """Return the start of the tables and of the memory of an ant or a world."""
     return At(steps.table_of(c, v, owner), owner * c.floats_by_8 * 8, owner * c.integers_by_8 * 8)
 
 
 @ti.func
 def rates_of(c: ti.template(), v: ti.template()):
-    """Learning rate, discount, epsilon and the learner's own hyperparameters."""
+    """Return learning rate, discount, epsilon and the hyperparameters of the learner."""
     return v.read_rates(c.weights[1], c.discount, c.epsilon, c.hyperparameters, 0)
 
 
 @ti.func
 def begin_to_learn(c: ti.template(), v: ti.template(), ant):
-    """Let the learner of an ant with a table of its own begin an episode."""
+    """Let the learner of an ant with its own table start an episode."""
     if ti.static(v.begins):
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         v.learner.begin(memory, memory_of(c, v, ant))
@@ -94,7 +94,7 @@ def begin_to_learn(c: ti.template(), v: ti.template(), ant):
 
 @ti.func
 def forget(c: ti.template(), v: ti.template(), ant):
-    """Begin anew the tables and the memory of a slot for the ant that was born into it."""
+    """Reset the tables and the memory of a slot for a newborn ant."""
     at = memory_of(c, v, ant)
     for i in range(at.table, steps.table_of(c, v, ant + 1)):
         c.q[i] = ti.select(i % ROW < N_ACTIONS, c.initial_q, 0.0)
@@ -107,7 +107,7 @@ def forget(c: ti.template(), v: ti.template(), ant):
 
 @ti.func
 def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick):
-    """Update the ant's own table, as an ant that is alone does."""
+    """Update the ant's own table, as if it were alone."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
     event = steps.trait(c.event, ant)
     last = ti.cast((steps.trait(c.stage, ant) == Stage.DYING) | (tick + 1 == c.length), ti.i32)
@@ -130,7 +130,7 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
 def error_of(
     c: ti.template(), v: ti.template(), w, pair, reward, terminated, seen, next_action
 ):  # fmt: skip
-    """The TD error of a pair (its offset in the table) by the shared table of a world."""
+    """Return the TD error of a pair (its offset in the table) by the shared table of a world."""
     table = steps.table_of(c, v, w)
     error = v.td_error(
         c.q[table + pair],
@@ -141,13 +141,13 @@ def error_of(
         c.epsilon,
     )
     if not ti.abs(error) < c.largest_error:
-        c.q[table + pair] = ti.math.nan  # a fixed-point sum would hide it
+        c.q[table + pair] = ti.math.nan  # a fixed-point sum would hide such an error
     return error
 
 
 @ti.func
 def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
-    """Add the TD error of an ant to the sums of its chunk, and what it saw."""
+    """Add the TD error and the transition of an ant to the sums of its chunk."""
     event = steps.trait(c.event, ant)
     reward = ti.cast(c.rewards[event], ti.f32)
     terminated = terminates(event, c.delivery_terminates)
@@ -161,13 +161,13 @@ def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_ac
 
 @ti.func
 def fixed(error):
-    """An error as a fixed-point number: f32 -> i64."""
+    """Return an error as a fixed-point number: f32 -> i64."""
     return ti.cast(ti.floor(ti.cast(error, ti.f64) * _ONE + 0.5), ti.i64)
 
 
 @ti.func
 def list_of(v: ti.template(), chunk):
-    """Where the list of a chunk's pairs begins in `touched`: how many, then which."""
+    """Return the start of a chunk's list in `touched`: the number of pairs, then the pairs."""
     return (v.n_pairs + 1) * chunk
 
 
@@ -188,7 +188,7 @@ def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, c
 
 @ti.func
 def note_transition(c: ti.template(), place, number, transition):
-    """Note what an ant saw of a pair, for the model; the highest ant number's transition stays."""
+    """Store the transition of a pair for the model if its ant has the highest number so far."""
     if number > c.sums_of[SumRow.LATEST, place]:
         c.sums_of[SumRow.LATEST, place] = number
         c.sums_of[SumRow.TRANSITION, place] = transition
@@ -196,7 +196,7 @@ def note_transition(c: ti.template(), place, number, transition):
 
 @ti.func
 def learn_together(c: ti.template(), v: ti.template(), w, tick):
-    """Update the table of a world by what all of its ants have done."""
+    """Update the table of a world by the errors of all its ants."""
     join_sums(c, v, w)
     if ti.static(v.learner.plans):
         remember_shared(c, v, w)
@@ -205,7 +205,7 @@ def learn_together(c: ti.template(), v: ti.template(), w, tick):
 
 @ti.func
 def join_sums(c: ti.template(), v: ti.template(), w):
-    """Bring the sums of all chunks of a world into its first one."""
+    """Add the sums of all chunks of a world to those of the first chunk."""
     first = w * c.n_chunks
     for chunk in range(first + 1, first + c.n_chunks):
         listed = list_of(v, chunk)
@@ -230,7 +230,7 @@ def remember_shared(c: ti.template(), v: ti.template(), w):
     chunk = w * c.n_chunks
     listed = list_of(v, chunk)
     n = c.touched[listed]
-    for i in range(2, n + 1):  # insertion sort: short lists, nearly always known pairs
+    for i in range(2, n + 1):  # insertion sort, because lists are short
         pair = c.touched[listed + i]
         j = i - 1
         while j >= 1 and c.touched[listed + ti.max(j, 1)] > pair:
@@ -245,7 +245,7 @@ def remember_shared(c: ti.template(), v: ti.template(), w):
 
 @ti.func
 def apply_sums(c: ti.template(), v: ti.template(), w):
-    """Move the shared values of a world by their joined errors, and forget these."""
+    """Update the shared values of a world by the joined sums, and reset the sums."""
     chunk, table = w * c.n_chunks, steps.table_of(c, v, w)
     listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
@@ -253,7 +253,7 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
         place = v.n_pairs * chunk + pair
         count = c.sums_of[SumRow.COUNT, place]
         error = c.errors[place]
-        rate = c.weights[ti.min(count, c.weights.shape[0] - 1)]  # the last is that of all above
+        rate = c.weights[ti.min(count, c.weights.shape[0] - 1)]  # the last is for more errors
         if count > 1:
             mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
             error = ti.cast(mean, ti.f32)
@@ -264,7 +264,7 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
 
 @ti.func
 def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """One planning draw of an ant: count an update of a visited pair."""
+    """Draw a visited pair for a planning update of an ant."""
     if steps.trait(c.stage, ant) != Stage.NEWBORN:
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         at = memory_of(c, v, w)
@@ -276,7 +276,7 @@ def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def plan_together(c: ti.template(), v: ti.template(), w, tick):
-    """Update the pairs that were drawn, by the table at the start of the round."""
+    """Update the drawn pairs, by the table at the start of the round."""
     join_sums(c, v, w)
     chunk = w * c.n_chunks
     listed = list_of(v, chunk)

@@ -1,7 +1,7 @@
-"""What comes and goes in a colony: births, deaths, food that grows back, food that wanders.
+"""Births, deaths, regrowth of food, and wandering food in a colony.
 
-`grow_old` and `retire` are phases of single ants, in parallel. All others handle one whole world,
-serially; there is little to do in a tick.
+`grow_old` and `retire` are phases of single ants, in parallel. The others process one whole world
+serially, because they have little to do in a tick.
 """
 
 import taichi as ti
@@ -26,7 +26,7 @@ from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
 @ti.func
 def stream_of(seed, purpose, number):
-    """The first state of a random stream, see `randomness.stream_state`."""
+    """Return the first state of a random stream, see `randomness.stream_state`."""
     h = bits_of(advance(seed))
     h = bits_of(advance(h ^ ti.cast(purpose, ti.u64)))
     return bits_of(advance(h ^ number))
@@ -34,7 +34,7 @@ def stream_of(seed, purpose, number):
 
 @ti.func
 def count(c: ti.template(), v: ti.template(), w, tick):
-    """Add up what the chunks have counted since this was done last."""
+    """Add the tallies of all chunks to the counts of a world, and reset them."""
     gives = 0
     for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
         first = chunk * TALLY_WIDTH
@@ -54,7 +54,7 @@ def count(c: ti.template(), v: ti.template(), w, tick):
 
 @ti.func
 def free_around(c: ti.template(), base, cell):
-    """A bit for each heading at which the neighbour is empty."""
+    """Return a bit for each heading at which the neighbour of a cell is empty."""
     free = 0
     for heading in ti.static(range(N_HEADINGS)):
         if c.ground[base + cell + c.compass[heading + 1]] == EMPTY:
@@ -64,7 +64,7 @@ def free_around(c: ti.template(), base, cell):
 
 @ti.func
 def give_birth(c: ti.template(), v: ti.template(), w, tick):
-    """Turn stored food into ants beside the queen, while there is room; without births none is."""
+    """Turn stored food into ants next to the queen, while slots and cells are free."""
     base, queen = w * c.size, c.worlds[WorldRow.QUEEN_CELL, w]
     free = free_around(c, base, queen)
     while (
@@ -105,7 +105,7 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
 
 @ti.func
 def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Age by one tick; at the end of its life an ant leaves its cell, and its food there."""
+    """Age an ant by one tick; if it reaches its lifespan, empty its cell, or leave its food."""
     if c.lifespan > 0 and trait(c.stage, ant) == Stage.LIVING:
         c.age[ant] = c.age[ant] + 1
         if c.age[ant] >= c.lifespan:
@@ -117,7 +117,7 @@ def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def regrow(c: ti.template(), v: ti.template(), w, tick):
-    """Food grows back in food sources that have waited long enough and are empty."""
+    """Let food grow back in empty cells of food sources that have waited long enough."""
     base = w * c.size
     for source in range(
         w * c.n_food_sources, w * c.n_food_sources + c.worlds[WorldRow.FOOD_SOURCES, w]
@@ -134,7 +134,7 @@ def regrow(c: ti.template(), v: ti.template(), w, tick):
 
 @ti.func
 def wander(c: ti.template(), v: ti.template(), w, tick):
-    """Now and then every pile takes a step."""
+    """Move every pile, every `c.wander` ticks."""
     if c.wander > 0:
         if (tick + 1) % c.wander == 0:
             for pile in range(c.worlds[WorldRow.PILES, w]):
@@ -143,9 +143,9 @@ def wander(c: ti.template(), v: ti.template(), w, tick):
 
 @ti.func
 def move_pile(c: ti.template(), w, pile):
-    """A pile takes a step: its foods that can move leave their cells, then all enter the next ones.
+    """Move a pile: all food that can move leaves its cells, then enters the next ones.
 
-    So the front of a pile makes way for what is behind it, whatever the order of the food sources.
+    So the front of a pile makes way for the food behind it, in any order of the food sources.
     """
     heading, c.queen_streams[w] = draw_below(c.queen_streams[w], N_HEADINGS)
     step = c.compass[heading + 1]
@@ -174,16 +174,16 @@ def move_pile(c: ti.template(), w, pile):
 
 @ti.func
 def listed_source(c: ti.template(), w, i):
-    """The column in `food_sources` of the i-th food source in the order of piles."""
+    """Return the column in `food_sources` of the i-th food source in the order of piles."""
     return w * c.n_food_sources + c.food_sources[FoodSourceRow.LISTED, w * c.n_food_sources + i]
 
 
 @ti.func
 def can_move(c: ti.template(), w, source, step):
-    """Whether a food source can take the step.
+    """Return whether a food source can move by a step.
 
-    One with food can if the cell ahead is empty, or holds food of the same pile that can itself:
-    the foods in a row move together. One that waits can unless rock or queen is ahead.
+    A source with food can move if the cell ahead is empty, or has food of the same pile that can
+    move: food in a row moves together. A waiting source can move unless rock or queen is ahead.
     """
     ahead = w * c.size + c.food_sources[FoodSourceRow.CELL, source] + step
     can = c.walls[ahead] == 0 and c.ground[ahead] & 15 != QUEEN
@@ -205,7 +205,7 @@ def can_move(c: ti.template(), w, source, step):
 
 @ti.func
 def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """At the end of the tick the dead leave their slots, and the newborn are ants."""
+    """Free the slot of a dying ant, and let a newborn ant live, at the end of the tick."""
     if trait(c.stage, ant) == Stage.NEWBORN:
         put(c.stage, ant, Stage.LIVING)
     elif trait(c.stage, ant) == Stage.DYING:
@@ -217,7 +217,7 @@ def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def end_tick(c: ti.template(), v: ti.template(), w, tick):
-    """Count the tick, and end the episode of a world at its delivery, if it is one that ends so."""
+    """Count the tick, and end the episode of a world at a delivery if `c.ends_at_delivery`."""
     c.worlds[WorldRow.TICKS, w] = tick + 1
     if c.ends_at_delivery == 1 and c.worlds[WorldRow.DELIVERIES, w] > 0:
         c.worlds[WorldRow.RUNNING, w] = 0

@@ -1,7 +1,7 @@
 """The state of a colony: its worlds, ants and action values, views of them, and its files.
 
-All of it lies in NumPy arrays, on which the kernels work in place. Only this package reads
-`ColonyState.arrays`, see `layout` and `arrays`; others use the views.
+The state is in NumPy arrays, which kernels change in place. Only this package reads
+`ColonyState.arrays`, see `layout`; other code uses the views.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ Sharing = Literal["shared", "independent", "frozen"]
 SHARINGS: tuple[str, ...] = get_args(Sharing)
 Arrays = dict[str, np.ndarray]
 Which = slice | np.ndarray
-ALL = slice(None)  # the worlds, where a bool (W,) would name some
+ALL = slice(None)  # selects all worlds; a bool (W,) selects some
 
-_MOST_NUMBERS = 2**31 - 1  # kernels index arrays by 32 bits
-# Where actions are given, nobody chooses or learns, and none of these matters.
+_MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
+# Unused settings for colonies with given actions, in which ants neither choose nor learn.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
 _KIND = Kind("colony", 11, "Colony.save")
-# What a file holds besides arrays: arguments of `Colony`, and the progress of the episode.
+# The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 
@@ -67,8 +67,8 @@ _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 class ColonyEpisodes(Record):
     """Results of episodes, arrays of shape (episodes, worlds).
 
-    `first_delivery` is -1 if there was none; `blocked` are the moves that failed, `living` the ants
-    at the end. Returns, moves and blocked are int64, all others int32.
+    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `living` ants at the
+    end. Returns, moves and blocked are int64, all others int32.
     """
 
     returns: np.ndarray
@@ -93,20 +93,20 @@ def column(name: str) -> property:
 
 
 class ColonyState:
-    """The state of a colony of W worlds with `capacity` slots each, in which ants live.
+    """The state of a colony of W worlds with `capacity` slots for ants each.
 
-    Attributes, besides the arguments of `Colony`:
+    Attributes, in addition to the arguments of `Colony`:
         learns: Whether the ants learn.
-        is_given_actions: Whether ants do what `Colony.act` is given.
+        is_given_actions: Whether ants take the actions passed to `Colony.act`.
         one_a_slot: Whether each slot has its own table of action values, not each world.
         ants_change: Whether ants are born or die.
         food_changes: Whether food grows back or wanders.
-        memory: The memory that the learner keeps with each table.
-        pheromone: The pheromone of the task, which evaporates as the task says of this colony.
-        stored: The names of the arrays that a file holds.
-        length: Of the episode in ticks; 0 if it is not known.
-        ticks: Since an episode began for all worlds.
-        delivered: int64 (W,), food items that were delivered in the episodes before this one.
+        memory: The size of the learner's memory for each table.
+        pheromone: The pheromone of the task, with or without evaporation.
+        stored: The names of the arrays in a file.
+        length: Length of the episode in ticks; 0 if unknown.
+        ticks: Number of ticks since an episode started in all worlds.
+        delivered: int64 (W,), food items delivered in previous episodes.
     """
 
     def __init__(
@@ -142,8 +142,8 @@ class ColonyState:
         (self.training,) = checks.checked_configs(training)
         if not self.learns and q_values is None and not self.is_given_actions:
             raise AntsError(
-                "sharing is 'frozen', but q_values is None; nobody learns, so give the action "
-                "values that the ants follow."
+                "sharing is 'frozen', but q_values is None; these ants do not learn, so give the "
+                "action values that they follow."
             )
         if self.learner:
             checks.check_sharing(self.learner, sharing)
@@ -175,7 +175,7 @@ class ColonyState:
 
     @property
     def learner(self) -> Learner | None:
-        """The learner; None if nobody learns."""
+        """The learner; None if the ants do not learn."""
         return learners.get(self.training.learner) if self.learns else None
 
     @property
@@ -187,12 +187,12 @@ class ColonyState:
 
     @property
     def episode(self) -> int:
-        """The number of the present episode, -1 before the first; of the world that had most."""
+        """The number of the present episode, or the largest of all worlds; -1 before the first."""
         return int(self.arrays["episodes"].max())
 
     @property
     def running(self) -> np.ndarray:
-        """Worlds whose episode has not ended, bool (W,)."""
+        """Whether the episode of each world is still running, bool (W,)."""
         return self.arrays["worlds"][WorldRow.RUNNING] == 1
 
     @property
@@ -205,10 +205,10 @@ class ColonyState:
         """Deliveries of the present episode, int32 (W,); a view."""
         return self.arrays["worlds"][WorldRow.DELIVERIES]
 
-    # By slot, arrays (W, capacity): the number of the last ant in it, int32, -1 for none; the flat
-    # index of its cell, int32; its heading 0 to 5, the paper's state (see `task.states`), its last
-    # action (-1 before the first one) and `Event`, int8; the action that it has drawn ahead of the
-    # next tick, int8, else -1; and the state of its random stream, uint64.
+    # Arrays (W, capacity) by slot: the number of its last ant, int32, -1 for none; the flat index
+    # of its cell, int32; its heading 0 to 5, percept (see `task.states`), last action (-1 before
+    # the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1; and the
+    # state of its random stream, uint64.
     numbers, cells, headings = column("number"), column("cell"), column("heading")
     percepts, actions, events = column("percept"), column("action"), column("event")
     next_actions, streams = column("next_action"), column("streams")
@@ -216,50 +216,50 @@ class ColonyState:
 
     @property
     def living(self) -> np.ndarray:
-        """Slots in which ants live, bool (W, capacity)."""
+        """Whether an ant lives in each slot, bool (W, capacity)."""
         return self._stages == Stage.LIVING
 
     @property
     def carrying(self) -> np.ndarray:
-        """Slots whose ant carries food, bool (W, capacity)."""
+        """Whether the ant of each slot carries food, bool (W, capacity)."""
         return self._loads == 1
 
     @property
     def states(self) -> np.ndarray:
-        """State index of each ant, of dead ones the last, int32 (W, capacity)."""
+        """The state index of the last ant in each slot, int32 (W, capacity)."""
         return (self._states if "state" in self.arrays else self.percepts).astype(np.int32)
 
     @property
     def draws_ahead(self) -> bool:
-        """Whether ants draw their next action while they learn from the last one."""
+        """Whether ants draw their next action before they learn from the last one."""
         learner = self.learner
         return learner is not None and learner.draws_next_action
 
     @property
     def occupied(self) -> np.ndarray:
-        """Cells on which ants stand, bool (W, grid.size)."""
+        """Whether an ant is on each cell, bool (W, grid.size)."""
         return self.arrays["ground"].reshape(len(self.seeds), -1) >= ANT_GROUND
 
     @property
     def update_weights(self) -> np.ndarray:
-        """By how much of the mean error n updates move a value, by n; the last is that of more."""
+        """The weight of the mean of n errors in an update, by n; the last is for all larger n."""
         return self.arrays["weights"]
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all arrays."""
+        """The number of bytes of all arrays."""
         return sum(array.nbytes for array in (*self.arrays.values(), *self.at_start.values()))
 
     @property
     def q_values(self) -> np.ndarray:
-        """The action values, float32 (W, n_states, 5), with own tables (W, slots, n_states, 5)."""
+        """The action values, float32 (W, n_states, 5), by slot (W, slots, n_states, 5); a copy."""
         n = self.capacity if self.one_a_slot else 1
         tables = self.arrays["q"].reshape(len(self.seeds), n, -1, self.task.n_states, ROW)
         tables = tables[:, :, 0, :, :N_ACTIONS]
         return (tables if self.one_a_slot else tables[:, 0]).copy()
 
     def outcome(self) -> ColonyEpisodes:
-        """Return the results of the episode so far, arrays (1, W), see `check_finite`."""
+        """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
         totals, worlds = self.arrays["totals"], self.arrays["worlds"]
         counts = {row.name: totals[row] for row in TOTALS}
@@ -267,7 +267,7 @@ class ColonyState:
         return ColonyEpisodes(**{name.lower(): one[None].copy() for name, one in counts.items()})
 
     def snapshot(self, world: int = 0) -> Snapshot:
-        """Return world number `world` as it is now; arrays are copies."""
+        """Return the present state of world number `world`; arrays are copies."""
         self.check_begun()
         world = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
@@ -289,8 +289,8 @@ class ColonyState:
     def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:
         """Return a copy of the trail of world number `world` as kernels store it, and the clock.
 
-        These are expiry clocks, int32 (grid.size,); or levels, float32, and 0, if the pheromone is
-        dense. The level of a cell is what is stored less the clock, not below 0.
+        The stored trail has expiry clocks, int32 (grid.size,). If the pheromone is dense, it has
+        levels, float32, and the clock is 0. The level of a cell is max(stored - clock, 0).
         """
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
         if self.pheromone.dense:
@@ -298,16 +298,16 @@ class ColonyState:
         return self.arrays["trail"][cells].copy(), self.trail_clock(world)
 
     def trail_clock(self, world: int) -> int:
-        """Return by how much integer trails have evaporated since the episode began."""
+        """Return the amount by which integer trails have evaporated in this episode."""
         return int(self.episode_ticks[world]) * (self.pheromone.evaporation == "linear")
 
     def check_begun(self) -> None:
-        """Raise an AntsError if no episode has begun."""
+        """Raise an AntsError if no episode has started."""
         if self.episode < 0:
             raise AntsError("no episode has begun; call begin_episode first.")
 
     def check_finite(self) -> None:
-        """Raise an AntsError if the learner has made action values that are not finite."""
+        """Raise an AntsError if an action value is not finite."""
         tables = self.arrays["q"].reshape(len(self.seeds), -1)
         checks.check_finite(tables, [self.training], self.seeds)
 
@@ -321,14 +321,14 @@ class ColonyState:
         self.arrays |= self._constants()
 
     def make_room_for_food(self, n: int) -> None:
-        """Set all to the start of an episode, with room for n food sources in each world."""
+        """Reset all arrays of episodes, with room for n food sources in each world."""
         self.n_food_sources = n
         self.at_start = self._start_of_episode()
         self.arrays |= (changing := self._of_episode())
         self._changing = tuple(changing)
 
     def begin(self, which: Which = ALL) -> None:
-        """Set these worlds to the start of an episode; tables, memories and streams stay."""
+        """Reset worlds to the start of an episode; tables, memories and random streams stay."""
         self.delivered[which] += self.deliveries[which]
         self.set_learning_rate(self.learning_rate)
         self._set_to_start(self.arrays, which)
@@ -336,7 +336,7 @@ class ColonyState:
         self.arrays["episodes"][which] += 1
 
     def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
-        """Give some worlds, bool (W,), other seeds, as if nothing had happened in them yet."""
+        """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
         (places,) = np.nonzero(which)
         changed = dict(zip(places.tolist(), seeds, strict=True))
         self.seeds = tuple(changed.get(w, seed) for w, seed in enumerate(self.seeds))
@@ -345,11 +345,11 @@ class ColonyState:
         self._copy_worlds(self.arrays, self._seeded(), which)
 
     def stop(self, which: np.ndarray) -> None:
-        """End the episode of some worlds, bool (W,), which stand still until they begin again."""
+        """End the episode of some worlds, bool (W,), which then wait for their next episode."""
         self.arrays["worlds"][WorldRow.RUNNING, which] = 0
 
     def keep_streams(self, which: Which = ALL) -> None:
-        """Keep the streams of the ants that started an episode of these worlds, at its end."""
+        """Save the random streams of the ants that started the episode of these worlds."""
         ours = np.zeros((len(self.seeds), 1), bool)
         ours[which] = True
         there = (self._stages != Stage.VACANT) & ours
@@ -358,24 +358,24 @@ class ColonyState:
         first_streams[worlds, self.numbers[worlds, slots]] = self.streams[worlds, slots]
 
     def set_learning_rate(self, learning_rate: float) -> None:
-        """Set the learning rate and the weights that follow from it."""
+        """Set the learning rate and the update weights."""
         self.learning_rate = learning_rate
         most = self.capacity if self.sharing == "shared" else 1
         weights, kept = update_weights(learning_rate, most), self.arrays["weights"]
-        if len(weights) > len(kept):  # seldom: Taichi keeps some bytes for good of each array
+        if len(weights) > len(kept):  # rare, because Taichi leaks some bytes for each new array
             kept = self.arrays["weights"] = np.empty(min(2 * len(weights), most + 1), np.float32)
         kept[: len(weights)], kept[len(weights) :] = weights, weights[-1]
 
     def sort_ants(self) -> None:
-        """Store the ants of a world about in the order of their cells: neighbours share caches.
+        """Sort the ants of a world roughly by cell, so that neighbours share caches.
 
-        Ants have numbers, so that their order changes nothing; but it stays where slots matter, and
-        where some are vacant, which must stay behind the others.
+        Ants have numbers, so their order does not change results. They are not sorted if slots
+        matter, or if some slots are vacant, because vacant slots must be the last ones.
         """
         slots_matter = self.ants_change or self.one_a_slot or self.is_given_actions
         if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
             return
-        # Cells to 16 bits, by which NumPy sorts in a tenth of the time.
+        # Keys of 16 bits, which NumPy sorts in a tenth of the time.
         near = self.cells >> max(0, self.grid.size.bit_length() - 16)
         first = np.arange(len(self.seeds))[:, None] * self.capacity
         order = (np.argsort(near.astype(np.uint16), axis=1, kind="stable") + first).ravel()
@@ -390,7 +390,7 @@ class ColonyState:
     # Arrays
 
     def _start_of_episode(self) -> Arrays:
-        """Make what each episode begins with, as short as it can be told; see `_set_to_start`."""
+        """Return compact arrays for the start of each episode; see `_set_to_start`."""
         worlds, n = self.worlds, self.ants
         starts = [
             world.start(seed, n, self.start) for world, seed in zip(worlds, self.seeds, strict=True)
@@ -399,7 +399,7 @@ class ColonyState:
         ground = self._of_each(World.ground)
         np.put_along_axis(ground, cells.astype(np.int64), ANT_GROUND, axis=1)
         levels = self._of_each(World.trail_levels)
-        levels = levels if levels.any() else levels[:, :1].copy()  # all cells begin alike
+        levels = levels if levels.any() else levels[:, :1].copy()  # all cells are equal
         rows = np.zeros((len(WorldRow), len(worlds)), np.int32)
         rows[WorldRow.RUNNING] = 1
         for row in (WorldRow.TOP, WorldRow.FIRST_VACANT, WorldRow.LIVING, WorldRow.NEXT_NUMBER):
@@ -408,12 +408,12 @@ class ColonyState:
         rows[WorldRow.QUEEN_CELL] = [int(self.grid.index(world.queen)) for world in worlds]
         foods = [food_sources.at_start(world) for world in worlds] if self.n_food_sources else []
         return {
-            # Where the ants start, by world and number.
+            # The start cells and headings of ants, by world and number.
             "start_cells": cells,
             "start_headings": np.array([headings for _, headings in starts], np.int8),
-            # What a cell holds, and a mark of the ant on it, see `layout`.
+            # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
-            # Integer trails: the clock at which a cell's trail has evaporated; dense: the levels.
+            # The clock at which a cell's trail has evaporated; if dense, its level.
             "level" if self.pheromone.dense else "trail": levels.reshape(-1),
             "worlds": rows,
             # Sums over all ants in this episode, see `Tally`.
@@ -422,7 +422,7 @@ class ColonyState:
         }
 
     def _of_episode(self) -> Arrays:
-        """Make the arrays that change in an episode, as they are at the start of one."""
+        """Return the arrays that change in an episode, at its start."""
         n_worlds, dense = len(self.worlds), self.pheromone.dense
         slots, cells = n_worlds * self.capacity, n_worlds * self.grid.size
         unused = {"state"} if self.task.sees.name == "paper" else set()  # the percept is the state
@@ -437,17 +437,17 @@ class ColonyState:
         }
         for names, dtype in ((INTEGER_COLUMNS, np.int32), (BYTE_COLUMNS, np.int8)):
             used = [name for name in names if name not in unused]
-            # In one piece, since columns at the same offset of a page slow each other down.
+            # One allocation, because columns at equal offsets in pages slow each other down.
             made |= zip(used, np.zeros((len(used), slots), dtype), strict=True)
         self._set_to_start(made)
         return made
 
     def _at_start(self) -> Arrays:
-        """Return what begins an episode without where ants stand, which goes into columns."""
+        """Return the start of an episode without the cells and headings of ants."""
         return {k: v for k, v in self.at_start.items() if not k.startswith("start_")}
 
     def _set_to_start(self, arrays: Arrays, which: Which = ALL) -> None:
-        """Set what changes in an episode of these worlds to its start."""
+        """Reset the arrays that change in an episode, for these worlds."""
         self._copy_worlds(arrays, self._at_start(), which)
         shape = len(self.worlds), self.capacity
         column = {
@@ -464,39 +464,39 @@ class ColonyState:
         column["stage"][which, :n] = Stage.LIVING
 
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
-        """Make the arrays that outlive an episode."""
+        """Return the arrays that last through all episodes."""
         slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
         owners = n_worlds * (slots if self.one_a_slot else 1)
         sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)
         if owners * max(sizes) > _MOST_NUMBERS:
             raise AntsError(
-                f"{owners} tables, and what learner {self.training.learner!r} keeps with each, "
-                f"take more than {_MOST_NUMBERS} numbers; take fewer ants, worlds or states, or "
-                'make sharing "shared".'
+                f"{owners} tables, with the memory of learner {self.training.learner!r} for each, "
+                f"need more than {_MOST_NUMBERS} numbers; choose fewer ants, worlds or states, or "
+                'sharing="shared".'
             )
         return {
             "streams": np.zeros(n_worlds * slots, np.uint64),
             **self._seeded(),
-            # By world or slot: the tables, further tables of the learner behind each; its memory.
+            # By world or slot: the table, then further tables of the learner; its memory.
             "q": self._tables(q_values),
             "floats": np.zeros(max(1, owners * memory.floats), np.float32),
             "integers": np.zeros(max(1, owners * memory.integers), np.int32),
         }
 
     def _seeded(self) -> Arrays:
-        """Make what the seeds of the worlds decide, and what goes on through all episodes."""
+        """Return the arrays that depend on seeds and last through all episodes."""
         seeds = words_of(self.seeds)
         numbers = np.arange(self.capacity, dtype=np.uint64)  # more ants may start later episodes
         first_streams = stream_state(seeds[:, None], STREAM_ANT, numbers[None, :])
         return {
-            # By world and ant number: where the streams of the ants that start episodes stopped.
+            # By world and ant number: the last states of the streams of ants that start episodes.
             "first_streams": first_streams.reshape(-1),
             "queen_streams": np.atleast_1d(stream_state(seeds, STREAM_QUEEN, 0)).astype(np.uint64),
-            "episodes": np.full(len(seeds), -1, np.int32),  # the number of the present one
+            "episodes": np.full(len(seeds), -1, np.int32),  # the number of the present episode
         }
 
     def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
-        """Make the tables of all worlds or slots; without values, of the initial value."""
+        """Return the tables of all worlds or slots, with `q_values` or the initial value."""
         n_worlds, own = len(self.seeds), self.one_a_slot
         slots, n_states = self.capacity if own else 1, self.task.n_states
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
@@ -506,50 +506,50 @@ class ColonyState:
             if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
                 raise AntsError(
                     f"q_values has shape {q_values.shape}; give ({form}), ({n_worlds}, {form}) for "
-                    f"one table a world, or ({n_worlds}, {slots}, {form}) for one a slot, if they "
-                    "are not shared."
+                    f"one table per world, or without sharing ({n_worlds}, {slots}, {form}) for "
+                    "one table per slot."
                 )
             given = q_values.reshape(*leading, *[1] * (2 - len(leading)), 1, n_states, N_ACTIONS)
             q[..., :N_ACTIONS] = given
         return q.reshape(-1)
 
     def _constants(self) -> Arrays:
-        """Make what worlds and settings determine, and what is used within a tick alone."""
+        """Return constants of worlds and settings, and scratch arrays of a tick."""
         chunks = len(self.seeds) * self.chunks
         pairs = self.task.n_states * ROW if self.sharing == "shared" else 0
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
-            # A bit for each heading that leads nearer to the queen.
+            # By cell: a bit for each heading that leads nearer to the queen.
             "closer": self._of_each(World.closer).reshape(-1),
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
             "rewards": self.task.rewards.by_event(),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
-            # How far the mean of n errors moves a value, by n; see `set_learning_rate`.
+            # By n: the weight of the mean of n errors in an update; see `set_learning_rate`.
             "weights": np.zeros(2, np.float32),
-            # What the ant on a cell wants, see `layout`.
+            # By cell: the mark of what its ant wants, see `rules.conflicts`.
             "wants": np.zeros(cells, np.uint8),
             "spare": np.zeros_like(self.arrays["level"]),  # the next levels, with diffusion
             "orders": np.zeros(len(Order), np.int32),
             "barrier": np.zeros(24, np.int64),  # see `kernels.wait_for_all`
             "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),
-            # By chunk and pair: fixed-point sums of TD errors, the last error, and see SumRow.
+            # By chunk and pair: fixed-point sums of TD errors, the last error, and `SumRow`.
             "sums": np.zeros(sums, np.int64),
             "errors": np.zeros(sums, np.float32),
             "sums_of": np.zeros((len(SumRow), sums), np.int32),
-            # By chunk: how many pairs have updates, then which.
+            # By chunk: the number of pairs with updates, then these pairs.
             "touched": np.zeros(chunks * (pairs + 1), np.int32),
         }
 
     def _of_each(self, make: Callable[[World], np.ndarray]) -> np.ndarray:
-        """Make an array for each world, once for those that are equal."""
+        """Return an array for each world, made once for equal worlds."""
         made = {world: make(world) for world in dict.fromkeys(self.worlds)}
         return np.stack([made[world] for world in self.worlds])
 
     def _copy_worlds(self, into: Arrays, source: Arrays, which: Which) -> None:
-        """Copy what belongs to some worlds, which lie one after another in the last axis."""
+        """Copy the parts of some worlds; worlds are consecutive in the last axis."""
         n_worlds = len(self.seeds)
         for name, array in source.items():
             if array.shape[-1] % n_worlds == 0:  # others are not in use
@@ -559,7 +559,7 @@ class ColonyState:
     # Files
 
     def contents(self) -> tuple[dict[str, Any], Arrays]:
-        """Return all that a file holds: facts and arrays."""
+        """Return the contents of a file: facts and arrays."""
         arrays = {f"array_{name}": self.arrays[name] for name in self.stored}
         numbers = {world: number for number, world in enumerate(dict.fromkeys(self.worlds))}
         facts = {
@@ -568,14 +568,14 @@ class ColonyState:
             "worlds": [world.as_dict() for world in numbers],
             "world_of": [numbers[world] for world in self.worlds],
             "one_a_slot": self.one_a_slot,
-            # Interventions can make more than there are at the start.
+            # Interventions can add food sources.
             "food_sources": self.n_food_sources,
             **{name: getattr(self, name) for name in (*_OPTIONS, *_PROGRESS)},
         }
         return facts, arrays
 
     def save(self, path: files.PathLike) -> None:
-        """Write the colony as it is now; `load` resumes it, bit for bit.
+        """Write the present state to a file, from which `load` resumes the colony bit for bit.
 
         AntsError if an action value is not finite, seeds repeat, or the file cannot be written.
         """
@@ -592,11 +592,11 @@ class ColonyState:
         *,
         arch: str | None = None,
     ) -> State:
-        """Read a colony that `save` wrote.
+        """Return a colony that `save` wrote.
 
         AntsError if the file cannot be used, or its learner or observation is not registered.
         """
-        runtime.start(threads, arch)  # its errors are not about the file
+        runtime.start(threads, arch)  # first, because its errors are not about the file
         with _KIND.reading(path) as (arrays, facts):
             given = facts["training"]
             training = None if given is None else TrainingConfig(**given)
@@ -605,7 +605,7 @@ class ColonyState:
             worlds = [World.from_dict(one) for one in facts["worlds"]]
             task, options = Task.from_dict(facts["task"]), {name: facts[name] for name in _OPTIONS}
             if options["sharing"] == "frozen" and training is not None:
-                # Tables of the right shape, until its own are put in.
+                # Tables of the right shape, which the arrays of the file replace.
                 leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
                 options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
             colony = cls([worlds[w] for w in facts["world_of"]], task, training, **options)
@@ -622,7 +622,7 @@ class ColonyState:
         return colony
 
     def __eq__(self, other: object) -> bool:
-        """Return whether both would be written alike, so that they go on alike."""
+        """Return whether both would be saved as equal files, and so behave identically."""
         if not isinstance(other, ColonyState):
             return NotImplemented
         (facts, arrays), (other_facts, other_arrays) = self.contents(), other.contents()
@@ -636,11 +636,11 @@ class ColonyState:
 
 
 def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:
-    """A world for each seed, all of the same ranges."""
+    """Return a world for each seed; AntsError unless all have the same ranges."""
     given = entries_of(world) or [world] * n_seeds
     worlds = tuple(checks.checked_world(one, learns) for one in given)
     if len(worlds) != n_seeds:
-        raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds.")
+        raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds; give one per seed.")
     ranges = {world.ranges for world in worlds}
     if len(ranges) > 1:
         raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")

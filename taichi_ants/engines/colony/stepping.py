@@ -1,4 +1,4 @@
-"""Time in a colony: launches of its kernels, and which threads share the work of a tick."""
+"""Launches of the kernels of a colony, and the choice of threads for a tick."""
 
 from __future__ import annotations
 
@@ -14,26 +14,26 @@ from taichi_ants import runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
 
-# Ants are sorted once they have taken so many steps together, but not too seldom nor too often.
+# Ants are sorted after this many steps of all ants, within limits in ticks.
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _PIECE_SECONDS = 0.4
-_SPINS = 2**26  # of a thread at a barrier: half a second or more
-_LAUNCHES_BETWEEN_PROBES = 8  # and a probe has so many times fewer ticks
+_SPINS = 2**26  # checks of a thread at a barrier, which take at least half a second
+_LAUNCHES_BETWEEN_PROBES = 8  # also the factor by which a probe has fewer ticks
 
 
 class ThreadChoice:
-    """All threads share the ticks of a large world, or one does them alone, if that is faster.
+    """The choice whether all threads share the ticks of a large world, or one does them alone.
 
-    Threads that share a tick wait for each other several times in it, and wait long where other
-    programs use the processors. So the slower choice is tried now and then.
+    Threads that share a tick wait for each other several times, and they wait long if other
+    programs use the processors. So the slower choice is measured again from time to time.
     """
 
     def __init__(self) -> None:
         self._launches = 0
-        self._paces: dict[int, float] = {}  # seconds a tick took, by threads
+        self._paces: dict[int, float] = {}  # seconds per tick, by number of threads
 
     def plan(self, ticks: int, most: int) -> tuple[int, int]:
-        """Return how many of the ticks to launch next, and on how many threads, `most` at most."""
+        """Return the number of ticks for the next launch, and of threads, up to `most`."""
         if most == 1:
             return ticks, 1
         self._launches += 1
@@ -43,20 +43,20 @@ class ThreadChoice:
         return ticks, best
 
     def took(self, threads: int, seconds: float) -> None:
-        """Note how long so many threads took for a tick."""
+        """Record the seconds per tick on a number of threads."""
         self._paces[threads] = seconds
 
 
 class Stepper:
-    """Launches the kernels of one colony."""
+    """The launches of the kernels of one colony."""
 
     def __init__(self) -> None:
         self._launches: dict[str, Any] = {}  # prepared kernels, by name
-        self._piece = 1  # ticks that take less than _PIECE_SECONDS
+        self._piece = 1  # a number of ticks that takes less than _PIECE_SECONDS
         self.threads = ThreadChoice()
 
     def pieces(self, state: ColonyState, n: int) -> Iterator[None]:
-        """Let n ticks pass, in short pieces: a launch of a kernel cannot be interrupted."""
+        """Yield after each short launch until n ticks are done; launches cannot be interrupted."""
         end = state.ticks + n
         while state.ticks < end:
             piece = min(self._piece, end - state.ticks)
@@ -68,7 +68,7 @@ class Stepper:
             yield
 
     def advance(self, state: ColonyState, n: int) -> None:
-        """Let n ticks pass."""
+        """Advance the colony by n ticks."""
         end = state.ticks + n
         if state.schedule == "by_world":
             self._launch_ticks(state, n, parts=len(state.seeds))
@@ -80,14 +80,14 @@ class Stepper:
             self._share_ticks(state, min(end - state.ticks, interval - state.ticks % interval))
 
     def launch(self, state: ColonyState, name: str) -> None:
-        """Do the phases of this name of `kernels`, or its `ticks`."""
-        runtime.start()  # the caller may have reset Taichi, or forked
+        """Launch a kernel: the phases of this name in `kernels`, or "ticks"."""
+        runtime.start()  # the caller may have reset Taichi, or forked the process
         if name not in self._launches:
             self._launches[name] = self._prepared(state, name)
         self._launches[name]({**kernel_numbers(state), **state.arrays})
 
     def _share_ticks(self, state: ColonyState, n: int) -> None:
-        """Let up to n ticks pass, each shared by all threads."""
+        """Advance by up to n ticks, which threads share."""
         running = runtime.start()
         if not _has_barrier(running):
             rounds = state.training.planning_steps if state.plans_together else 0
@@ -103,7 +103,7 @@ class Stepper:
             self.threads.took(threads, (time.perf_counter() - began) / n)
 
     def _launch_ticks(self, state: ColonyState, n: int, parts: int) -> None:
-        """Let n ticks pass in one launch; if it gives up at the barrier, another does the rest."""
+        """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""
         orders, barrier = state.arrays["orders"], state.arrays["barrier"]
         orders[:], barrier[:] = (n, parts, 0, _SPINS), 0
         self.launch(state, "ticks")
@@ -115,7 +115,7 @@ class Stepper:
 
     @staticmethod
     def _prepared(state: ColonyState, name: str) -> Any:
-        """Return a kernel that can be launched again and again."""
+        """Return a kernel for repeated launches."""
         from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.colony import kernels
 
@@ -131,16 +131,16 @@ class Stepper:
 
 
 def _has_barrier(running: runtime.Runtime) -> bool:
-    """Return whether threads can wait for each other: not on a GPU."""
+    """Return whether threads can wait for each other, which a GPU does not allow."""
     return running.arch == "cpu"
 
 
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
-    """Return the numbers that kernels read besides arrays."""
+    """Return the numbers that kernels read in addition to arrays."""
     memory = state.memory
     return {
         "n_worlds": len(state.seeds),
-        "n_ants": state.ants,  # that start an episode
+        "n_ants": state.ants,  # at the start of an episode
         "n_slots": state.capacity,
         "n_chunks": state.chunks,
         "n_food_sources": state.n_food_sources,  # room for food sources in each world
@@ -154,7 +154,7 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "epsilon": state.epsilon,
         "explore_below": np.uint64(state.epsilon * 4294967296.0),
         "planning_steps": state.training.planning_steps,
-        # So that the sum of the errors of all ants is a fixed-point number, see `learning`.
+        # A bound with which the sum of the errors of all ants fits 64 bits, see `learning`.
         "largest_error": 2.0**31 / (state.capacity + 1),
         "tables": 1 + memory.tables,
         "floats_by_8": memory.floats // 8,  # see the runs' `engine`

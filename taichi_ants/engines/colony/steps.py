@@ -1,9 +1,9 @@
-"""What each ant of a colony does in a tick, phase by phase; see `rules` for what it means.
+"""Observations and actions of the ants of a colony in a tick, phase by phase; see `rules`.
 
-Each ant writes what it wants into `wants` at its own cell, see `rules.conflicts`. `wants` stays as
-it is while ants act, and each ant takes its own mark away when it looks around at the end of the
-tick. Where cells with ants can be entered, see `Traffic`, the winners are marked in a phase of
-their own before all act: each ant finds its own way out of what all have written.
+Each ant writes a mark of what it wants into `wants` at its own cell, see `rules.conflicts`. The
+marks do not change while ants act; each ant removes its mark when it observes at the end of the
+tick. If ants can enter cells with ants, see `Traffic`, an additional phase marks the winners before
+all ants act.
 """
 
 import taichi as ti
@@ -38,19 +38,19 @@ from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
 @ti.func
 def trait(column: ti.template(), ant):
-    """One of the small numbers of an ant, as i32."""
+    """Return a value of an ant from a byte column, as i32."""
     return ti.cast(column[ant], ti.i32)
 
 
 @ti.func
 def put(column: ti.template(), ant, value):
-    """Write down one of the small numbers of an ant."""
+    """Set a value of an ant in a byte column."""
     column[ant] = ti.cast(value, ti.i8)
 
 
 @ti.func
 def state_index_of(c: ti.template(), v: ti.template(), ant):
-    """The state index of an ant."""
+    """Return the state index of an ant."""
     state = trait(c.percept, ant)
     if ti.static(not v.sees_percept):
         state = c.state[ant]
@@ -59,7 +59,7 @@ def state_index_of(c: ti.template(), v: ti.template(), ant):
 
 @ti.func
 def observe(c: ti.template(), v: ti.template(), w, ant, clock):
-    """What an ant sees: the percept, and the state index."""
+    """Return the percept and the state index of an ant."""
     percept, state = 0, 0
     if ti.static(v.sees_percept):
         percept = see(c, v, w, ant, clock)
@@ -73,7 +73,7 @@ def observe(c: ti.template(), v: ti.template(), w, ant, clock):
 
 @ti.func
 def see(c: ti.template(), v: ti.template(), w, ant, clock):
-    """The percept alone, without what only other observations need."""
+    """Return the percept, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     left = here + step_towards(c.compass, heading, LEFT)
     forward = here + step_towards(c.compass, heading, FORWARD)
@@ -100,14 +100,14 @@ def see(c: ti.template(), v: ti.template(), w, ant, clock):
 
 @ti.func
 def strongest_of(c: ti.template(), v: ti.template(), left, forward, right, clock):
-    """The largest level of the three cells ahead that counts."""
+    """Return the largest level that counts among the three cells ahead."""
     others = ti.max(level_that_counts(c, v, forward, clock), level_that_counts(c, v, right, clock))
     return ti.max(level_that_counts(c, v, left, clock), others)
 
 
 @ti.func
 def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
-    """All that the ant can look at."""
+    """Return the view of an ant."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     nearer = vision.nearer_from(c.closer[here], heading)
     view = v.view_type(carries=trait(c.carries, ant), own_level=level_of(c, v, here, clock))
@@ -116,7 +116,7 @@ def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
         place = here + step_around(c.compass, heading, cells[k])
         standable = (looks_of(c.ground[place]) == EMPTY) | (c.ground[place] >= ANT_GROUND)
         view.levels[k] = ti.select(standable, level_of(c, v, place, clock), 0)
-        # 0 if no ant stands there, 1 if one without food does, 2 if one with food does.
+        # 0 without an ant, 1 with a forager, 2 with a carrier.
         view.ants[k] = (ti.cast(c.ground[place] >> 4, ti.i32) + 1) >> 3
         view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
         view.codes[k] = looks_of(c.ground[place])
@@ -132,19 +132,19 @@ def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
 
 @ti.func
 def looks_of(ground):
-    """How a cell looks, without the mark of the ant on it: u8 -> i32."""
+    """Return the ground of a cell, without the mark of the ant on it: u8 -> i32."""
     return ti.cast(ground & 15, ti.i32)
 
 
 @ti.func
 def table_of(c: ti.template(), v: ti.template(), owner):
-    """Where the tables of an ant, or of the world whose ants share one, begin."""
+    """Return the start of the tables of an ant, or of a world whose ants share a table."""
     return owner * c.tables * (v.observation.n_states * ROW)
 
 
 @ti.func
 def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state):
-    """The ant's choice in a state, by a random stream that was advanced for it."""
+    """Return the ant's action in a state, by a random stream that was advanced for it."""
     table = table_of(c, v, ant if ti.static(v.own_tables) else w)
     values, bits = values_of(c.q, table, state), bits_of(random_state)
     return choose_in_crowd(c.compass, values, bits, c.explore_below)
@@ -152,9 +152,9 @@ def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state)
 
 @ti.func
 def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Turn, and write down what the action needs: a cell to enter, or a food to take.
+    """Turn an ant, and write what its action needs: a cell to enter, or food to take.
 
-    Hardly a branch: what the next ant does cannot be predicted from what this one did.
+    There are few branches, because the processor cannot predict the actions of ants.
     """
     action, percept = -1, trait(c.percept, ant)
     cell, carries = c.cell[ant], trait(c.carries, ant)
@@ -177,7 +177,7 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     foods = vision.goals_in_view(percept)
     if foods != 0 and action == PICK_UP and carries == 0:
         position = lowest_bit_number(foods)
-        if foods & (foods - 1) != 0:  # several foods in view
+        if foods & (foods - 1) != 0:  # several food items in view
             k, random_state = draw_below(random_state, popcnt(foods))
             position = bit_number(foods, k)
         wanted = cell + step_towards(c.compass, heading, position)
@@ -194,9 +194,9 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Where cells with ants can be entered: mark the winners, and note what a move would be.
+    """Mark the winners if ants can enter cells with ants, and store the event of a move.
 
-    A move is judged before any ant lays a trail.
+    The event of a move does not depend on the deposits of this tick.
     """
     base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
     won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
@@ -207,18 +207,18 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def step_ahead(c: ti.template(), ant):
-    """The index step to the cell before an ant."""
+    """Return the index step to the cell ahead of an ant."""
     return step_towards(c.compass, trait(c.heading, ant), FORWARD)
 
 
 @ti.func
 def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
-    """The event of a move that succeeds; a cell with an ant is a lure if it is the better one."""
+    """Return the event of a successful move; a cell with an ant is a lure if it is better."""
     action, percept = trait(c.action, ant), trait(c.percept, ant)
     event = move_event(vision.code_in_view(percept, ti.min(action, RIGHT)))
     here = base + c.cell[ant]
     ahead = here + step_ahead(c, ant)
-    if conflicts.had_ant(c, ahead):  # seldom, so that few trails are read
+    if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
         rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
         nearer = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
         better = ti.select(trait(c.carries, ant) == 1, nearer, rises)
@@ -228,7 +228,7 @@ def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
 
 @ti.func
 def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Do what is won: move, take, give, deposit."""
+    """Do the action of an ant, as far as it has won: move, pick up, deliver, deposit."""
     base, clock = w * c.size, tick * c.evaporates
     action, percept = trait(c.action, ant), trait(c.percept, ant)
     cell, wanted = c.cell[ant], c.want[ant]
@@ -251,7 +251,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         )
     if not filled:
         c.ground[base + cell] = EMPTY
-    c.want[ant] = cell  # where its mark is
+    c.want[ant] = cell  # the cell with the ant's mark
     if carries == 1:
         carried = c.carried[ant]
         if goes != cell:
@@ -284,13 +284,13 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def tally(c: ti.template(), state, chunk, n):
-    """Count in a chunk, whose ants one thread moves; `+=` would be atomic, which takes longer."""
+    """Add n to a tally of a chunk, which one thread processes; `+=` would be atomic and slower."""
     c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
 
 
 @ti.func
 def take_from_source(c: ti.template(), place, tick):
-    """If the food of a source lay there, the source waits from now on."""
+    """Let the food source whose food was taken from a cell, if any, wait from now on."""
     if c.n_food_sources > 0:
         source = c.source_of[place]
         if source >= 0:

@@ -1,4 +1,4 @@
-"""The trails of a colony in its arrays: expiry clocks in `trail`, or levels in `level` if dense."""
+"""The trails of a colony: expiry clocks in the array `trail`, or levels in `level` if dense."""
 
 import taichi as ti
 
@@ -9,20 +9,20 @@ from taichi_ants.task.rules import pheromone
 
 @ti.func
 def level_of(c: ti.template(), v: ti.template(), place, clock):
-    """The trail on a cell: i32, or f32 if dense."""
+    """Return the trail of a cell: i32, or f32 if dense."""
     return c.level[place] if ti.static(v.dense) else pheromone.level_left(c.trail[place], clock)
 
 
 @ti.func
 def level_in_view(c: ti.template(), v: ti.template(), place, clock):
-    """The trail that an ant can see in a cell: 0 unless the cell is empty."""
-    # Always read, never branch: most cells are empty, and nobody can predict which.
+    """Return the trail that an ant sees in a cell: 0 unless the cell is empty."""
+    # Read without a branch, because the processor cannot predict which cells are empty.
     return ti.select(c.ground[place] & 15 == EMPTY, level_of(c, v, place, clock), 0)
 
 
 @ti.func
 def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
-    """The trail of a cell in view for the strongest one, 0 where it does not count."""
+    """Return the trail of a cell as it counts for the strongest one, 0 if it does not count."""
     level = level_in_view(c, v, place, clock)
     if ti.static(v.view == "strongest_under_carriers"):
         carrier = c.ground[place] >> 4 == STANDS_WITH_FOOD
@@ -32,7 +32,7 @@ def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
 
 @ti.func
 def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
-    """Lay the trail of an ant that has carried its food for so many ticks, as the task says."""
+    """Deposit, by the task's rule, the trail of an ant that has carried its food for some ticks."""
     if c.deposits != pheromone.NONE:
         laid = pheromone.level_after_deposit(c, c.deposits, level_of(c, v, place, clock), carried)
         if ti.static(v.dense):
@@ -43,7 +43,7 @@ def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
 
 @ti.func
 def evaporate(c: ti.template(), place):
-    """One tick of evaporation of a cell in dense mode."""
+    """Evaporate the dense trail of a cell for one tick."""
     c.level[place] = pheromone.evaporated(c.level[place], c.decay)
 
 
@@ -56,6 +56,6 @@ def diffuse(c: ti.template(), place):
 
 @ti.func
 def settle(c: ti.template(), place):
-    """Take over what `diffuse` has computed for all cells."""
+    """Set the level of a cell to the result of `diffuse`."""
     if c.share > 0.0:
         c.level[place] = c.spare[place]

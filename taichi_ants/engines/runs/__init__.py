@@ -1,1 +1,1 @@
-"""Many independent runs: one parallel task a run, whole episodes inside it."""
+"""The engine of independent runs: each run is one parallel task of whole episodes."""

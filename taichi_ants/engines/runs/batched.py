@@ -1,4 +1,4 @@
-"""Many single ants, each in a world of its own, that do one step at a time by given actions."""
+"""Batched environments: many single ants, each in its own world, that take given actions."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.task import Task
 from taichi_ants.worlds.world import World
 
-_PER_CHUNK = 256  # ants that one thread steps together
-# The arrays with a number for each ant.
+_PER_CHUNK = 256  # ants that one thread steps in a row
+# The arrays with one value per ant.
 _OF_ANTS: dict[type, tuple[str, ...]] = {
     np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
     + ("final_states",),
@@ -30,18 +30,18 @@ _OF_ANTS: dict[type, tuple[str, ...]] = {
 
 
 class BatchedEnvironments:
-    """n ants, each in a world of its own.
+    """n environments with one ant each.
 
-    An ant depends on its world, the task, its seed and its actions alone. Worlds have the same
-    ranges; ant i lives in number i modulo their number. A delivery (`ends`) "terminates" the
-    episode, "truncates" it, or "continues": then food grows back at once. If it `falls`, a trail
-    evaporates.
+    An ant depends only on its world, the task, its seed and its actions. All worlds have the same
+    ranges; ant i lives in world i modulo the number of worlds. `ends` is the effect of a delivery
+    on the episode: "terminates", "truncates" or "continues". In the last case food grows back at
+    once. Trails evaporate if `falls`.
 
     Attributes:
-        arrays: By name, one row for each ant: percepts uint8 and states int32, what it sees;
-            rewards_of float64, terminations and truncations uint8, events uint8 (`Event`) and
-            reasons uint8 (`Reason`), the result of its last action; final_states int32 and
-            final_percepts uint8, what it saw when the episode ended that `step` has restarted.
+        arrays: Arrays by name, with one row per ant. States: percepts uint8, states int32. Results
+            of the last action: rewards_of float64, terminations and truncations uint8, events uint8
+            (`Event`), reasons uint8 (`Reason`). Last states of an episode that `step` has
+            restarted: final_states int32, final_percepts uint8.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class BatchedEnvironments:
         number = np.arange(n, dtype=np.int32) % len(self.worlds)
         own = np.empty((n, size + 2), np.int32)
         own[:, :size] = common["world"].reshape(-1, size)[number]
-        own[:, size:] = size, -1  # nothing has changed, see `step.restore`
+        own[:, size:] = size, -1  # no cell has changed, see `step.restore`
         self.arrays: dict[str, Any] = {
             **common,
             "n": n,
@@ -64,7 +64,7 @@ class BatchedEnvironments:
             "delivery_terminates": int(ends == "terminates"),
             "delivery_truncates": int(ends == "truncates"),
             "same_step": 0,
-            # The cells of all worlds, then those of each ant.
+            # The cells of all worlds, then the cells of each ant.
             "shared_cells": common["world"].size,
             "cells": np.concatenate([common["world"], own.reshape(-1)]),
             "worlds": number,
@@ -72,7 +72,7 @@ class BatchedEnvironments:
         }
 
     def seed(self, seeds: Sequence[int], which: np.ndarray) -> None:
-        """Give some ants, int (k,), new random streams and start places, by their seeds."""
+        """Set the seeds of some ants, int (k,): new random streams and start cells."""
         words = words_of(seeds)
         self.arrays["random_states"][which] = stream_state(words, STREAM_ANT, 0)
         for number, world in enumerate(self.worlds):
@@ -82,18 +82,18 @@ class BatchedEnvironments:
             self.arrays["start_headings"][which[here]] = headings
 
     def begin(self, which: np.ndarray) -> None:
-        """Begin an episode for the ants where `which`, bool (n,), is True."""
+        """Start an episode for the ants for which `which`, bool (n,), is True."""
         self._go(np.where(which, Command.BEGIN, Command.WAIT), same_step=False)
 
     def step(
         self, actions: np.ndarray, begins: np.ndarray | int = 0, same_step: bool = False
     ) -> None:
-        """Let all ants do these actions; but where `begins` is 1 an episode begins."""
+        """Let all ants take these actions, except ants with `begins` 1, which start an episode."""
         self.arrays["actions"][:] = actions
         self._go(begins, same_step)
 
     def snapshot(self, number: int) -> Snapshot:
-        """Return the world of an ant as it is now; arrays are copies."""
+        """Return the present state of an ant's world; arrays are copies."""
         arrays, grid = self.arrays, self.worlds[0].grid
         own = self.arrays["shared_cells"] + number * (grid.size + 2)
         ground, levels = unpack_cells(arrays["cells"][own : own + grid.size])
@@ -108,7 +108,7 @@ class BatchedEnvironments:
         self.arrays["same_step"] = int(same_step)
         with runtime.alone:
             if self._launch is None:
-                runtime.start()  # Taichi is imported once it is configured
+                runtime.start()  # configures Taichi before the imports below
                 from taichi_ants.engines.arguments import Launch
                 from taichi_ants.engines.runs.kernels import step_kernel
 
@@ -118,5 +118,5 @@ class BatchedEnvironments:
             self._launch(self.arrays)
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but what Taichi holds, which is made anew; so copies and pickles go on alike."""
+        """Return the state without Taichi's objects, so that copies and pickles work."""
         return {**vars(self), "_launch": None}

@@ -1,7 +1,8 @@
-"""A world and a task laid out for the kernel of independent runs, and the loop over launches.
+"""Arguments of the kernel of independent runs, and the loop over its launches.
 
 A launch cannot be interrupted, so it should take about a second even if every episode uses all of
-its steps. Within that bound few large launches are best: threads wait for the last run of each.
+its steps. Within that bound, few large launches are best, because threads wait for the last run of
+each launch.
 """
 
 from __future__ import annotations
@@ -35,25 +36,24 @@ from taichi_ants.worlds.world import World
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
 
 _SECONDS = 1.0
-_STEP_NS = 25  # of Q-learning in one thread, on a slow core
+_STEP_NS = 25  # a step of Q-learning on one thread of a slow core
 _WORKSPACE_BYTES = 256 * 2**20
-_MOST_NUMBERS = 2**30  # of one array in a launch, which kernels index by 32 bits
+_MOST_NUMBERS = 2**30  # in one array of a launch, because kernels use 32-bit indices
 _PARALLEL_RUNS_ON_GPU = 4096
 
-# The arguments of the kernel besides those of world and task: of n runs of one learner with tables
-# of n_states rows. Arrays of runs are flat, one run behind the other. Each has so many tables, and
-# so many times 8 floats and integers, see `layout.padded`.
+# The arguments of the kernel for n runs of one learner, without those for world and task. Arrays
+# are flat, one run after another. The sizes of a memory are multiples of 8, see `layout.padded`.
 _NO_WORK: dict[str, Any] = {
     "n_runs": 0,
     "n_episodes": 0,
-    "regrows": 0,  # 1 if food grows back at once; not while an episode ends at a delivery
+    "regrows": 0,  # 1 if food grows back at once; 0 here, because a delivery ends the episode
     "start_cells": np.zeros(1, np.int32),  # (n,)
     "start_headings": np.zeros(1, np.int32),  # (n,)
     "settings": np.zeros(1, np.float64),  # `layout.SETTINGS`, then the hyperparameters
-    "epsilon": np.zeros(1, np.float64),  # (n,) of the next episode
-    "learning_rate": np.zeros(1, np.float64),  # (n,) of the next episode
+    "epsilon": np.zeros(1, np.float64),  # (n,), for the next episode
+    "learning_rate": np.zeros(1, np.float64),  # (n,), for the next episode
     "random_states": np.zeros(1, np.uint64),  # (n,)
-    "streams": np.zeros(1, np.uint64),  # (n * n_episodes,): of each episode without learning
+    "streams": np.zeros(1, np.uint64),  # (n * n_episodes,), one per episode without learning
     "tables": 0,
     "floats_by_8": 0,
     "integers_by_8": 0,
@@ -72,14 +72,14 @@ _NO_WORK: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Runs:
-    """Runs of one learner, or that follow tables without learning.
+    """n runs that learn by one learner, or follow tables without learning.
 
     Attributes:
         seeds: The seed of each run, Python integers (n,), for worlds that do not list their ant.
         settings: float64 (n, columns), `layout.SETTINGS` and the hyperparameters of the learner.
-        state: Where the runs stand, arrays (n, ...), contiguous; the kernel moves it on.
+        state: The state of the runs, contiguous arrays (n, ...), which the kernel updates.
         streams: uint64 (n, episodes), a random stream for each episode without learning.
-        cost: What a step takes, 1 for one of Q-learning.
+        cost: The time of a step, relative to a step of Q-learning.
     """
 
     learner: Learner | None
@@ -93,7 +93,7 @@ class Runs:
     def learning(
         cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], state: RunState
     ) -> Runs:
-        """Configurations that differ in the settings of all learners alone, times seeds."""
+        """Return runs of all seeds and configurations, which share learner and hyperparameters."""
         learner = learners.get(configs[0].learner)
         more = learner.settings(configs[0])
         settings = [(*(getattr(one, name) for name in SETTINGS), *astuple(more)) for one in configs]
@@ -109,7 +109,7 @@ class Runs:
     def following(
         cls, tables: np.ndarray, seeds: np.ndarray, numbers: np.ndarray, epsilon: float
     ) -> Runs:
-        """Runs that follow tables (n, n_states, 5), in the rollouts of these `numbers`."""
+        """Return runs that follow tables (n, n_states, 5), in the rollouts `numbers` of each."""
         state = RunState.empty((len(tables),), tables.shape[-2])
         state.q[:, 0, :, :N_ACTIONS] = tables
         state.epsilon[:] = epsilon
@@ -123,15 +123,15 @@ class Runs:
 
 
 def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]:
-    """Arrays and numbers of a task and of worlds of one grid; trails evaporate if `falls`."""
+    """Return kernel arguments for a task and worlds of one grid; trails evaporate if `falls`."""
     grid = worlds[0].grid
     return {
         "size": grid.size,
         **(task.pheromone if falls else task.pheromone.lasting).numbers,
         **task.numbers,
         "rewards": task.rewards.by_event(),
-        # Of the cells of each world: packed at the start of an episode; trails then, under food
-        # too; a bit for each heading that leads nearer to the queen.
+        # For each world: packed cells and all trails (also under food) at the start of an episode;
+        # per cell a bit for each heading that leads nearer to the queen.
         "world": np.concatenate([pack_cells(world) for world in worlds]),
         "trails": np.concatenate([world.trail_levels() for world in worlds]),
         "closer": np.concatenate([world.closer() for world in worlds]),
@@ -140,12 +140,12 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
 
 
 class Launcher:
-    """The compiled kernel of some runs in one world, and its arguments."""
+    """The compiled kernel for runs in one world, and its arguments."""
 
     def __init__(
         self, world: World, task: Task, max_steps: int, runs: Runs, traced: bool = False
     ) -> None:
-        # Taichi is imported once it is configured, see `runtime`.
+        # Imported here, because Taichi must be configured first; see `runtime`.
         from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.runs.kernels import run_kernel
         from taichi_ants.engines.runs.step import EXTRA_CELLS
@@ -158,10 +158,10 @@ class Launcher:
         self._launch = Launch(partial(run_kernel, runs.learner, task.sees, deposits, half, traced))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self._values = {**_NO_WORK, **laid_out([world], task, falls), "max_steps": max_steps}
-        self._launch(self._values)  # which compiles it
+        self._launch(self._values)  # compiles the kernel
 
     def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
-        """Do some episodes of some runs; what comes out is written into the arrays."""
+        """Do some episodes of some runs, and write the results into the arrays."""
         runs, state = self._runs, self._runs.state
         start_cells = self._cells[some]
         values = {
@@ -179,7 +179,7 @@ class Launcher:
         }
         if runs.streams is not None:
             values["streams"] = np.ascontiguousarray(runs.streams[some, episodes]).reshape(-1)
-        # An array of length 0 cannot be an argument; the single 0 stays.
+        # Taichi allows no arrays of length 0; the default of length 1 stays instead.
         self._values.update({name: one for name, one in values.items() if getattr(one, "size", 1)})
         self._launch(self._values)
 
@@ -192,15 +192,14 @@ def do_episodes(
     outcomes: np.ndarray,
     progress: Progress | None = None,
 ) -> float:
-    """Do the next episodes of n runs, move their state on, and write `outcomes` (3, n, episodes).
+    """Do the next episodes of n runs, update their state, and write `outcomes` (3, n, episodes).
 
     Returns:
-        What it took without compilation, in CPU seconds of all threads together, or wall-clock
-        seconds on a GPU.
+        The time without compilation: CPU seconds of all threads, or wall-clock seconds on a GPU.
     """
     episodes = outcomes.shape[2]
     settings = runtime.start()
-    # Seconds of all threads of this process on the CPU, which other processes do not slow.
+    # Other processes do not change the CPU time of this one.
     clock = time.process_time if settings.arch == "cpu" else time.perf_counter
     workers = settings.threads if settings.arch == "cpu" else _PARALLEL_RUNS_ON_GPU
     launcher = Launcher(world, task, max_steps, runs)
@@ -219,10 +218,10 @@ def do_episodes(
 def size_of_launch(
     workers: int, episodes: int, max_steps: int, cost: float, cells: int, widest: int
 ) -> tuple[int, int]:
-    """Runs, and episodes of each, in one launch, if `workers` runs progress at the same time.
+    """Return the number of runs in a launch, and of episodes of each, for `workers` parallel runs.
 
-    A step costs `cost`, 1 for one of Q-learning; a run needs so many `cells`, and `widest` is the
-    most numbers that its state has in one array.
+    `cost` is the time of a step, relative to a step of Q-learning. `cells` is the number of cells
+    of a run, and `widest` the size of the largest array in its state.
     """
     steps_each = _SECONDS * 1e9 / (_STEP_NS * cost)
     rounds = int(steps_each // (episodes * max_steps))
@@ -240,7 +239,7 @@ def pieces(
     episodes_each: int,
     progress: Progress | None = None,
 ) -> Iterator[tuple[slice, slice]]:
-    """Yield the runs and the episodes of all launches, the episodes of a run in order."""
+    """Yield the runs and episodes of each launch, with the episodes of a run in order."""
     for first in range(0, n_runs, runs_each):
         end = min(first + runs_each, n_runs)
         for begin in range(0, n_episodes, episodes_each):

@@ -1,9 +1,8 @@
-"""The kernels of single ants, each in a world of its own.
+"""The kernels for single ants, each in its own world.
 
-`run_kernel` does whole episodes, step by step, in one task a run. All that a run touches (cells,
-Q-table, memory) lies together and stays in the processor's first cache. A launch cannot be
-interrupted, so that the engine cuts the work into short ones. `step_kernel` does one step of many
-ants, whose actions come from outside.
+`run_kernel` runs whole episodes, with one parallel task per run. The data of a run (cells, Q table,
+memory) are small enough for the processor's first cache. `step_kernel` does one step of many ants
+with given actions.
 """
 
 from collections.abc import Callable
@@ -47,8 +46,8 @@ from taichi_ants.task.rules.pheromone import FADING
 from taichi_ants.task.rules.policy import chance_of, choose
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
-# Places in arrays lie below this, see `engine.size_of_launch`. To say so spares the compiler the
-# case that they are negative.
+# The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
+# indices are not negative.
 _PLACES = 2**30 - 1
 
 
@@ -61,11 +60,11 @@ def run_kernel(
     traced: bool,
     arguments: Any,
 ) -> Callable[..., None]:
-    """The kernel for runs that learn, or follow a fixed policy; it is compiled on first use.
+    """Return the kernel for runs that learn, or that follow a fixed policy if `learner` is None.
 
-    `deposit` and `half` are the pheromone's, see `rules.pheromone` and `Pheromone.view`. If
-    `traced`, each step is recorded too, in `n_episodes * max_steps` rows for each run. `arguments`
-    is the type of the argument pack.
+    For `deposit` and `half`, see `rules.pheromone` and `Pheromone.view`. If `traced`, the kernel
+    also records each step, in `n_episodes * max_steps` rows per run. `arguments` is the type of the
+    argument pack.
     """
     learns = learner is not None
     learner = checked_plugin(learner) if learns else None
@@ -80,7 +79,7 @@ def run_kernel(
 
     @ti.func
     def decide(a: ti.template(), begin, ant, state, explore_below):
-        """The ant's next action, its stream after the draw, and, if traced, the probability."""
+        """Return the next action, the stream after the draw and, if traced, the probability."""
         rng, values = advance(ant.random_state), values_of(a.q, begin, state)
         action, chance = choose(values, bits_of(rng), explore_below), ti.f64(0.0)
         if ti.static(traced):
@@ -89,7 +88,7 @@ def run_kernel(
 
     @ti.func
     def record(a: ti.template(), n, episode, step, before, percept, taken, after, seen):
-        """Write the integers of a step."""
+        """Record the integers of a step."""
         a.trace[n, 0], a.trace[n, 1] = episode, step
         a.trace[n, 2], a.trace[n, 3] = before.cell, before.heading
         a.trace[n, 4], a.trace[n, 5] = percept, taken.state
@@ -127,7 +126,7 @@ def run_kernel(
                 )
                 explore_below = ti.cast(exploration * 4294967296.0, ti.u64)
                 step, clock, total, next_action = 0, 0, 0, -1
-                next_chance = ti.f64(0.0)  # of the next action, where it is drawn before learning
+                next_chance = ti.f64(0.0)  # probability of a next action drawn before learning
                 percept = percept_of(half, a, base, ant, clock)
                 state = state_of(a, base, ant, clock, percept)
                 if ti.static(on_policy):
@@ -198,7 +197,7 @@ def run_kernel(
 
 @ti.func
 def reason_of(a: ti.template(), base, before, after, action):
-    """Why an action was blocked or failed, as a `Reason`."""
+    """Return the `Reason` why an action was blocked or failed."""
     reason = ti.cast(Reason.NONE, ti.i32)
     if after.event == Event.BLOCKED:
         ahead = before.cell + step_towards(a.compass, after.heading, FORWARD)
@@ -222,15 +221,15 @@ def reason_of(a: ti.template(), base, before, after, action):
 def step_kernel(
     observation: Observation, deposit: int, half: bool, serial: bool, arguments: Any
 ) -> Callable[..., None]:
-    """The kernel of a step: act, observe, and begin anew, with arguments as of `run_kernel`.
+    """Return the kernel of a step, in which ants act, observe and restart; see `run_kernel`.
 
-    If `serial`, one thread does all and no other one is woken.
+    If `serial`, one thread does all the work, because waking others would take longer.
     """
     state_of = state_seen(observation, half)
 
     @ti.func
     def put(a: ti.template(), i, ant):
-        """Write down an ant."""
+        """Store an ant."""
         a.ant_cells[i] = ant.cell
         a.headings[i], a.carries[i] = ti.cast(ant.heading, ti.u8), ti.cast(ant.carries, ti.u8)
         if ti.static(deposit == FADING):
@@ -238,14 +237,14 @@ def step_kernel(
 
     @ti.func
     def observe(a: ti.template(), i, base, ant, clock):
-        """Write down what an ant sees; its cells, or those of its unchanged world, are at base."""
+        """Store the percept and state of an ant; the cells of its world start at `base`."""
         percept = percept_of(half, a, base, ant, clock)
         a.percepts[i] = ti.cast(percept, ti.u8)
         a.states[i] = state_of(a, base, ant, clock, percept)
 
     @ti.func
     def begin(a: ti.template(), i, own, origin):
-        """Set a world and its ant to where an episode starts."""
+        """Reset a world and its ant to the start of an episode."""
         if a.changed[i] == 1:
             restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
         ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
@@ -255,15 +254,15 @@ def step_kernel(
 
     @ti.func
     def do(a: ti.template(), i, own, origin, action):
-        """An action of an ant; returns whether the episode has ended."""
+        """Do an action of an ant, and return whether the episode has ended."""
         before = Ant(origin=origin, cell=a.ant_cells[i], heading=ti.cast(a.headings[i], ti.i32))
         before.carries = ti.cast(a.carries[i], ti.i32)
         if ti.static(deposit == FADING):
             before.carried = a.carried[i]
-        if action == PICK_UP:  # only which of several foods it takes is left to chance
+        if action == PICK_UP:  # only the choice among several food items is random
             before.random_state = a.random_states[i]
-        # As long as an ant has changed nothing, it sees the cells that all ants of its world share:
-        # they stay in the processor's cache.
+        # Until an ant changes its world, it reads cells that all ants share, because these stay in
+        # the processor's cache.
         changed = ti.cast(a.changed[i], ti.i32)
         base = ti.select((changed == 1) | (action == PICK_UP), own, origin)
         clock, percept = a.steps[i] * a.evaporates, ti.cast(a.percepts[i], ti.i32)

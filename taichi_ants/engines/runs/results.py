@@ -1,4 +1,4 @@
-"""What training and evaluation return: NumPy arrays and what is needed to go on."""
+"""Results of training and evaluation, with the state from which training resumes."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 _KIND = Kind("training result", 7, "TrainingResult.save")
-_SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that a result shows
+_SUMMED_UP, _LISTED = 50, 6  # episodes and configurations that `repr` of a result shows
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunState(Record):
-    """The state of runs where they stopped; training goes on from it bit for bit.
+    """The state of runs after their last episode, from which training resumes, bit for bit.
 
     Attributes (leading axes: the runs, for example (configurations, seeds)):
-        q: float32 (..., 1 + tables, n_states, 8), the table that the ant acts by and the further
-            ones of its learner; 5 action values and 3 unused.
-        floats, integers: float32 and int32 (..., k), as many as any learner here needs, up to the
-            next multiple of 8; see `taichi_ants.learners.Memory`.
+        q: float32 (..., 1 + tables, n_states, 8), the table by which the ant acts, then further
+            tables of the learner; a row has 5 action values and 3 unused numbers.
+        floats, integers: float32 and int32 (..., k), the memory of the learner, as large as any
+            learner here needs, in multiples of 8; see `taichi_ants.learners.Memory`.
         random_states: uint64 (...,), the ants' random streams.
-        epsilon, learning_rate: float64 (...,), of the next episode.
+        epsilon, learning_rate: float64 (...,), values for the next episode.
     """
 
     q: np.ndarray
@@ -54,7 +54,7 @@ class RunState(Record):
         n_states: int,
         memory: Memory = Memory(),  # noqa: B008
     ) -> RunState:
-        """Zeros for runs of this shape."""
+        """Return a state of zeros for runs of this shape."""
         return cls(
             q=np.zeros((*shape, 1 + memory.tables, n_states, ROW), dtype=np.float32),
             floats=np.zeros((*shape, memory.floats), dtype=np.float32),
@@ -68,7 +68,7 @@ class RunState(Record):
     def fresh(
         cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int
     ) -> RunState:
-        """Of runs that have not begun, leading axes (configurations, seeds)."""
+        """Return the state of new runs, with leading axes (configurations, seeds)."""
         state = cls.empty((len(configs), len(seeds)), n_states, memory_for(configs, n_states))
         state.random_states[:] = stream_state(words_of(seeds), STREAM_ANT, 0)
         for config, q, epsilon, rate in zip(
@@ -79,14 +79,14 @@ class RunState(Record):
         return state
 
     def part(self, configs: slice | list[int]) -> RunState:
-        """The runs of some configurations, with one leading axis: views of a slice, else copies."""
+        """Return runs of some configurations with one leading axis: views of a slice, or copies."""
         n, arrays = self.epsilon[configs].size, vars(self).items()
         return RunState(
             **{name: array[configs].reshape(n, *array.shape[2:]) for name, array in arrays}
         )
 
     def put(self, configs: slice | list[int], part: RunState) -> None:
-        """Overwrite the runs of some configurations with such a part, unless it has views."""
+        """Overwrite the runs of some configurations with a part that has copies, not views."""
         for name, array in vars(self).items():
             new = getattr(part, name)
             if not np.may_share_memory(array, new):
@@ -94,7 +94,7 @@ class RunState(Record):
 
 
 def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
-    """As much as any of the learners needs, which must be registered."""
+    """Return a memory that is large enough for each of the learners, which must be registered."""
     memories = [
         astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
     ]
@@ -105,17 +105,17 @@ def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
 class TrainingResult(Record):
     """The result of `train`: C configurations, S seeds, E episodes.
 
-    Two results are equal if all but their seconds are.
+    Two results are equal if everything except `seconds` is equal.
 
     Attributes:
-        returns, steps, deliveries: int32 (C, S, E), of each episode the undiscounted sum of
-            rewards, the length, and 1 if the food was given to the queen.
-        seconds: What the last training took without compilation: CPU seconds of all threads
-            together, or wall-clock seconds on a GPU.
-        state: Where the runs stopped, leading axes (C, S).
+        returns, steps, deliveries: int32 (C, S, E), for each episode the undiscounted sum of
+            rewards, the number of steps, and 1 if the ant delivered, else 0.
+        seconds: The time of the last training without compilation: CPU seconds of all threads, or
+            wall-clock seconds on a GPU.
+        state: The state of the runs after the last episode, with leading axes (C, S).
 
     Raises:
-        AntsError: The arrays do not belong to the configurations and seeds.
+        AntsError: The arrays do not fit the configurations and seeds.
     """
 
     world: World
@@ -130,14 +130,14 @@ class TrainingResult(Record):
     state: RunState
 
     def __post_init__(self) -> None:
-        """Refuse arrays that training, where kernels believe them, could not go on from."""
+        """Check the shapes and types of arrays, because kernels rely on them."""
         runs, state = (len(self.configs), len(self.seeds)), self.state
         if not isinstance(state, RunState):
-            raise AntsError(f"state of a result is {shown(state)}; it must be a RunState.")
+            raise AntsError(f"the state of a result is {shown(state)}; it must be a RunState.")
         forms = {
             **dict.fromkeys(OUTCOMES, ("int32", (*runs, *np.shape(self.returns)[2:3]))),
             "q": ("float32", (*runs, *np.shape(state.q)[2:3], self.task.n_states, ROW)),
-            # Kernels count the numbers of a memory by 8.
+            # Kernels need sizes that are multiples of 8.
             "floats": ("float32", (*runs, *(n // 8 * 8 for n in np.shape(state.floats)[2:3]))),
             "integers": ("int32", (*runs, *(n // 8 * 8 for n in np.shape(state.integers)[2:3]))),
             "random_states": ("uint64", runs),
@@ -147,20 +147,20 @@ class TrainingResult(Record):
         arrays = {**vars(self), **vars(state)}
         for name, (kind, shape) in forms.items():
             array = arrays[name]
-            check_array(f"{name} of a result", array, kind, shape)
+            check_array(f"the array {name} of a result", array, kind, shape)
 
     @property
     def episodes(self) -> int:
-        """The number of episodes of each run so far."""
+        """The number of episodes of each run."""
         return self.returns.shape[2]
 
     @property
     def q_values(self) -> np.ndarray:
-        """The action values at the end, float32 (C, S, n_states, 5), a copy."""
+        """A copy of the action values after training, float32 (C, S, n_states, 5)."""
         return self.state.q[:, :, 0, :, :N_ACTIONS].copy()
 
     def save(self, path: PathLike) -> None:
-        """Write the result; training goes on from what `load` reads, bit for bit."""
+        """Write the result to a file, from which `load` and `continue_training` resume exactly."""
         facts = {
             "world": self.world.as_dict(),
             "task": self.task.as_dict(),
@@ -175,7 +175,7 @@ class TrainingResult(Record):
 
     @classmethod
     def load(cls, path: PathLike) -> TrainingResult:
-        """Read a result that `save` wrote; its learners need not be registered."""
+        """Return a result that `save` wrote; its learners need not be registered."""
         with _KIND.reading(path) as (arrays, facts):
             task = Task.from_dict(facts["task"])
             outcomes: dict[str, Any] = {name: arrays[name] for name in OUTCOMES}
@@ -213,7 +213,7 @@ class TrainingResult(Record):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Rollouts(Record):
-    """What `evaluate` returns: int32 arrays of shape q_values.shape[:-2] + (rollouts,)."""
+    """The result of `evaluate`: int32 arrays of shape q_values.shape[:-2] + (rollouts,)."""
 
     returns: np.ndarray
     steps: np.ndarray

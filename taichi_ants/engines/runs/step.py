@@ -1,4 +1,4 @@
-"""One ant in one world, in the packed cells of the engine of independent runs: see and act."""
+"""Vision and actions of one ant in one world with packed cells, for the engine of runs."""
 
 from collections.abc import Callable
 from functools import cache
@@ -19,24 +19,24 @@ from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, 
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
 from taichi_ants.task.rules.random_bits import draw_below
 
-# An ant, and what came of its last action.
+# An ant, and the event of its last action.
 Ant = ti.types.struct(
-    origin=ti.i32,  # where its world begins in `world`, `trails` and `closer`
+    origin=ti.i32,  # the start of its world in `world`, `trails` and `closer`
     cell=ti.i32,
     heading=ti.i32,
     carries=ti.i32,
-    carried=ti.i32,  # ticks with the food that it carries, where trails fade
+    carried=ti.i32,  # ticks since the pick-up, for fading deposits
     event=ti.i32,
     random_state=ti.u64,
 )
 
-# The cells of a run are followed by the range of those that the episode has changed.
+# After the cells of a run: the first and last cell that the episode has changed.
 EXTRA_CELLS = 2
 
 
 @ti.func
 def restore(a: ti.template(), base, origin, first, last):
-    """Set the cells from `first` to `last` of a run back to those of its world."""
+    """Reset the cells from `first` to `last` of a run to those of its world."""
     for c in range(first, last + 1):
         a.cells[base + c] = a.world[origin + c]
     a.cells[base + a.size] = a.size
@@ -45,7 +45,7 @@ def restore(a: ti.template(), base, origin, first, last):
 
 @ti.func
 def lay(kind: ti.template(), a: ti.template(), base, cell, clock, expiry, carried):
-    """Lay a trail on an empty cell, where `expiry` is stored so far; see `rules.pheromone`."""
+    """Deposit on an empty cell with the stored trail `expiry`; see `rules.pheromone`."""
     level = level_after_deposit(a, kind, level_left(expiry, clock), carried)
     a.cells[base + cell] = clock + level
     a.cells[base + a.size] = ti.min(a.cells[base + a.size], cell)
@@ -54,13 +54,13 @@ def lay(kind: ti.template(), a: ti.template(), base, cell, clock, expiry, carrie
 
 @ti.func
 def ground_of(packed):
-    """What a packed cell holds, see `engines.layout`."""
+    """Return the ground of a packed cell, see `engines.layout`."""
     return (packed >> 31) & packed & 15
 
 
 @ti.func
 def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
-    """The percept of the ant at `clock`; the cells of its run begin at `base`."""
+    """Return the percept of the ant at `clock`; the cells of its run start at `base`."""
     here = base + ant.cell
     left = a.cells[here + step_towards(a.compass, ant.heading, LEFT)]
     forward = a.cells[here + step_towards(a.compass, ant.heading, FORWARD)]
@@ -88,7 +88,7 @@ def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
 
 @cache
 def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
-    """A `ti.func` (a, base, ant, clock, percept) -> the index of the ant's state."""
+    """Return a `ti.func` (a, base, ant, clock, percept) that returns the ant's state index."""
     if observation.name == "paper":  # no view is needed
         return _percept_itself
     in_view = observation.cells
@@ -121,7 +121,7 @@ def _percept_itself(a: ti.template(), base, ant, clock, percept):
 
 @ti.func
 def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, clock):
-    """The ant after its action, with the event; the cells it changes are changed."""
+    """Return the ant after its action, with the event, and change the cells."""
     after = ant
     after.event = Event.FAILED
     if action <= RIGHT:
@@ -138,11 +138,11 @@ def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, cl
         goals = vision.goals_in_view(percept)
         if goals != 0 and action == PICK_UP and ant.carries == 0:
             position = lowest_bit_number(goals)
-            if goals & (goals - 1) != 0:  # several foods in view
+            if goals & (goals - 1) != 0:  # several food items in view
                 k, after.random_state = draw_below(ant.random_state, popcnt(goals))
                 position = bit_number(goals, k)
             food = ant.cell + step_towards(a.compass, ant.heading, position)
-            if a.regrows == 0:  # else the food is back before anybody sees what is under it
+            if a.regrows == 0:  # else the food grows back before an ant sees the trail under it
                 lay(deposit, a, base, food, clock, a.trails[ant.origin + food], 0)
             lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell], 0)
             after.heading = turn_round(ant.heading)

@@ -1,6 +1,6 @@
 """Step-by-step traces of the engine of independent runs, for pictures, teaching and tests.
 
-The kernel is the one that trains and evaluates, compiled once more so that it records.
+Traces come from the same kernel as training and evaluation, compiled to record each step.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
 MAX_ROLLOUT_STEPS = 1_000_000
-MAX_TABLE_ROWS = 12_800_000  # of 32 bytes; each step of training keeps its table
+MAX_TABLE_ROWS = 12_800_000  # of 32 bytes each; a trace keeps the table after each training step
 
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """The arguments of a trace, by which it can be played again; see `rollout`, `trace_training`.
+    """The arguments of `rollout` or `trace_training`, from which a trace can be made again.
 
-    `number` is that of the rollout; `q_values`, float (n_states, 5), the table that the ant
-    followed with `epsilon`, None if it learned; `config` is how it learned.
+    `q_values`, float (n_states, 5), is the table that the ant followed with `epsilon`, None if it
+    learned. `config` is the configuration of its learner, None if it did not learn.
     """
 
     world: World
@@ -47,21 +47,22 @@ class Made:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trace(Record):
-    """What happened in each of n steps; position, heading and state are those before the action.
+    """The record of n steps; cell, heading and state are those before the action.
 
     Attributes (int32 (n,) unless noted):
-        episodes: Number of the episode, from 0; of `trace_policies`, of the policy.
+        episodes: Number of the episode, from 0; in `trace_policies`, number of the policy.
         steps: Number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
-        headings, percepts, states: 0 to 5; what the ant sees, see `taichi_ants.task.states`; and
-            the index of its state, by the paper's observation the percept.
-        actions, rewards, events: 0 to 4; what they were paid; their results, see `Event`.
-        next_percepts, next_states: What the ant sees after the step.
-        terminated: bool (n,), whether the learner took the next state as terminal.
+        headings: Heading of the ant, 0 to 5.
+        percepts, states: Percept, see `taichi_ants.task.states`; state index, which is the percept
+            with the paper's observation.
+        actions, rewards, events: Action, 0 to 4; its reward; its result, see `Event`.
+        next_percepts, next_states: Percept and state index after the step.
+        terminated: bool (n,), whether the learner treated the next state as terminal.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
-        td_errors: float32 (n,), of the update after the step; None without learning.
-        tables: float32 (n, n_states, 5), the Q-table after the step; None without learning.
-        made: How it was made; None if it is of several policies, or was made by hand.
+        td_errors: float32 (n,), the TD error of the step; None without learning.
+        tables: float32 (n, n_states, 5), the Q table after the step; None without learning.
+        made: The arguments of the trace; None for several policies, or if you made it yourself.
     """
 
     episodes: np.ndarray
@@ -86,7 +87,7 @@ class Trace(Record):
 
     @property
     def delivered(self) -> np.ndarray:
-        """Whether the food was given to the queen, bool (n,)."""
+        """Whether the ant delivered in each step, bool (n,)."""
         return self.events == Event.DELIVERED
 
 
@@ -99,10 +100,10 @@ def rollout(
     task: Task | None = None,
     epsilon: float = 0.0,
 ) -> Trace:
-    """One episode with one table (n_states, 5): rollout `number` of the seed, from 0.
+    """Return the trace of one episode with a table (n_states, 5): rollout `number` of the seed.
 
-    Instead of the table you can give the `TrainingResult` of a single run, or a `Policy`. Other
-    arguments and errors are those of `evaluate`.
+    Instead of the table, you can pass the `TrainingResult` of a single run, or a `Policy`. Other
+    arguments and errors are those of `evaluate`. Numbers start at 0.
     """
     task = checks.checked_runs_task(task)
     max_steps = checks.checked_max_steps(max_steps, task)
@@ -124,12 +125,12 @@ def trace_policies(
 ) -> Iterator[Trace]:
     """Yield the traces of rollout 0 of many policies (n, n_states, 5), some policies at a time.
 
-    Each policy has a seed; a seed may come several times. Other arguments are those of `evaluate`.
+    `seeds` has one seed per policy, and may repeat seeds. Other arguments are those of `evaluate`.
     """
     task = checks.checked_runs_task(task)
     tables = checks.checked_q_values(q_values, task)
     checks.checked_world(world)
-    # A step takes ten times as much memory as a cell of the world.
+    # A step needs ten times as much memory as a cell of the world.
     per_policy = max(checks.checked_max_steps(max_steps, task), world.grid.size // 10)
     for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
         some = tables[first : first + size]
@@ -147,16 +148,17 @@ def trace_training(
     max_steps: int = EPISODE_STEPS,
     task: Task | None = None,
 ) -> Trace:
-    """The first episodes of one training run, step by step, with the Q-table after each step.
+    """Return the trace of the first episodes of one training run, with the Q table after each step.
 
-    Args and errors as in `train`; episodes * max_steps * n_states may not exceed 12.8 million.
+    Arguments and errors are those of `train`; episodes * max_steps * n_states is limited to 12.8
+    million.
     """
     checks.checked_world(world, learns=True)
     task = checks.checked_runs_task(task)
     max_steps = checks.checked_max_steps(max_steps, task)
     several = checks.checked_configs(config)
     if len(several) > 1:
-        raise AntsError(f"config holds {len(several)} configurations; a trace is of one.")
+        raise AntsError(f"config has {len(several)} configurations; pass a single one.")
     seeds = checks.checked_seeds_for(seed, ())
     state = RunState.fresh(several, seeds.tolist(), task.n_states).part([0])
     runs = Runs.learning(several, seeds.tolist(), state)
@@ -165,13 +167,13 @@ def trace_training(
 
 
 def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int = 1) -> Trace:
-    """The episodes of runs, one run if it learns, numbered one after the other; in one launch."""
+    """Return the trace of runs, or of one run if it learns, with episodes numbered in sequence."""
     capacity = episodes * max_steps
     learns = runs.learner is not None
     most = MAX_TABLE_ROWS // task.n_states if learns else MAX_ROLLOUT_STEPS
     if capacity > most:
         raise AntsError(
-            f"episodes * max_steps is {capacity}; at most {most} steps can be traced, so lower one."
+            f"episodes * max_steps is {capacity}; a trace has at most {most} steps, so reduce them."
         )
     checks.checked_world(world)
     runtime.start()
@@ -200,10 +202,10 @@ def record_steps(
     episodes: int,
     progress: Progress | None = None,
 ) -> Iterator[tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]]:
-    """Yield the steps of the next episodes of many runs, in pieces; move the state of the runs on.
+    """Yield the steps of the next episodes of many runs, in pieces, and update the runs' state.
 
-    A piece is the columns of a trace, episodes numbered from 0 in each run; the probability of each
-    action, float64 (n,); and the number of the run, int64 (n,). Pieces of a run come in order.
+    A piece is the columns of a trace, with episodes numbered from 0 in each run; the probability of
+    each action, float64 (n,); and the number of the run, int64 (n,). Pieces of a run are in order.
     """
     checks.check_progress(progress)
     runtime.start()
@@ -224,12 +226,12 @@ def _launch(
     max_steps: int,
     tables: np.ndarray | None = None,
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, np.ndarray]:
-    """Some episodes of some runs: columns, TD errors, probabilities of actions, number of the run.
+    """Return columns, TD errors, probabilities of actions, and runs of some episodes of some runs.
 
-    The table after each step is written into `tables`, if there are any.
+    If `tables` is given, write the table after each step into it.
     """
     n_runs, n_episodes = some.stop - some.start, part.stop - part.start
-    capacity = n_episodes * max_steps  # each run has room for so many steps
+    capacity = n_episodes * max_steps  # the most steps of a run
     rows, learns = n_runs * capacity, runs.learner is not None
     integers = np.empty((rows, len(TRACE)), dtype=np.int32)
     errors, chances = np.empty(rows if learns else 0, np.float32), np.empty(rows)

@@ -1,4 +1,4 @@
-"""Training and evaluation of many ants, each alone in a world of its own."""
+"""Training and evaluation of many ants, each alone in its own world."""
 
 from __future__ import annotations
 
@@ -34,21 +34,24 @@ def train(
     arch: str | None = None,
     progress: Progress | None = None,
 ) -> TrainingResult:
-    """Train every configuration with every seed, each run independent of all others.
+    """Return the result of training every configuration with every seed, in independent runs.
 
-    A run depends on the world, its configuration, its seed and the arguments below alone: not on
-    what else is trained, in which order, or on how many threads.
+    A run depends only on its configuration, its seed, world, episodes, max_steps and task. Other
+    runs, their order, and the number of threads do not change it.
 
     Args:
-        world: The world; each episode starts from exactly this.
+        world: The world, to which each episode resets.
         configs: One configuration or several.
         seeds: One seed or several different ones: 5 is the single seed 5, range(5) are five seeds.
         episodes: Episodes of each run, at least 1.
         max_steps: Steps after which an episode is truncated, 1 to 10 million.
-        task: The rules of the game; None is the paper's.
-        threads: CPU threads; None keeps what runs, or takes all.
-        arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
-        progress: Called now and then with the share of the work that is done.
+        task: The rules; None for those of the paper.
+        threads: CPU threads; None keeps the present number, or at the first start uses all.
+        arch: "cpu" or "cuda"; None keeps the present one, or at the first start uses the CPU.
+        progress: A function that is called with the share of the work done, 0 to 1.
+
+    Raises:
+        AntsError: An argument is not allowed; the message names it.
     """
     configs = checks.checked_configs(configs)
     seeds = checks.checked_seeds(seeds)
@@ -78,13 +81,13 @@ def continue_training(
     arch: str | None = None,
     progress: Progress | None = None,
 ) -> TrainingResult:
-    """Train every run of a result, which is left as it is, for more episodes.
+    """Return a new result after training every run of a result for more episodes.
 
-    The outcome is, bit for bit, that of a single training with the sum of the episodes; `seconds`
-    is what the new ones took. Further arguments and errors are those of `train`.
+    It equals, bit for bit, the result of a single training with the sum of the episodes; `seconds`
+    is the time of the new ones. Other arguments and errors are those of `train`.
     """
     if not isinstance(result, TrainingResult):
-        raise AntsError(f"result is {shown(result)}; give what train has returned.")
+        raise AntsError(f"result is {shown(result)}; it must be a TrainingResult.")
     checks.checked_configs(result.configs)
     state = result.state
     given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
@@ -92,8 +95,8 @@ def continue_training(
         needed = astuple(memory_for([config], result.task.n_states))
         if not all(map(operator.ge, given, needed)):  # kernels would write outside of it
             raise AntsError(
-                f"learner {config.learner!r} has come to need more memory than when this training "
-                "began; train anew."
+                f"learner {config.learner!r} needs more memory than when this training started; "
+                "train again from the first episode."
             )
     kept = replace(result, state=copy.deepcopy(result.state))
     return _train(kept, episodes, threads, arch, progress)
@@ -106,7 +109,7 @@ def _train(
     arch: str | None,
     progress: Progress | None,
 ) -> TrainingResult:
-    """As `continue_training`, but the state of the given result is moved on."""
+    """Return what `continue_training` returns, but change the state of the given result."""
     episodes = checked_whole("episodes", episodes)
     checks.check_progress(progress)
     runtime.start(threads, arch)
@@ -142,7 +145,7 @@ def _train(
 
 
 def _report(progress: Progress, done: float, share: float, part: float) -> None:
-    """Report the progress of one part of the work as that of all."""
+    """Report the progress of one part of the work as progress of the whole."""
     progress(done + share * part)
 
 
@@ -159,13 +162,14 @@ def evaluate(
     arch: str | None = None,
     progress: Progress | None = None,
 ) -> Rollouts:
-    """Follow fixed policies without learning.
+    """Return the outcomes of episodes in which ants follow fixed policies and do not learn.
 
     Args:
-        q_values: float (..., n_states, 5), action values; the best action is taken, ties at random.
-        rollouts: Episodes with each table, at least 1. Rollout k of a seed has a stream of its own.
-        seeds: One seed for all tables, or as many as the tables' last leading axis is long. A
-            single table takes any number of seeds; then they are the first axis of what comes out.
+        q_values: float (..., n_states, 5), action values; ants take the best action, and break ties
+            at random.
+        rollouts: Episodes with each table, at least 1. Each rollout has its own random stream.
+        seeds: One seed for all tables, or one per index of the tables' last leading axis. A single
+            table takes any number of seeds, which are then the first axis of the result.
         epsilon: Probability of a random action.
         world, max_steps, task, threads, arch, progress: As in `train`.
 

@@ -148,18 +148,18 @@ def test_what_is_not_allowed():
         with pytest.raises(AntsError, match=rf"^an action is {action}; it must lie between 0 and"):
             colony.act(right + action)
     colony.act(np.where(colony.living, 2, 99))  # nobody lives in the other slots
-    with pytest.raises(AntsError, match=r"^training is None, so nobody chooses; "):
+    with pytest.raises(AntsError, match=r"^training is None, so ants do not choose actions; "):
         colony.tick()
     with pytest.raises(AntsError, match=r"^which is .*; give a bool for each of the worlds\.$"):
         colony.begin_some(np.ones(2, bool))
-    with pytest.raises(AntsError, match=r"^there are 2 seeds for 1 worlds\.$"):
+    with pytest.raises(AntsError, match=r"^there are 2 seeds for 1 worlds; give 1\.$"):
         colony.begin_some(np.array([True, False, False]), [1, 2])
     with pytest.raises(AntsError, match=r"^a seed is 0\.5; "):
         colony.begin_some(np.array([True, False, False]), [0.5])
     training = TrainingConfig("sarsa", 0.1, 0.9, 0.2, 0.9)
     learning = Colony(MEADOW, Task(), training, ants=9)
     learning.begin_episode()
-    with pytest.raises(AntsError, match=r"^this colony has a training by which ants choose; "):
+    with pytest.raises(AntsError, match=r"^the ants of this colony choose actions by its"):
         learning.act(np.zeros((1, 9), int))
     for options in (
         {},

@@ -257,7 +257,7 @@ def test_arguments_are_left_as_they_are():
 
     result = train(paper(), [CONFIG, PLANS], [0, 1], 3, 50)
     kept = {name: array.copy() for name, array in vars(result.state).items()}
-    says("result is None; give what train has returned", continue_training, None, 2)
+    says("result is None; it must be a TrainingResult", continue_training, None, 2)
     longer = continue_training(result, 2)
     for name, array in kept.items():
         assert np.array_equal(getattr(result.state, name), array)
