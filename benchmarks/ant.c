@@ -1,7 +1,7 @@
-/* Ants that learn, in plain C, one run after the other: the yardstick of throughput.py.
+/* Ants that learn, in plain C, one run after another, for comparison in throughput.py.
  *
- * Written as one would by hand, with branches; the rules are those that ant.h names. Threads, if
- * there are several, take one run after the other.
+ * The program has branches, as one would write it by hand; for the rules, see ant.h. Several
+ * threads take one run after another.
  */
 #include <stdlib.h>
 #include <string.h>
@@ -17,16 +17,16 @@ typedef struct {
     int32_t *trail;
 } Ant;
 
-/* What came of a pair of state and action when it was last taken. */
+/* The last transition of a pair of state and action. */
 typedef struct {
-    int32_t pair, next; /* places in the table */
+    int32_t pair, next; /* indices in the table */
     float reward, discount;
 } Transition;
 
 /* The transitions of all visited pairs, in the order of first visits. */
 typedef struct {
     int n;
-    int16_t place[N_PAIRS]; /* of a pair in this order, from 1 */
+    int16_t place[N_PAIRS]; /* the place of a pair in this order, from 1 */
     Transition transitions[N_PAIRS];
 } Model;
 
@@ -41,7 +41,7 @@ static int observe(const World *world, const Ant *ant)
     int state = ant->carries;
     if (ant->carries) {
         int nearer = world->closer[ant->cell];
-        nearer |= nearer << N_HEADINGS | nearer << 2 * N_HEADINGS; /* headings turn round */
+        nearer |= nearer << N_HEADINGS | nearer << 2 * N_HEADINGS; /* headings are cyclic */
         nearer >>= ant->heading + N_HEADINGS - 1;
         for (int k = 0; k < 3; k++) {
             int ground = ant->ground[in_view(world, ant, k)];
@@ -133,7 +133,7 @@ static void plan(float *q, Model *model, Transition seen, int steps, float learn
     }
 }
 
-/* One run, for a learner that is known when this is compiled; 0 if out of memory. */
+/* Do one run of a learner that is known at compile time; return 0 if out of memory. */
 static inline __attribute__((always_inline)) int train_run(const World *world, const Job *job,
                                                            int number, Run run, int learner)
 {
@@ -182,7 +182,7 @@ static inline __attribute__((always_inline)) int train_run(const World *world, c
     return enough;
 }
 
-/* Train all runs; 0 if out of memory. */
+/* Train all runs; return 0 if out of memory. */
 int train(const World *world, const Job *job, const Run *runs)
 {
     int enough = 1;

@@ -1,8 +1,8 @@
 /* The same as ant.c with sixteen runs at a time, one in each lane of an AVX-512 vector.
  *
- * The lanes go in lockstep. A lane whose episode ends begins the next one, and after the last the
- * next run. Rows of the table are loaded as a whole and transposed, and values are stored one by
- * one, which takes less time than gathers and scatters; single values are gathered.
+ * All lanes take a step together. A lane whose episode ends starts its next episode, and after the
+ * last one the next run. Rows of the table are loaded as a whole and transposed, and values are
+ * stored one by one, which is faster than gathers and scatters; single values are gathered.
  */
 #if defined(__AVX512F__) && defined(__AVX512DQ__)
 #include <immintrin.h>
@@ -12,11 +12,11 @@
 #include "ant.h"
 
 enum { LANES = 16, N_PAIRS = N_STATES * N_ACTIONS };
-/* The tables of two lanes are so far apart; of each row eight floats are loaded, the last too. */
+/* The distance of the tables of two lanes, with room to load eight floats of the last row. */
 enum { TABLE = N_PAIRS + 16 };
-/* A cell holds its `closer`, its level or what is on it above, and the sign if something is. */
+/* A cell has its `closer`, then its level or content, and a sign bit if it is not empty. */
 enum { LEVEL_AT = 6, CLOSER = 63, OCCUPIED = INT32_MIN };
-/* What was seen last of a pair: its place in a table, that of the next row, and the transition. */
+/* The last transition of a pair: its index in a table, the next row, reward and terminal flag. */
 enum { ROW_AT = 11, TRANSITION_AT = 22, PLACE = 2047 };
 
 #define INLINE static inline __attribute__((always_inline))
@@ -25,18 +25,18 @@ typedef __m512i Ints;
 typedef __m512 Floats;
 typedef __mmask16 Mask;
 
-/* The state of sixteen runs: what one step needs and the next one changes. */
+/* The state of sixteen runs that each step reads and changes. */
 typedef struct {
     Ints cell, heading, state, step, sum;
-    Ints own, view[3];        /* the cell of the ant, and those in view, as they are packed */
-    Ints random[2];           /* of eight lanes each */
-    Ints explore_up_to;       /* explores if the draw is not larger, */
-    Mask explores, carries;   /* and the ant explores at all */
-    Floats values[N_ACTIONS]; /* of the state */
+    Ints own, view[3];        /* the packed cells of the ant and in view */
+    Ints random[2];           /* for eight lanes each */
+    Ints explore_up_to;       /* explore if the draw is not larger */
+    Mask explores, carries;   /* `explores`: whether epsilon is above 0 */
+    Floats values[N_ACTIONS]; /* action values of the state */
     Floats learning_rate, discount;
 } Ants;
 
-/* What lies in memory, lane by lane. */
+/* The data in memory, lane by lane. */
 typedef struct {
     float q[LANES * TABLE];
     uint64_t random[LANES];
@@ -44,13 +44,13 @@ typedef struct {
     int32_t explore_up_to[LANES], explores[LANES];
     float learning_rate[LANES], discount[LANES];
     Run run[LANES];
-    int32_t number[LANES], episode[LANES]; /* of the run; -1 where none is left */
+    int32_t number[LANES], episode[LANES]; /* the run and its episode; -1 without a run */
     int32_t running;                       /* lanes with a run */
-    int32_t visited[LANES];                /* pairs of state and action */
-    int16_t place[LANES][N_PAIRS];         /* of a pair in the order of first visits, from 1 */
+    int32_t visited[LANES];                /* the number of visited pairs */
+    int16_t place[LANES][N_PAIRS];         /* the place of a pair in the order of first visits, from 1 */
     uint32_t transitions[LANES][N_PAIRS];     /* from the lowest bit: pair, next row, transition */
-    int32_t stride;                        /* from lane to lane of the cells */
-    int32_t *cells, *fresh;                /* and how they are at the start of an episode */
+    int32_t stride;                        /* the distance of lanes in `cells` */
+    int32_t *cells, *fresh;                /* `fresh`: the cells at the start of an episode */
 } Memory;
 
 INLINE Ints all(int32_t value) { return _mm512_set1_epi32(value); }
@@ -62,7 +62,7 @@ INLINE Ints times_lane(int32_t stride)
     return _mm512_mullo_epi32(lanes, all(stride));
 }
 
-/* The steps to neighbours, to look up by heading and position in view. */
+/* The steps to neighbours, by heading and position in view. */
 INLINE Ints steps_of(const World *world)
 {
     return _mm512_castsi256_si512(_mm256_loadu_si256((const __m256i *)world->offsets));
@@ -77,7 +77,7 @@ INLINE Ints mix(Ints z)
     return _mm512_xor_si512(z, _mm512_srli_epi64(z, 31));
 }
 
-/* Of two vectors of eight, the lower and the upper halves as sixteen. */
+/* Combine the lower and upper halves of two vectors of eight into vectors of sixteen. */
 INLINE void split(Ints a, Ints b, Ints *low, Ints *high)
 {
     const Ints even =
@@ -123,19 +123,19 @@ INLINE void load_fours(const float *q, const int32_t *at, Floats columns[4])
     columns[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(b, d));
 }
 
-/* Where the row of a state begins in a table. */
+/* The start of a state's row in a table. */
 INLINE Ints row_of(Ints state)
 {
     return _mm512_add_epi32(state, _mm512_slli_epi32(state, 2));
 }
 
-/* The same in the tables of all lanes. */
+/* The start of rows in the tables of all lanes. */
 INLINE Ints place_of(Ints row)
 {
     return _mm512_add_epi32(row, times_lane(TABLE));
 }
 
-/* The action values of the rows that begin at these places. */
+/* The action values of the rows that start at these indices. */
 INLINE void load_rows(const float *q, Ints row, Floats values[N_ACTIONS])
 {
     int32_t at[LANES] __attribute__((aligned(64)));
@@ -175,7 +175,7 @@ INLINE Floats value_of(const Floats values[N_ACTIONS], Ints action)
     return chosen;
 }
 
-/* Action values after an update; a transition is the reward * 2, and 1 more where it is terminal. */
+/* Action values after an update; a transition is the reward * 2, plus 1 if it is terminal. */
 INLINE Floats updated(const Ants *ants, Floats value, Ints transition, Floats next_value)
 {
     Mask goes_on = _mm512_testn_epi32_mask(transition, all(1));
@@ -186,7 +186,7 @@ INLINE Floats updated(const Ants *ants, Floats value, Ints transition, Floats ne
     return _mm512_add_ps(value, _mm512_mul_ps(ants->learning_rate, error));
 }
 
-/* Epsilon-greedy: the action is the number of those before it, of the actions that are as good. */
+/* Epsilon-greedy: choose the action by counting the equally good actions before it. */
 INLINE Ints choose(const Ants *ants, const Floats values[N_ACTIONS], Ints low, Ints high)
 {
     Mask explores = ants->explores & _mm512_cmple_epu32_mask(high, ants->explore_up_to);
@@ -215,7 +215,7 @@ INLINE void look(const World *world, const Memory *memory, Ants *ants)
     }
 }
 
-/* The state that the cells in view make. */
+/* The state index of the cells in view. */
 INLINE void judge(Ants *ants)
 {
     const Ints closer = _mm512_and_si512(ants->own, all(CLOSER));
@@ -257,7 +257,7 @@ INLINE void lay_trail(Memory *memory, Mask some, Ints cell, Ints packed)
     }
 }
 
-/* Take one of the foods in view. */
+/* Pick up one of the food items in view. */
 INLINE void pick_up(const World *world, Memory *memory, Ants *ants, Mask some)
 {
     Ints counts[3], n = all(0), position = all(0), low, high, food = ants->view[0];
@@ -289,7 +289,7 @@ INLINE void pick_up(const World *world, Memory *memory, Ants *ants, Mask some)
     ants->carries |= some;
 }
 
-/* Act; the rewards, and which lanes have delivered. */
+/* Act; return the rewards, and the lanes that have delivered. */
 INLINE Ints act(const World *world, Memory *memory, Ants *ants, Ints action, Mask *delivered)
 {
     const Ints headings = _mm512_setr_epi32(5, 0, 1, 2, 3, 4, 5, 0, 0, 0, 0, 0, 0, 0, 0, 0);
@@ -323,7 +323,7 @@ INLINE Ints act(const World *world, Memory *memory, Ants *ants, Ints action, Mas
     return reward;
 }
 
-/* Put what came of pairs into the models. */
+/* Store transitions in the models. */
 INLINE void remember(Memory *memory, Ints pair, Ints packed)
 {
     int32_t pairs[LANES] __attribute__((aligned(64)));
@@ -338,7 +338,7 @@ INLINE void remember(Memory *memory, Ints pair, Ints packed)
     }
 }
 
-/* Updates from pairs of the models that are drawn. */
+/* Update randomly drawn pairs from the models. */
 INLINE void plan(Memory *memory, Ants *ants, int steps)
 {
     const Ints visited = load(memory->visited), lanes = times_lane(N_PAIRS);
@@ -361,7 +361,7 @@ INLINE void plan(Memory *memory, Ants *ants, int steps)
     }
 }
 
-/* Put a run into a lane. */
+/* Start a run in a lane. */
 static void begin_run(const World *world, const Job *job, Memory *memory, int lane, int number,
                       Run run)
 {
@@ -383,7 +383,7 @@ static void begin_run(const World *world, const Job *job, Memory *memory, int la
         memory->q[lane * TABLE + pair] = q[pair];
 }
 
-/* Write the outcome of an episode; and the table, if it was the last of its run. */
+/* Write the outcome of an episode, and the table after the last episode of a run. */
 static void end_episode(const Job *job, Memory *memory, int lane, int sum, int steps)
 {
     int number = memory->number[lane], episode = memory->episode[lane]++;
@@ -401,8 +401,8 @@ static void end_episode(const Job *job, Memory *memory, int lane, int sum, int s
     memory->running--;
 }
 
-/* End the episodes of some lanes, and begin the next ones. A lane without a run repeats the first,
- * of which nothing is written. */
+/* End the episodes of some lanes, and start the next ones. A lane without a run repeats the first
+ * run, and writes no results. */
 static void restart(const World *world, const Job *job, const Run *runs, int *taken,
                     Memory *memory, Ants *ants, Mask some)
 {
@@ -447,7 +447,7 @@ static void restart(const World *world, const Job *job, const Run *runs, int *ta
     load_rows(memory->q, place_of(row_of(ants->state)), ants->values);
 }
 
-/* Train runs until none is left, for a learner that is known when this is compiled. */
+/* Train runs until none is left, for a learner that is known at compile time. */
 INLINE void train_lanes(const World *world, const Job *job, const Run *runs, int *taken,
                         Memory *memory, int learner)
 {
@@ -509,7 +509,7 @@ INLINE void train_lanes(const World *world, const Job *job, const Run *runs, int
     }
 }
 
-/* As train of ant.c. Levels of trails are below 2 ** 25. */
+/* The same as `train` of ant.c. Levels of trails are below 2 ** 25. */
 int train_vector(const World *world, const Job *job, const Run *runs)
 {
     int taken = 0, enough = 1;

@@ -1,10 +1,10 @@
-/* A colony of ants that share one table, in C with OpenMP: the yardstick of colony_in_c.py.
+/* A colony of ants that share one table, in C with OpenMP, for comparison in colony_in_c.py.
  *
- * The rules, random numbers and arithmetic are the package's (taichi_ants/engines/colony), for two
- * of its tasks: the paper's and foraging(). What it gives is equal to the bit, if the compiler does
- * not fuse multiplications and additions (-ffp-contract=off). Its shape is what a patient
- * programmer would choose: small columns, one byte a cell for what lies there and one for what its
- * ant wants, three or four passes over the ants in a tick, ants sorted by cell now and then.
+ * The rules, random numbers and arithmetic are those of the package (taichi_ants/engines/colony),
+ * for two of its tasks: the paper's and foraging(). Results are equal to the bit if the compiler
+ * does not fuse multiplications and additions (-ffp-contract=off). The design is that of a patient
+ * programmer: small columns, one byte per cell for its content and one for what its ant wants,
+ * three or four passes over the ants in a tick, and ants sorted by cell from time to time.
  */
 #include <math.h>
 #include <omp.h>
@@ -21,18 +21,18 @@ enum { ENTERED_EMPTY, FAILED, ENTERED_LURE, PICKED_UP, DELIVERED };
 enum { SEES_LURE = 2, ROW = 8, N_HEADINGS = 6 };
 /* What the ant on a cell wants: nothing, to enter the cell at a heading, to take the food there. */
 enum { ENTER = 1, STANDS = 7, TAKE = 9, MARK = 15 };
-/* And what else others need to know of it, in the same byte. */
+/* Flags in the same byte, which other ants read. */
 enum { HAS_FOOD = 16, TAKES_FOOD = 32, WINS = 64 };
-enum { ANT_SHIFT = 4 }; /* above what a cell looks like: 1 for an ant on it, 2 for one with food */
+enum { ANT_SHIFT = 4 }; /* above the ground: 1 for an ant, 2 for a carrier */
 enum { TICKS_BETWEEN_SORTS = 8, CELLS_TOGETHER = 64, MOST_THREADS = 64 };
 
 typedef struct {
     int32_t size, n;
-    uint8_t *ground;       /* (size) what lies there, an ant as ground and ANT_SHIFT say */
+    uint8_t *ground;       /* (size) the ground, and marks of ants, see ANT_SHIFT */
     int32_t *trail;        /* (size) the clock at which the trail has evaporated */
     const uint8_t *closer; /* (size) bit h: the neighbour at heading h is nearer to the queen */
     const int32_t *steps;  /* (8) to the neighbours at headings 5, 0, 1, 2, 3, 4, 5, 0 */
-    int32_t *cells;        /* (n) of the ants */
+    int32_t *cells;        /* (n) the cells of the ants */
     uint8_t *headings;
     uint64_t *random;
     float *q; /* (states, ROW) */
@@ -42,10 +42,10 @@ typedef struct {
     uint64_t explore_below;
     const float *weights;   /* (n + 1) */
     const int32_t *rewards; /* (5) in the order of the fields of Rewards, as events are here */
-    int64_t counts[4];      /* returns, deliveries, moves, blocked: what came of it */
+    int64_t counts[4];      /* the results: returns, deliveries, moves, blocked */
 } Colony;
 
-/* What is known of the ants beside Colony's columns, and the sums of TD errors of each thread. */
+/* Further columns of the ants, and the sums of TD errors of each thread. */
 typedef struct {
     uint8_t *carries, *percept, *action, *want, *event, *wants;
     uint16_t *state;
@@ -95,7 +95,7 @@ INLINE int goals_in_view(int percept)
     return (both >> 4 & 1) | (both >> 1 & 2) | (both & 1) << 2;
 }
 
-/* Without a branch: in a crowd nobody can predict what the next ant does. */
+/* Without a branch, because the processor cannot predict what the next ant does. */
 INLINE int choose(const float *q, uint64_t bits, uint64_t explore_below)
 {
     float best = q[0];
@@ -114,7 +114,7 @@ INLINE int level_of(const Colony *c, int cell, int clock)
     return level > 0 ? level : 0;
 }
 
-/* What an ant sees: the percept; and under foraging's rules the row of its table. */
+/* The percept of an ant, and under the rules of foraging the row of its table. */
 INLINE int see(const Colony *c, int foraging, int cell, int heading, int carries, int clock, int *row)
 {
     int codes[3], levels[3] = {0}, ants[3], nearer, strongest;
@@ -208,7 +208,7 @@ static __attribute__((noinline)) int beats_rivals(
     return 1;
 }
 
-/* Whether the ant gets what it wants: nobody else wants it, or its key is the smallest. */
+/* Whether an ant wins: no other ant wants the same, or its key is the smallest. */
 INLINE int wins(const Colony *c, const Work *w, int cell, int want, int tick)
 {
     int wanted = wanted_by(c, cell, want), kind = want & 8, rivals = -1;
@@ -219,7 +219,7 @@ INLINE int wins(const Colony *c, const Work *w, int cell, int want, int tick)
 
 INLINE int claims(int want) { return want != 0 && want != STANDS; }
 
-/* The heading towards the ant with food that wins the cell of another one, -1 if none does. */
+/* The heading towards the carrier that wins the cell of another ant, -1 if none does. */
 INLINE int pushed_towards(const Colony *c, const Work *w, int cell)
 {
     int found = -1;
@@ -238,7 +238,7 @@ INLINE int gives_way(const Colony *c, const Work *w, int cell)
     return !(mark & WINS) || w->wants[wanted_by(c, cell, mark & MARK)];
 }
 
-/* Under foraging's rules: the flag for winners, and whether a cell with an ant is a lure. */
+/* Under the rules of foraging: mark winners, and judge whether a cell with an ant is a lure. */
 INLINE void resolve(const Colony *c, const Work *w, int i, int tick, int clock)
 {
     int cell = c->cells[i], want = w->want[i];
@@ -289,7 +289,7 @@ INLINE void act(const Colony *c, const Work *w, int foraging, int i, int tick, i
         }
         counts[3] += moves && !enters;
     } else {
-        claim &= wins(c, w, cell, want, tick); /* also of nothing, which costs less than a guess */
+        claim &= wins(c, w, cell, want, tick); /* also if it wants nothing, which is faster than a branch */
         int enters = moves & claim;
         goes = enters ? wanted : cell;
         came = enters ? want : 0;
@@ -343,10 +343,10 @@ INLINE void sense_and_learn(const Colony *c, const Work *w, int foraging, int i,
     w->percept[i] = percept;
     if (foraging)
         w->state[i] = row;
-    w->wants[cell - (w->want[i] ? c->steps[w->want[i]] : 0)] = 0; /* where it was */
+    w->wants[cell - (w->want[i] ? c->steps[w->want[i]] : 0)] = 0; /* its previous cell */
 }
 
-/* Update the table by the errors of all threads, and forget these. */
+/* Update the table by the errors of all threads, and reset the errors. */
 INLINE void apply(const Colony *c, const Work *w, int threads)
 {
     for (int pair = 0; pair < c->states * ROW; pair++) {
@@ -458,7 +458,7 @@ INLINE void run_as(Colony *colony, const Work *work, int foraging, int ticks, in
     free(spare);
 }
 
-/* An episode of so many ticks; ants carry nothing at first. Returns seconds, without what is laid out. */
+/* Run an episode of some ticks, in which ants start without food. Return the seconds of the ticks. */
 double run(Colony *c, int foraging, int ticks, int threads)
 {
     Work w;

@@ -1,10 +1,10 @@
-"""How fast a colony is, beside the same in C: scattered ants that learn into one table.
+"""Compare the speed of a colony with a program in C that does the same.
 
-Ants stand all over open worlds, eight cells to an ant, and learn by Q-learning, by the
-paper's rules and by those of foraging. colony.c does the same with as many threads, and its results
-are equal to the bit. Both are measured in turn, several times; the table has medians, and the ratio
-of each round's paces, more than 1 where ours is faster. On a busy machine take `--threads 1`, which
-is measured by processor time: threads of C that wait for each other there wait long.
+Ants are spread over open worlds, with eight cells per ant, and learn into one table by Q-learning,
+under the paper's rules and under those of foraging. The program colony.c does the same with as many
+threads, and its results are equal to the bit. The command measures both in turn, several times. The
+table contains medians, and ratios above 1 where ours is faster. On a busy machine, use
+`--threads 1`, which is measured by processor time; several threads in C wait long for each other.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from taichi_ants.task import foraging
 SOURCE = Path(__file__).with_name("colony.c")
 TASKS = {"the paper's": Task(), "foraging": foraging()}
 Q_LEARNING = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.97)
-_SECONDS = 0.3  # of a measurement at least
+_SECONDS = 0.3  # the shortest measurement
 _ANT_SHIFT = 4  # of colony.c
 
 
@@ -53,7 +53,7 @@ class CColony(ctypes.Structure):
 
 
 class Lived(NamedTuple):
-    """What came of some ticks in C: the table (n_states, 5), and what was counted."""
+    """The result of some ticks in C: the table (n_states, 5), and counts."""
 
     q_values: np.ndarray
     returns: int
@@ -63,7 +63,7 @@ class Lived(NamedTuple):
 
 
 def load(command: str, folder: str | Path) -> ctypes.CDLL:
-    """Compile colony.c in a folder and load it."""
+    """Return the library of colony.c, compiled in a folder."""
     library = Path(folder) / "colony.so"
     given = [command, *FLAGS, "-fopenmp", "-o", library, SOURCE, "-lm"]
     subprocess.run(given, check=True, capture_output=True)
@@ -74,16 +74,17 @@ def load(command: str, folder: str | Path) -> ctypes.CDLL:
 
 
 def scattered(task: Task, n: int) -> Colony:
-    """n ants all over a world of eight cells to an ant."""
+    """Return a colony of n ants spread over a world with eight cells per ant."""
     side = 2 + round((n * 8 / 3) ** 0.5)
     world = worlds.open_world(1, (side, side, side))
     return Colony(world, task, Q_LEARNING, ants=n, start="spread")
 
 
 def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) -> Lived:
-    """Let ticks pass in C for a colony that has just begun an episode; it stays as it is.
+    """Return the result in C of some ticks of a colony at the start of an episode.
 
-    Only what the colonies of `scattered` have: one world, Q-learning into one table, no life.
+    The colony does not change. It must have one world, Q-learning into one table, and no births,
+    deaths or changes of food, as in `scattered`.
     """
     arrays, numbers = colony.arrays, kernel_numbers(colony)
     ground, last = arrays["ground"] & 15, len(arrays["weights"]) - 1
@@ -115,10 +116,10 @@ def live_in_c(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) ->
 
 
 def check_same(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) -> None:
-    """Let both live for some ticks from the start of an episode.
+    """Check that both have the same results after some ticks of an episode.
 
     Raises:
-        AntsError: They differ, and so cannot be compared.
+        AntsError: The results differ, so the paces cannot be compared.
     """
     colony.begin_episode()
     lived = live_in_c(library, colony, ticks, threads)
@@ -126,13 +127,13 @@ def check_same(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) -
     done = colony.outcome()
     ours = [int(one[0, 0]) for one in (done.returns, done.deliveries, done.moves, done.blocked)]
     if not (ours == list(lived[1:]) and np.array_equal(colony.q_values[0], lived.q_values)):
-        raise AntsError("colony.c gives other results than the package; compare the two.")
+        raise AntsError("colony.c returns other results than the package; compare the two.")
 
 
 def measured(
     library: ctypes.CDLL, sizes: Sequence[int], rounds: int, threads: int, seconds: float
 ) -> dict[tuple[str, int], np.ndarray]:
-    """By rules and ants: million ant-steps a second of ours and of C, (rounds, 2)."""
+    """Return million ant steps/s of ours and of C, (rounds, 2), by rules and number of ants."""
     found: dict[tuple[str, int], np.ndarray] = {}
     with progress_bar("Measuring") as progress:
         for rules, task in TASKS.items():
@@ -159,13 +160,13 @@ def measured(
 
 
 def _millions(work: Work, seconds: float, threads: int) -> float:
-    """Million steps a second; of one thread by processor time, which others hardly disturb."""
+    """Return million steps/s: of one thread by processor time, which is more stable."""
     steps, nanoseconds = pace(work, seconds)
     return 1e3 / nanoseconds if threads == 1 else steps / 1e6
 
 
 def table(found: dict[tuple[str, int], np.ndarray], threads: int) -> Table:
-    """The medians, and the ratios within the rounds."""
+    """Return a table of medians, and of ratios within the rounds."""
     rows = []
     for (rules, n), paces in found.items():
         ratios = paces[:, 0] / paces[:, 1]
@@ -175,7 +176,7 @@ def table(found: dict[tuple[str, int], np.ndarray], threads: int) -> Table:
     columns = ["rules", "ants", "ours, M steps/s", "C", "ours to C", "lowest, highest"]
     rounds = len(next(iter(found.values())))
     about = f"Medians of {rounds} rounds, with {threads} threads. {machine(('taichi', 'numpy'))}"
-    return Table("A colony beside C", columns, rows, [about], text_columns=1)
+    return Table("A colony compared with C", columns, rows, [about], text_columns=1)
 
 
 def compare(
@@ -188,7 +189,7 @@ def compare(
     """
     threads = runtime.start(threads).threads
     if (command := compiler()) is None:
-        print("There is no C compiler (cc, gcc, clang or CC), so no comparison with C.")
+        print("There is no C compiler (cc, gcc, clang or CC), so the comparison is skipped.")
         return
     with tempfile.TemporaryDirectory() as folder:
         found = measured(load(command, folder), ants, rounds, threads, _SECONDS)
@@ -200,22 +201,23 @@ def compare(
         ratio = float(np.median(paces[:, 0] / paces[:, 1]))
         if ratio < least:
             raise AntsError(
-                f"{n} ants by {rules} rules go at {ratio:.2f} of the pace of C; at least {least:g} "
-                "is expected, so look for what has made them slower."
+                f"{n} ants (rules: {rules}) have {ratio:.2f} times the pace of C, but at least "
+                f"{least:g} is expected; find out what has made them slower."
             )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    """Run the command line."""
+    parser = Parser(__doc__)
     add = parser.add_argument
     sizes = [10_000, 100_000, 1_000_000]
     several = {"type": whole_number(1), "nargs": "+", "default": sizes, "metavar": "N"}
-    add("--ants", **several, help="in one world (default: 10000 100000 1000000)")
-    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
-    add("--least", type=a_ratio, default=0.0, metavar="RATIO", help="fail below this ratio to C")
-    add("--publish", action="store_true", help="put the table into docs/performance.md")
+    add("--ants", **several, help="put N ants into one world (default: 10000 100000 1000000)")
+    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")
+    about = "fail if a ratio to C is below RATIO"
+    add("--least", type=a_ratio, default=0.0, metavar="RATIO", help=about)
+    add("--publish", action="store_true", help="write the table to docs/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

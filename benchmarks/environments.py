@@ -1,8 +1,8 @@
-"""How fast environments step, beside the engine that does whole episodes by itself.
+"""Compare the speed of environments with that of the engine that runs whole episodes.
 
-All ants act at random in the paper's world: in vector environments through `step()`, by actions
-drawn beforehand; in the engine of independent runs by a table and epsilon 1. They are measured in
-turn, several times; the table has medians, and the ratio to the engine.
+All ants act at random in the paper's world: in environments with actions that were drawn before, in
+the engine of independent runs with a table and epsilon 1. The command measures them in turn,
+several times. The table contains medians, and the ratio of each median to that of the engine.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from taichi_ants.learners.policies import random_policy
 from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 ID = "taichi_ants/HexForage-v0"
-_STEPS = 6_000_000  # of all ants in a measurement, about
-_BATCHES = 16  # of actions drawn beforehand
+_STEPS = 6_000_000  # of all ants in a measurement, roughly
+_BATCHES = 16  # of actions that are drawn before the measurement
 
 
 def engine() -> tuple[int, float]:
-    """Steps of random ants in the engine of independent runs, and seconds of the wall clock."""
+    """Return steps and wall-clock seconds of random ants in the engine of independent runs."""
     rollouts = _STEPS // 600
     began = time.perf_counter()
     outcome = evaluate(worlds.paper(), random_policy()[None], rollouts, epsilon=1.0)
@@ -31,11 +31,11 @@ def engine() -> tuple[int, float]:
 
 
 def vector(num_envs: int) -> Callable[[], tuple[int, float]]:
-    """A function that steps such a vector environment, and gives steps and seconds."""
+    """Return a function that steps a vector environment, and returns steps and seconds."""
     env = gymnasium.make_vec(ID, num_envs=num_envs)
     env.reset(seed=0)
     actions = np.random.default_rng(0).integers(0, 5, (_BATCHES, num_envs))
-    for batch in actions:  # compiles, and spreads the ants
+    for batch in actions:  # compiles kernels and spreads the ants
         env.step(batch)
 
     def measured() -> tuple[int, float]:
@@ -49,7 +49,7 @@ def vector(num_envs: int) -> Callable[[], tuple[int, float]]:
 
 
 def single() -> tuple[int, float]:
-    """Steps of one environment, with all wrappers of `gymnasium.make`."""
+    """Return steps and seconds of one environment, with all wrappers of `gymnasium.make`."""
     env = gymnasium.make(ID)
     env.reset(seed=0)
     actions = np.random.default_rng(0).integers(0, 5, 20_000).tolist()
@@ -62,7 +62,7 @@ def single() -> tuple[int, float]:
 
 
 def measure(num_envs: list[int], rounds: int, threads: int | None) -> None:
-    """Print a line for the engine and for each number of environments."""
+    """Print a line for the engine, and for each number of environments."""
     runtime.start(threads)
     import taichi_ants.envs  # noqa: F401 (registers)
 
@@ -82,7 +82,7 @@ def measure(num_envs: list[int], rounds: int, threads: int | None) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
+    """Run the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
     add(
@@ -91,10 +91,10 @@ def main(arguments: list[str] | None = None) -> None:
         nargs="+",
         default=[256, 4096, 65536],
         metavar="N",
-        help="environments of a step (default: 256 4096 65536)",
+        help="step N environments at once (default: 256 4096 65536)",
     )
-    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")
     run_command(lambda: measure(**vars(parser.parse_args(arguments))))
 
 

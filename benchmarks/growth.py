@@ -1,9 +1,9 @@
-"""How cost grows: steps a second against runs, ants, cells, states and threads, and memory.
+"""Measure speed by the number of runs, ants, cells, states and threads, and memory per run or ant.
 
-Runs learn by Q-learning in the paper's world, 500 episodes each; ants forage in open worlds and
-learn into one table, scattered. All sizes are measured in turn with 1 thread and with all, several
-times, by the wall clock; the tables have medians. Memory is how much more the process takes at most
-while it works on twice as many of a thing, beside the sum of the arrays that are kept.
+Runs learn by Q-learning in the paper's world, for 500 episodes. Ants forage in open worlds and
+learn into one table. The command measures all sizes in turn, with 1 thread and with all threads,
+several times, by the wall clock; the tables contain medians. For memory, it doubles the size, and
+reports the growth of stored arrays and of the peak memory of the process, per run, ant or cell.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ _STATUS = Path("/proc/self/status")  # of this process, on Linux
 
 
 class Direction(NamedTuple):
-    """What grows.
+    """A quantity that grows.
 
     Attributes:
-        of: For readers.
-        step: What a step is.
-        make: The work at a size.
-        sizes: Which are measured.
+        of: The name in tables.
+        step: A description of one step.
+        make: Makes the work for a size.
+        sizes: The sizes to measure.
     """
 
     of: str
@@ -48,7 +48,7 @@ class Direction(NamedTuple):
 
 
 def runs(n: int, observation: str = "paper", episodes: int = 500) -> Work:
-    """Training of n runs."""
+    """Return work that trains n runs."""
     task = Task(delivery="truncates", observation=observation)
 
     def work() -> int:
@@ -59,23 +59,23 @@ def runs(n: int, observation: str = "paper", episodes: int = 500) -> Work:
 
 
 def states(n_states: int) -> Work:
-    """Training of 64 runs by the observation of so many states."""
+    """Return work that trains 64 runs with the observation of `n_states` states."""
     named = {observations.get(name).n_states: name for name in STATES}
     return runs(64, named[n_states], 100)
 
 
 def ants(n: int) -> Work:
-    """Ticks of n ants, four cells an ant."""
+    """Return ticks of n ants with four cells per ant."""
     return ticks(n, max(10, round((4 * n / 3) ** 0.5)))
 
 
 def cells(side: int) -> Work:
-    """Ticks of 10 000 ants in a world of so many values a coordinate."""
+    """Return ticks of 10 000 ants in a world of the ranges (side, side, side)."""
     return ticks(10_000, side)
 
 
 def ticks(n: int, side: int) -> Work:
-    """Ticks of a colony."""
+    """Return ticks of a colony of n ants in a world of the ranges (side, side, side)."""
     colony, several = colony_of(n, side), max(1, 50_000 // n)
 
     def work() -> int:
@@ -87,19 +87,19 @@ def ticks(n: int, side: int) -> Work:
 
 @cache
 def open_world(side: int) -> World:
-    """The same for all."""
+    """Return an open world of the ranges (side, side, side), the same one at each call."""
     return worlds.open_world(0, (side, side, side))
 
 
 def colony_of(n: int, side: int) -> Colony:
-    """Ants that forage, at the start of an episode."""
+    """Return a colony of n foraging ants, at the start of an episode."""
     colony = Colony(open_world(side), foraging(), SARSA, ants=n, start="spread")
     colony.begin_episode()
     return colony
 
 
 def n_cells(side: int) -> int:
-    """The cells of a world of equal ranges."""
+    """Return the number of cells of a world of the ranges (side, side, side)."""
     return 3 * side * (side - 1) + 1
 
 
@@ -115,12 +115,12 @@ SMALL = (
     Direction("ants", "of an ant", ants, (50, 100)),
 )
 
-# By direction, threads and size: steps a second, CPU nanoseconds a step.
+# By direction, threads and size: steps per second, CPU nanoseconds per step.
 Paces = dict[tuple[Direction, int, int], list[tuple[float, float]]]
 
 
 def measured(directions: Sequence[Direction], rounds: int, seconds: float) -> Paces:
-    """The paces of all sizes, with 1 thread and with all."""
+    """Return the paces of all sizes, with 1 thread and with all threads."""
     every = [(one, size) for one in directions for size in one.sizes]
     threads = sorted({1, runtime.available_threads()})
     found: Paces = {(one, k, size): [] for one, size in every for k in threads}
@@ -131,7 +131,7 @@ def measured(directions: Sequence[Direction], rounds: int, seconds: float) -> Pa
             for k in threads:
                 runtime.start(k)
                 for (one, size), work in zip(every, works, strict=True):
-                    work()  # Taichi has been started anew, and loads its kernels
+                    work()  # loads kernels, because Taichi has been restarted
                     found[one, k, size].append(pace(work, seconds))
                     done += 1
                     progress(done / total)
@@ -139,7 +139,7 @@ def measured(directions: Sequence[Direction], rounds: int, seconds: float) -> Pa
 
 
 class Memory(NamedTuple):
-    """Bytes for each of a thing: of the arrays that are kept, and of the process at most."""
+    """Bytes per unit of a quantity: of stored arrays, and of the peak of the process."""
 
     of: str
     arrays: float
@@ -147,10 +147,10 @@ class Memory(NamedTuple):
 
 
 def memory(small: bool) -> list[Memory]:
-    """What a run takes beyond its results, an ant and a cell."""
+    """Return the memory per run without its outcomes, per ant and per cell."""
     few = 200 if small else 20_000
     side = 20 if small else 600
-    n_ants = 200 if small else 600_000  # of fewer, each thread's sums are shared by fewer
+    n_ants = 200 if small else 600_000  # so many that sums per thread matter little
     episodes, outcomes = 20, 3 * np.dtype(np.int32).itemsize
 
     def training(n: int) -> Callable[[], list[np.ndarray]]:
@@ -172,7 +172,7 @@ def memory(small: bool) -> list[Memory]:
 
     sides = {n_cells(one): one for one in (side, 2 * side)}
     for one in sides.values():
-        open_world(one)  # which is not counted
+        open_world(one)  # cached, and not counted
     with progress_bar("Memory") as progress:
         kept, taken = growth(training, few, 2 * few)
         found = [Memory("run", kept, taken - episodes * outcomes)]
@@ -186,8 +186,8 @@ def memory(small: bool) -> list[Memory]:
 def growth(
     prepare: Callable[[int], Callable[[], list[np.ndarray]]], few: int, many: int
 ) -> tuple[float, float]:
-    """Bytes for each more: of the arrays that work keeps, and of the process at most in it."""
-    prepare(few)()  # compiles, and fills caches
+    """Return bytes per additional unit: of stored arrays, and of the peak of the process."""
+    prepare(few)()  # compiles kernels and fills caches
     (kept, peak), (kept_more, higher_peak) = (_measure(prepare, n) for n in (few, many))
     return (kept_more - kept) / (many - few), (higher_peak - peak) / (many - few)
 
@@ -197,13 +197,13 @@ def _measure(prepare: Callable[[int], Callable[[], list[np.ndarray]]], n: int) -
     before, work = _kilobytes("VmRSS"), prepare(n)
     _give_back()
     if _STATUS.exists():
-        Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
+        Path("/proc/self/clear_refs").write_text("5")  # resets the peak
     kept = sum(array.nbytes for array in work())
     return kept, (_kilobytes("VmHWM") - before) * 1024
 
 
 def _give_back() -> None:
-    """Return memory that is free to the system, which counts it as ours until then."""
+    """Return free memory to the system, so that it does not count for the process."""
     gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if _STATUS.exists() else None
     if trim is not None:
@@ -211,7 +211,7 @@ def _give_back() -> None:
 
 
 def _kilobytes(name: str) -> float:
-    """What the system says of this process, nan where it is not Linux."""
+    """Return a memory value of this process in kB, or nan if the system is not Linux."""
     if not _STATUS.exists():
         return float("nan")
     lines = _STATUS.read_text().splitlines()
@@ -219,7 +219,7 @@ def _kilobytes(name: str) -> float:
 
 
 def tables(found: Paces, memories: Sequence[Memory], rounds: int) -> list[Table]:
-    """Throughput, then memory."""
+    """Return the tables of throughput and of memory."""
     rows = []
     for (one, threads, size), values in found.items():
         steps, cpu = np.array(values).T
@@ -227,14 +227,12 @@ def tables(found: Paces, memories: Sequence[Memory], rounds: int) -> list[Table]
         spread = interval(steps.min() / 1e6, steps.max() / 1e6)
         numbers = figure(np.median(steps) / 1e6), spread, figure(np.median(cpu))
         rows.append([one.of, one.step, shown, str(threads), *numbers])
-    columns = ["", "a step", "how many", "threads", "M steps/s", "lowest, highest", "CPU ns"]
+    columns = ["size", "one step", "number", "threads", "M steps/s", "lowest, highest", "CPU ns"]
     about = f"Medians of {rounds} rounds. {machine(('taichi', 'numpy'))}"
     paces = Table("How throughput grows", columns, rows, [about], text_columns=2)
-    bytes_each = [
-        [f"a {one.of}" if one.of != "ant" else "an ant", *map(_whole, one[1:])] for one in memories
-    ]
-    columns = ["bytes for", "arrays that are kept", "the process at most"]
-    note = "A run is counted without its outcomes, which take 12 bytes an episode."
+    bytes_each = [[one.of, *map(_whole, one[1:])] for one in memories]
+    columns = ["bytes per", "stored arrays", "peak of the process"]
+    note = "Runs are counted without their outcomes, which take 12 bytes per episode."
     return [paces, Table("How memory grows", columns, bytes_each, [note])]
 
 
@@ -243,7 +241,7 @@ def _whole(value: float) -> str:
 
 
 def draw(found: Paces) -> None:
-    """Draw the throughput for the page, docs/figures/growth.png.
+    """Draw the throughput into docs/figures/growth.png.
 
     Raises:
         AntsError: The file cannot be written.
@@ -264,19 +262,19 @@ def draw(found: Paces) -> None:
             draw_lines(axes, lines)
             axes.set_xscale("log")
             axes.set(title=one.of, xlabel=f"{one.of}; a step {one.step}", ylim=(0, None))
-        panels[0].set_ylabel("million steps a second")
+        panels[0].set_ylabel("million steps per second")
         caption = "Medians, with the lowest and highest. Runs learn by Q-learning, ants by SARSA."
         style.frame(drawn, "How throughput grows", caption, style.legend_entries(panels))
     style.save_all({"growth": drawn}, FIGURES)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    """Run the command line."""
+    parser = Parser(__doc__)
     add = parser.add_argument
-    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
-    add("--small", action="store_true", help="little work, to try the command; says nothing")
-    add("--publish", action="store_true", help="put tables and figure into docs/performance.md")
+    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
+    add("--small", action="store_true", help="do little work, to test this command")
+    add("--publish", action="store_true", help="write tables and figure to docs/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

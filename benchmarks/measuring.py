@@ -1,4 +1,4 @@
-"""What benchmarks share: the machine in words, a pace, and tables that go into a page."""
+"""Tools for benchmarks: a description of the machine, measured paces, tables in a docs page."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "performance.md"
 FIGURES = ROOT / "docs" / "figures"
 
-Work = Callable[[], int]  # does a piece of work, and gives the steps in it
+Work = Callable[[], int]  # does some work, and returns the number of steps in it
 
 
 def a_ratio(text: str) -> float:
-    """The type of an option: a number from 0 on."""
+    """Return a number of at least 0, as the type of an option."""
     if not 0 <= (value := float(text)) < math.inf:
-        raise ArgumentTypeError(f"{text} is not allowed, it must be a number from 0 on")
+        raise ArgumentTypeError(f"{text} is not allowed, give a finite number of at least 0")
     return value
 
 
 def machine(packages: Sequence[str]) -> str:
-    """Kind and number of processors, and versions, of packages those that are installed."""
+    """Return a description of the machine: processors, system, and versions of packages."""
     versions = [f"{name} {version(name)}" for name in packages if find_spec(name) is not None]
     return (
         f"{_processor()}, {runtime.available_threads()} processors, {platform.system()}, "
@@ -49,7 +49,11 @@ def _processor() -> str:
 
 
 def pace(work: Work, seconds: float) -> tuple[float, float]:
-    """Work for so long at least: steps a second by the wall clock, CPU nanoseconds a step."""
+    """Return the pace of work that is repeated for at least some seconds.
+
+    Returns:
+        Steps per second by the wall clock, and CPU nanoseconds per step.
+    """
     steps, began, cpu = 0, time.perf_counter(), time.process_time()
     while not steps or time.perf_counter() - began < seconds:
         steps += work()
@@ -58,15 +62,15 @@ def pace(work: Work, seconds: float) -> tuple[float, float]:
 
 
 def publish(name: str, tables: Sequence[Table], page: Path) -> None:
-    """Replace what stands between `<!-- name -->` and `<!-- /name -->` of a page by tables.
+    """Replace the text between `<!-- name -->` and `<!-- /name -->` of a page by tables.
 
     Raises:
-        AntsError: The page has no such place, or cannot be read or written.
+        AntsError: The page lacks these marks, or cannot be read or written.
     """
     text, first, last = read_text(page), f"<!-- {name} -->\n", f"<!-- /{name} -->"
     before, begins, rest = text.partition(first)
     _, ends, after = rest.partition(last)
     if not begins or not ends:
-        raise AntsError(f"{page} has no place {first.strip()} ... {last}; put both lines there.")
+        raise AntsError(f"{page} lacks the lines {first.strip()} and {last}; add both lines.")
     new = "\n".join(table.markdown() for table in tables)
     write_text(page, f"{before}{first}\n{new}\n{last}{after}")

@@ -1,11 +1,11 @@
-"""Plant small mistakes in a copy of the package, and see which of them the quick suite notices.
+"""Put small errors into a copy of the package, and count those that the quick tests notice.
 
-    python benchmarks/mutations.py                   # all, about ten minutes
-    python benchmarks/mutations.py statistics files  # those in which one of the words occurs
+    python benchmarks/mutations.py                   # all mutations, about ten minutes
+    python benchmarks/mutations.py statistics files  # mutations that contain one of these words
 
-Each mutation is a wrong change of one line with the tests that must notice it. The script prints
-"noticed", "NOT NOTICED", or "stale" where the old text no longer occurs exactly once, and exits
-with 1 unless all were noticed. It first runs the tests without mutations, which must pass.
+A mutation is a wrong change of one line, with the tests that must notice it. The script prints
+"noticed", "NOT NOTICED", or "stale" if the old text does not occur exactly once. It exits with 1
+unless all mutations were noticed. It first runs the tests without mutations, which must pass.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
-TIMEOUT = 300.0  # seconds; a mutation that makes a test wait that long is noticed
+TIMEOUT = 300.0  # seconds; a mutation that makes tests take longer counts as noticed
 
 RUNS = "tests/engines/runs/test_against_reference.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
@@ -213,7 +213,7 @@ MUTATIONS = [
 
 
 def main(words: list[str]) -> int:
-    """Try the mutations in which one of the words occurs; 0 if all were noticed."""
+    """Return 0 if tests notice all mutations that contain one of the words, else 1."""
     chosen = [one for one in MUTATIONS if not words or any(w in " ".join(one) for w in words)]
     found: dict[str, int] = {}
     with tempfile.TemporaryDirectory() as name:
@@ -222,7 +222,7 @@ def main(words: list[str]) -> int:
         shutil.copytree(ROOT, place, ignore=ignored)
         for tests in dict.fromkeys(one[3] for one in chosen):
             if fails(place, tests):
-                raise SystemExit(f"{tests} fails without a mutation, so it cannot notice one.")
+                raise SystemExit(f"{tests} fails without a mutation; fix the test first.")
         for path, old, new, tests in chosen:
             start = time.monotonic()
             outcome = tried(place, place / "taichi_ants" / path, old, new, tests)
@@ -234,7 +234,7 @@ def main(words: list[str]) -> int:
 
 
 def tried(place: Path, file: Path, old: str, new: str, tests: str) -> str:
-    """The outcome of one mutation of a file in a copy of the project at `place`."""
+    """Return the outcome of one mutation of a file in a copy of the project at `place`."""
     text = file.read_text()
     if text.count(old) != 1:
         return "stale"
@@ -246,8 +246,8 @@ def tried(place: Path, file: Path, old: str, new: str, tests: str) -> str:
 
 
 def fails(place: Path, tests: str) -> bool:
-    """Whether tests fail in a copy of the project, or take too long."""
-    # Python compares cached byte code by size and time in seconds, so it could reuse a mutation's.
+    """Return whether tests fail in a copy of the project, or take too long."""
+    # Python compares byte code by size and seconds, so it could reuse that of another mutation.
     environment = {**os.environ, "PYTHONPATH": str(place), "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", "-x", "-n0", "-p", "no:cacheprovider", tests]
     options = {"capture_output": True, "text": True, "timeout": TIMEOUT}
@@ -255,7 +255,7 @@ def fails(place: Path, tests: str) -> bool:
         done = subprocess.run(command, cwd=place, env=environment, **options)
     except subprocess.TimeoutExpired:
         return True
-    if done.returncode > 1:  # of which pytest itself is the cause, as a file that is missing
+    if done.returncode > 1:  # a failure of pytest itself, such as a missing file
         raise SystemExit(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
     return bool(done.returncode)
 

@@ -1,8 +1,9 @@
-"""How fast Taichi Ants steps beside others on this machine: NumPy, numba, JAX, Mesa and more.
+"""Compare the speed of Taichi Ants with NumPy, numba, JAX, Mesa and others on this machine.
 
-Each system works as its users would run it. They are measured in turn, several times, by the wall
-clock; the tables have medians. Compare within a table, and read what a step is: only the first rows
-of the first table do exactly the same. Install all of them with pip install -e ".[bench]".
+Each system runs as its users would run it. The command measures all systems in turn, several times,
+by the wall clock; the tables contain medians. Compare within a table, and read the column of steps:
+only the first rows of the first table do exactly the same. To install all systems, run
+pip install -e ".[bench]".
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from taichi_ants.studies.command_line import Parser, progress_bar, run_command, 
 
 
 class Sizes(NamedTuple):
-    """How much of each there is: seeds of a configuration, environments, ants."""
+    """The sizes of the systems: seeds per configuration, environments, ants."""
 
     seeds: int = 100
     environments: int = 4096
@@ -33,12 +34,12 @@ SMALL = Sizes(1, 16, 16, 200)
 
 
 class System(NamedTuple):
-    """One that is measured.
+    """A system to measure.
 
     Attributes:
-        name: For readers.
-        step: What it does in a step.
-        call: Module in `systems`, function, and what it is given; "?name" is one of `Sizes`.
+        name: The name in tables.
+        step: A description of one step.
+        call: Module in `systems`, function, and arguments; "?name" is a field of `Sizes`.
         needs: The packages that must be installed.
     """
 
@@ -50,7 +51,7 @@ class System(NamedTuple):
 
 _SAME = "paper's world and grid, Q-learning:"
 _COLONY = "hexagonal grid,"
-# The first of each group is what the others are compared with.
+# The others of a group are compared with its first system.
 Groups = dict[str, tuple[System, ...]]
 GROUPS: Groups = {
     "Steps with learning": (
@@ -90,7 +91,7 @@ GROUPS: Groups = {
         ),
         System(
             "PettingZoo, knights",
-            "2 archers and 2 knights against zombies, continuous places, nothing drawn",
+            "2 archers and 2 knights against zombies, continuous space, no rendering",
             ("parallel_agents", "knights"),
             ("pettingzoo", "pygame"),
         ),
@@ -108,7 +109,7 @@ GROUPS: Groups = {
         ),
         System(
             "Mesa",
-            f"{_COLONY} {{ants}} ants, trails, a fixed rule, nobody learns",
+            f"{_COLONY} {{ants}} ants, trails, a fixed rule, no learning",
             ("mesa_ants", "colony", "?ants"),
             ("mesa",),
         ),
@@ -120,19 +121,19 @@ Paces = dict[System, list[tuple[float, float]]]
 
 
 def missing(system: System) -> list[str]:
-    """Of the packages that a system needs those that are not installed."""
+    """Return the required packages of a system that are not installed."""
     return [name for name in system.needs if find_spec(name) is None]
 
 
 def prepared(system: System, sizes: Sizes) -> Work:
-    """The work of a system, warm: what it compiles is compiled."""
+    """Return the work of a system, with all code compiled."""
     module, function, *given = system.call
     make = getattr(import_module(f"systems.{module}"), function)
     return make(*(getattr(sizes, name[1:]) for name in given))
 
 
 def measured(sizes: Sizes, rounds: int, seconds: float) -> dict[str, Paces]:
-    """The paces of all systems that are installed, by group."""
+    """Return the paces of all installed systems, by group."""
     there = {name: [one for one in some if not missing(one)] for name, some in GROUPS.items()}
     every = [(name, one) for name, some in there.items() for one in some]
     found: dict[str, Paces] = {name: {one: [] for one in some} for name, some in there.items()}
@@ -149,7 +150,7 @@ def measured(sizes: Sizes, rounds: int, seconds: float) -> dict[str, Paces]:
 
 
 def tables(found: dict[str, Paces], groups: Groups, sizes: Sizes, rounds: int) -> list[Table]:
-    """A table for each group; the machine and what was left out below the last."""
+    """Return a table for each group, and one with notes on the machine and skipped systems."""
     words = {name: thousands(size) for name, size in sizes._asdict().items()}
     made = []
     for name, paces in found.items():
@@ -162,10 +163,10 @@ def tables(found: dict[str, Paces], groups: Groups, sizes: Sizes, rounds: int) -
             times = figure(float(np.median(first / steps)))
             step = system.step.format(**words)
             rows.append([system.name, step, numbers, spread, figure(np.median(cpu)), times])
-        columns = ["", "a step", "M steps/s", "lowest, highest", "CPU ns", "first / this"]
+        columns = ["system", "one step", "M steps/s", "lowest, highest", "CPU ns", "first / this"]
         made.append(Table(name, columns, rows, text_columns=2))
     lacking = [
-        f"{one.name} is left out for lack of {' and '.join(missing(one))}."
+        f"{one.name} is skipped, because it requires {' and '.join(missing(one))}."
         for some in groups.values()
         for one in some
         if missing(one)
@@ -176,7 +177,7 @@ def tables(found: dict[str, Paces], groups: Groups, sizes: Sizes, rounds: int) -
 
 
 def draw(found: dict[str, Paces]) -> None:
-    """Draw all paces for the page, docs/figures/peers.png.
+    """Draw all paces into docs/figures/peers.png.
 
     Raises:
         AntsError: The file cannot be written.
@@ -195,20 +196,20 @@ def draw(found: dict[str, Paces]) -> None:
             axes.set_yticks(range(len(paces)), [system.name for system in paces])
             axes.set(title=name, ylim=(len(paces) - 0.5, -0.5))
             axes.grid(visible=False, axis="y")
-        panels[-1].set(xlabel="steps a second", xscale="log")
-        title = "Steps a second on one machine"
+        panels[-1].set(xlabel="steps per second", xscale="log")
+        title = "Steps per second on one machine"
         caption = "Medians, with the lowest and highest. Compare within a panel."
         style.frame(drawn, title, caption, style.legend_entries(panels))
     style.save_all({"peers": drawn}, FIGURES)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    """Run the command line."""
+    parser = Parser(__doc__)
     add = parser.add_argument
-    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
-    add("--small", action="store_true", help="little work, to try the command; says nothing")
-    add("--publish", action="store_true", help="put tables and figure into docs/performance.md")
+    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
+    add("--small", action="store_true", help="do little work, to test this command")
+    add("--publish", action="store_true", help="write tables and figure to docs/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

@@ -1,6 +1,6 @@
-"""Each way to share the ticks of a colony among threads, forced on colonies of many sizes.
+"""Compare the ways in which threads can share the ticks of a colony, for colonies of many sizes.
 
-Each round measures all of them in turn. Compare `benchmarks/growth.py` for what a colony chooses.
+Each round measures all ways in turn. `benchmarks/growth.py` measures the way that a colony chooses.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from taichi_ants.engines.colony import stepping
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 
 SIZES = ((64, 1), (1000, 1), (10_000, 1), (100_000, 1), (64, 256), (1000, 64), (20_000, 8))
-# Of each way: the schedule; threads that share a tick, 0 for all; whether they have a barrier.
+# By way: the schedule; threads that share a tick, 0 for all; whether they use a barrier.
 WAYS = {
     "by world": ("by_world", 0, True),
     "by chunk, one thread": ("by_chunk", 1, True),
@@ -28,7 +28,7 @@ _STEPS = 400_000  # of ants, in one measurement
 
 
 def colony_of(ants: int, n_worlds: int, schedule: str) -> Colony:
-    """A colony in an episode, with eight cells for each ant."""
+    """Return a colony at the start of an episode, with eight cells per ant."""
     side = max(6, round((8 * ants / 3) ** 0.5) + 1)
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
     world, options = worlds.open_world(1, (side, side, side)), {"schedule": schedule}
@@ -38,12 +38,12 @@ def colony_of(ants: int, n_worlds: int, schedule: str) -> Colony:
 
 
 def pace(colony: Colony, way: str) -> float:
-    """Million steps of ants a second."""
+    """Return million steps of ants per second."""
     _, threads, barrier = WAYS[way]
     stepping.ThreadChoice.plan = lambda choice, ticks, most: (ticks, threads or most)
     stepping._has_barrier = lambda running: barrier
     steps = colony.ants * len(colony.seeds)
-    most = 100 if way.endswith(("barrier", "loops")) else 10_000  # these can wait long
+    most = 100 if way.endswith(("barrier", "loops")) else 10_000  # threads can wait long
     ticks = max(2, min(most, _STEPS // steps))
     began = time.perf_counter()
     colony.tick(ticks)
@@ -51,7 +51,7 @@ def pace(colony: Colony, way: str) -> float:
 
 
 def table(sizes: Sequence[tuple[int, int]], rounds: int) -> Table:
-    """Measure all ways in turn; the first measurement of each, which compiles, is left out."""
+    """Return a table of all ways, without their first measurement, which compiles kernels."""
     rows = []
     with progress_bar("Measuring") as progress:
         for n, (ants, n_worlds) in enumerate(sizes):
@@ -66,7 +66,7 @@ def table(sizes: Sequence[tuple[int, int]], rounds: int) -> Table:
         "ticks are shared",
         "ants",
         "worlds",
-        "M steps/s at best",
+        "best M steps/s",
         "median ratio to by world",
     ]
     threads = runtime.start().threads
@@ -75,12 +75,12 @@ def table(sizes: Sequence[tuple[int, int]], rounds: int) -> Table:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    """Run the command line."""
+    parser = Parser(__doc__)
     add = parser.add_argument
-    add("--rounds", type=whole_number(1), default=15, metavar="N", help="measurements of each")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
-    add("--publish", action="store_true", help="put the table into docs/performance.md")
+    add("--rounds", type=whole_number(1), default=15, metavar="N", help="measure each N times")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")
+    add("--publish", action="store_true", help="write the table to docs/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

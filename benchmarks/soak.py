@@ -1,10 +1,10 @@
-"""Whether a large colony stays sound: 10 000 ants for 20 000 ticks under two sets of rules.
+"""Check the consistency of a large colony: 10 000 ants for 20 000 ticks, under two sets of rules.
 
-Under the paper's rules nothing comes or goes. Under lively ones ants are born and die, food grows
-back and wanders, trails evaporate and spread, and ants queue. Now and then it checks that no food
-has appeared or vanished, that no two ants share a cell, that all numbers are finite and all clocks
-agree; at the end that the process has not grown. The first fault ends it with a sentence.
-`--ticks 1000000` takes about an hour on two cores.
+Under the rules "paper", ants and food sources do not change. Under the rules "lively", ants are
+born and die, food grows back and wanders, trails evaporate and spread, and ants queue. Every 100
+ticks the command checks the colony: no food has appeared or vanished, ants have different cells,
+all numbers are finite, and all clocks agree. At the end it checks the memory of the process. It
+stops at the first fault. `--ticks 1000000` takes about an hour on two cores.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ RULES = {
     ),
 }
 RANGES = (100, 100, 100)
-_MOST_GROWTH = 16.0  # MB of the process, after the first tenth
+_MOST_GROWTH = 16.0  # MB of process memory, after the first tenth of the ticks
 
 
 def new_colony(rules: str, ants: int) -> Colony:
-    """At the start of its episode; the ants learn into one table."""
+    """Return a colony at the start of an episode, with ants that learn into one table."""
     world = worlds.open_world(1, RANGES)
     training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
     colony = Colony(world, RULES[rules], training, 1, ants, start="spread")
     colony.begin_episode()
-    if (lifespan := colony.task.life.lifespan) is not None:  # not all of them shall die at once
+    if (lifespan := colony.task.life.lifespan) is not None:  # so that ants die at different times
         colony.arrays["age"][:ants] = np.arange(ants) * lifespan // ants
     for array in colony.arrays.values():
-        array[...] = array.copy()  # so that all memory that it will need is in use
+        array[...] = array.copy()  # so that the process already uses all its memory
     return colony
 
 
 def faults(colony: Colony) -> list[str]:
-    """What does not hold, in words, of what must hold at the end of every tick."""
+    """Return the faults of a colony at the end of a tick, as text."""
     arrays, world = colony.arrays, colony.arrays["worlds"][:, 0]
     taken = arrays["stage"] != Stage.VACANT
     ants = {name: arrays[name][taken] for name in colony.columns()}
@@ -59,28 +59,28 @@ def faults(colony: Colony) -> list[str]:
     trails = arrays["level"] if colony.pheromone.dense else arrays["trail"]
     food_sources = arrays["food_sources"][:, : world[WorldRow.FOOD_SOURCES]]
     ages, lifespan = ants.get("age", np.zeros(1)), colony.task.life.lifespan
-    outcome = colony.outcome()  # which makes sure that action values are finite
+    outcome = colony.outcome()  # checks that action values are finite
     moves, blocked = outcome.moves[0, 0], outcome.blocked[0, 0]
     holds = {
-        "food was lost, or came from nowhere": foods + world[WorldRow.DELIVERIES] == came,
-        "the queen's food is not what she was given": not colony.task.life.births
+        "food has vanished or appeared": foods + world[WorldRow.DELIVERIES] == came,
+        "the queen's food differs from the deliveries": not colony.task.life.births
         or stored == world[WorldRow.DELIVERIES],
         "ants share a cell": len(np.unique(cells)) == len(cells),
         "ants share a number": len(np.unique(numbers)) == len(numbers),
         "ants were lost": (ants["stage"] == Stage.LIVING).all()
         and len(cells) == world[WorldRow.LIVING]
         and len(cells) == colony.ants + world[WorldRow.BIRTHS] - world[WorldRow.DEATHS],
-        "cells and ants disagree": (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all(),
-        "an ant stands on something": not walls[cells].any() and (ground[cells] == EMPTY).all(),
-        "the queen is gone": np.flatnonzero(ground == QUEEN).tolist()
+        "cells and ants differ": (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all(),
+        "an ant's cell is not empty": not walls[cells].any() and (ground[cells] == EMPTY).all(),
+        "the queen is missing or misplaced": np.flatnonzero(ground == QUEEN).tolist()
         == [world[WorldRow.QUEEN_CELL]],
-        "an ant has no heading": ((ants["heading"] >= 0) & (ants["heading"] < 6)).all(),
-        "a trail is no number, below 0, or on rock": np.isfinite(trails).all()
+        "a heading is not between 0 and 5": ((ants["heading"] >= 0) & (ants["heading"] < 6)).all(),
+        "a trail is not finite, is negative, or is on rock": np.isfinite(trails).all()
         and trails.min() >= 0
         and not trails[walls].any(),
-        "clocks disagree": world[WorldRow.TICKS] == colony.ticks,
+        "the clocks of world and colony differ": world[WorldRow.TICKS] == colony.ticks,
         "an ant is too old": lifespan is None or ages.max(initial=0) < lifespan,
-        "a food was taken later than now": food_sources[FoodSourceRow.TAKEN].max(initial=-1)
+        "food was taken in a future tick": food_sources[FoodSourceRow.TAKEN].max(initial=-1)
         < colony.ticks,
         "a counter has overflowed": 0 <= blocked <= moves <= colony.capacity * colony.ticks,
     }
@@ -88,14 +88,18 @@ def faults(colony: Colony) -> list[str]:
 
 
 def megabytes() -> float:
-    """What the process holds in memory now."""
+    """Return the present memory of the process in MB."""
     with open("/proc/self/status", encoding="utf-8") as status:
         (line,) = (line for line in status if line.startswith("VmRSS:"))
     return int(line.split()[1]) / 1000
 
 
 def soak(rules: list[str], ants: int, ticks: int, every: int, threads: int | None) -> None:
-    """Print a line for each tenth of the ticks, under each of the rules."""
+    """Print a line for each tenth of the ticks, under each set of rules.
+
+    Raises:
+        AntsError: A check has failed.
+    """
     runtime.start(threads)
     print(f"{'rules':8}{'tick':>9}{'ants':>8}{'delivered':>11}{'MB':>8}{'ticks/s':>9}")
     for name in rules:
@@ -116,19 +120,23 @@ def soak(rules: list[str], ants: int, ticks: int, every: int, threads: int | Non
                         flush=True,
                     )
         if megabytes() - first > _MOST_GROWTH:
-            raise AntsError(f"{name}: the process has grown from {first:.1f} MB.")
-    print("All held.")
+            raise AntsError(
+                f"{name}: the memory of the process has grown from {first:.1f} to "
+                f"{megabytes():.1f} MB; at most {_MOST_GROWTH:g} MB more are allowed."
+            )
+    print("All checks passed.")
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
+    """Run the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--rules", choices=RULES, nargs="+", default=tuple(RULES), help="one or both")
-    add("--ants", type=whole_number(1, 20_000), default=10_000, metavar="N", help="that start")
-    add("--ticks", type=whole_number(1, 10_000_000), default=20_000, metavar="N", help="how long")
-    add("--every", type=whole_number(1), default=100, metavar="N", help="ticks between checks")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    rules, ants, ticks = RULES, whole_number(1, 20_000), whole_number(1, 10_000_000)
+    add("--rules", choices=rules, nargs="+", default=tuple(rules), help="use these rules")
+    add("--ants", type=ants, default=10_000, metavar="N", help="start with N ants")
+    add("--ticks", type=ticks, default=20_000, metavar="N", help="run N ticks")
+    add("--every", type=whole_number(1), default=100, metavar="N", help="check every N ticks")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")
     run_command(lambda: soak(**vars(parser.parse_args(arguments))))
 
 

@@ -1,12 +1,12 @@
-"""How fast the paper's grid trains, beside the same in plain C.
+"""Compare the speed of training the paper's grid with two programs in C that do the same.
 
-Trains the 16 configurations of each learner with several seeds; delivery truncates. Two yardsticks
-do the same runs, and their results are equal to the bit: ant.c, one run after the other, with
-branches, as one would write it by hand; and ant_vector.c, sixteen runs at a time in the lanes of
-AVX-512 vectors. Both are compiled with -O3 for this processor. Ours and theirs are measured in
-turn, several times; the table has medians, and ratios of paces, more than 1 where ours is faster.
-One thread is measured by processor time, which other programs hardly disturb; several threads by
-the wall clock.
+The command trains the 16 configurations of each learner with several seeds, where delivery
+truncates. The program ant.c does one run after another, with branches, as one would write it by
+hand. The program ant_vector.c does sixteen runs at a time, in the lanes of AVX-512 vectors. Both
+are compiled with -O3 for this processor, and their results are equal to ours to the bit. The
+command measures all three in turn, several times. The table contains medians, and ratios above 1
+where ours is faster. One thread is measured by processor time, which other programs hardly change;
+several threads are measured by the wall clock.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ LEARNERS = {
     "Dyna-Q (p3)": ("dyna_q", 3),
     "Dyna-Q (p5)": ("dyna_q", 5),
 }
-YARDSTICKS = {"train": "C", "train_vector": "vector C"}  # functions in C
-_NUMBERS_IN_C = ("q_learning", "sarsa", "dyna_q")  # of learners
+YARDSTICKS = {"train": "C", "train_vector": "vector C"}  # functions in C, and their names in tables
+_NUMBERS_IN_C = ("q_learning", "sarsa", "dyna_q")  # learners by their number in C
 
 _RUN = np.dtype(  # the struct Run of ant.h
     [
@@ -78,7 +78,7 @@ class CJob(ctypes.Structure):
 
 
 class Trained(NamedTuple):
-    """What C gives, by configuration and seed, and the seconds that it took.
+    """The results of a program in C, by configuration and seed, and its seconds.
 
     `returns` and `steps` are int32 (c, s, episodes), `q_values` float32 (c, s, 128, 5).
     """
@@ -93,13 +93,13 @@ Yardstick = Callable[[Any, Any, Any], int]  # a function of C
 
 
 def compiler() -> str | None:
-    """The C compiler of this machine: CC, cc, gcc or clang; None if there is none."""
+    """Return the C compiler of this machine: CC, cc, gcc or clang; None if there is none."""
     names = (os.environ.get("CC"), "cc", "gcc", "clang")
     return next((found for name in names if name and (found := shutil.which(name))), None)
 
 
 def load_yardsticks(command: str, folder: str | Path, threads: int) -> dict[str, Yardstick]:
-    """Compile both in a folder and load them, by name; one without AVX-512 is left out."""
+    """Return the two functions in C by name, compiled in a folder; vector C requires AVX-512."""
     library = Path(folder) / "ant.so"
     parallel = ["-fopenmp"] if threads > 1 else []
     given = [command, *FLAGS, *parallel, "-o", library, *SOURCES]
@@ -109,7 +109,7 @@ def load_yardsticks(command: str, folder: str | Path, threads: int) -> dict[str,
 
 
 def clock(threads: int) -> float:
-    """Seconds of the processor for one thread, of the wall clock for several."""
+    """Return processor time for one thread, or wall-clock time for several, in seconds."""
     return time.process_time() if threads == 1 else time.perf_counter()
 
 
@@ -123,10 +123,10 @@ def train_in_c(
     max_steps: int = EPISODE_STEPS,
     threads: int = 1,
 ) -> Trained:
-    """Train configurations of one learner, and one number of planning steps.
+    """Return the results of training in C, for configurations that differ only in the grid.
 
     Raises:
-        AntsError: C has found too little memory.
+        AntsError: There is too little memory for C.
     """
     offsets = world.grid.offsets[(np.arange(8) - 1) % 6]
     arrays = (world.ground(), world.trail_levels(), world.closer(), offsets)
@@ -151,7 +151,7 @@ def train_in_c(
     enough = yardstick(ctypes.byref(in_c), ctypes.byref(job), ctypes.c_void_p(runs.ctypes.data))
     seconds = clock(threads) - began
     if not enough:
-        raise AntsError(f"C finds no memory for {len(runs)} runs; take fewer seeds.")
+        raise AntsError(f"C cannot allocate memory for {len(runs)} runs; choose fewer seeds.")
     return Trained(returns, steps, q_values, seconds)
 
 
@@ -162,32 +162,32 @@ def _run(world: World, config: TrainingConfig, seed: int) -> tuple[float, ...]:
 
 
 def grid(learner: str, planning_steps: int) -> list[TrainingConfig]:
-    """The paper's 16 configurations of a learner."""
+    """Return the paper's 16 configurations of a learner."""
     more = {"planning_steps": planning_steps} if planning_steps else {}
     return [TrainingConfig(learner, *point, hyperparameters=more) for point in GRID]
 
 
 def check_same(trained: Trained, result: TrainingResult) -> None:
-    """Check that C has done the same.
+    """Check that the results of C are the same as ours.
 
     Raises:
-        AntsError: It has not, so that its pace says nothing about ours.
+        AntsError: They differ, so the paces cannot be compared.
     """
     for name in ("returns", "steps", "q_values"):
         if not np.array_equal(getattr(trained, name), getattr(result, name)):
-            raise AntsError(f"C gives other {name} than the package; compare the two.")
+            raise AntsError(f"C returns other {name} than the package; compare the two programs.")
 
 
 def measured(
     yardsticks: dict[str, Yardstick], seeds: Sequence[int], rounds: int, threads: int
 ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
-    """By learner: the steps, and the seconds of ours and of the yardsticks, (rounds, 1 + n)."""
+    """Return steps by learner, and seconds of ours and of n functions in C, (rounds, 1 + n)."""
     steps, seconds = {}, {}
     world, task = worlds.paper(), Task(delivery="truncates")
     with progress_bar("Measuring") as progress:
         for label, learner in LEARNERS.items():
             configs, found = grid(*learner), []
-            train(world, configs, 0, 1, 1, threads=threads)  # compiles
+            train(world, configs, 0, 1, 1, threads=threads)  # compiles kernels
             for number in range(rounds):
                 began = time.perf_counter()
                 result = train(world, configs, seeds, task=task, threads=threads)
@@ -211,7 +211,7 @@ def table(
     seeds: int,
     threads: int,
 ) -> Table:
-    """A row for each learner, and one for all: paces, and the ratios within the rounds."""
+    """Return a table with a row for each learner and one for all: paces, and medians of ratios."""
     rows, missing = [], [MISSING] * (len(YARDSTICKS) - len(names))
     for label in [*LEARNERS, "the grid"]:
         parts = [label] if label in LEARNERS else list(LEARNERS)
@@ -226,15 +226,14 @@ def table(
     notes = [f"Million steps/s of {what}; {taken_of}. {machine(('taichi', 'numpy'))}"]
     if "C" in names and "vector C" not in names:
         notes.append("No vector C: this processor or its compiler has no AVX-512.")
-    return Table("Training beside C", columns, rows, notes)
+    return Table("Training compared with C", columns, rows, notes)
 
 
 def compare(seeds: int, rounds: int, threads: int, least: float, publishes: bool) -> None:
     """Print the table.
 
     Raises:
-        AntsError: With a learner, training is slower than `least` times the pace of ant.c; or
-            results differ.
+        AntsError: Training of a learner is slower than `least` times ant.c, or results differ.
     """
     threads = runtime.start(threads).threads
     with tempfile.TemporaryDirectory() as folder:
@@ -246,27 +245,28 @@ def compare(seeds: int, rounds: int, threads: int, least: float, publishes: bool
     if publishes:
         publish("training", [made], PAGE)
     if not yardsticks:
-        print("There is no C compiler (cc, gcc, clang or CC), so no comparison with C.")
+        print("There is no C compiler (cc, gcc, clang or CC), so the comparison is skipped.")
         return
     ratios = {name: float(np.median(one[:, 1] / one[:, 0])) for name, one in seconds.items()}
     worst = min(ratios, key=ratios.__getitem__)
     if ratios[worst] < least:
         raise AntsError(
-            f"{worst} goes at {ratios[worst]:.2f} of the pace of C; at least {least:g} is "
-            "expected, so look for what has made it slower."
+            f"{worst} has {ratios[worst]:.2f} times the pace of C, but at least {least:g} is "
+            "expected; find out what has made it slower."
         )
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
-    parser = Parser(__doc__.split("\n", 1)[0], epilog=__doc__.split("\n", 1)[1])
+    """Run the command line."""
+    parser = Parser(__doc__)
     add = parser.add_argument
-    add("--seeds", type=whole_number(1), default=20, metavar="N", help="seeds of each setting")
-    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measurements of each")
-    add("--threads", type=whole_number(1, 1024), default=1, metavar="N", help="CPU threads")
-    about = "fail if the slowest learner, beside ant.c, is below this ratio"
+    about = "train each configuration with N seeds"
+    add("--seeds", type=whole_number(1), default=20, metavar="N", help=about)
+    add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
+    add("--threads", type=whole_number(1, 1024), default=1, metavar="N", help="use N CPU threads")
+    about = "fail if the ratio of a learner to ant.c is below RATIO"
     add("--least", type=a_ratio, default=0.0, metavar="RATIO", help=about)
-    add("--publish", action="store_true", help="put the table into docs/performance.md")
+    add("--publish", action="store_true", help="write the table to docs/performance.md")
 
     def command() -> None:
         given = parser.parse_args(arguments)

@@ -1,4 +1,4 @@
-"""gymnax's FourRooms, a grid of 13 x 13 squares, under random actions: vmap and scan."""
+"""FourRooms of gymnax, a grid of 13 x 13 squares, with random actions: vmap and scan."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 import gymnax
 import jax
 
-_STEPS = 100  # of a scan
+_STEPS = 100  # in a scan
 
 
 def environments(n: int) -> Callable[[], int]:
-    """Steps of n environments at random, all in one compiled scan."""
+    """Return steps of n environments with random actions, in one compiled scan."""
     env, params = gymnax.make("FourRooms-misc")
 
     def one(state: Any, key: Any) -> tuple[Any, Any]:
@@ -23,7 +23,7 @@ def environments(n: int) -> Callable[[], int]:
 
     def step(states: Any, key: Any) -> tuple[Any, Any]:
         states, (seen, rewards) = jax.vmap(one)(states, jax.random.split(key, n))
-        return states, (seen.sum(), rewards.sum())  # or the compiler would leave them out
+        return states, (seen.sum(), rewards.sum())  # else the compiler would remove them
 
     @jax.jit
     def scan(states: Any, key: Any) -> tuple[Any, Any]:

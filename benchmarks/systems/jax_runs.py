@@ -1,5 +1,4 @@
-"""The paper's world and Q-learning in JAX: one run as pure functions, vmap over runs, scan over
-steps."""
+"""The paper's world and Q-learning in JAX: pure functions of one run, vmap over runs, scan."""
 
 from __future__ import annotations
 
@@ -26,13 +25,13 @@ from systems.paper_world import (
 )
 from taichi_ants import TrainingConfig
 
-_STEPS = 100  # of a scan
+_STEPS = 100  # in a scan
 _WORLD = layout()
 _GROUND, _TRAIL, _CLOSER, _AHEAD = map(jnp.asarray, _WORLD[:4])
 
 
 class Run(NamedTuple):
-    """Where a run stands."""
+    """The state of a run."""
 
     cell: Any
     heading: Any
@@ -47,7 +46,7 @@ class Run(NamedTuple):
 
 
 def look(run: Run) -> Any:
-    """The codes of the cells in view, int (3,)."""
+    """Return the codes of the cells in view, int (3,)."""
     view = run.cell + _AHEAD[:, run.heading]
     looks = run.ground[view]
     empty = looks == 0
@@ -59,12 +58,12 @@ def look(run: Run) -> Any:
 
 
 def state_of(carries: Any, codes: Any) -> Any:
-    """The row of the table."""
+    """Return the row of the table."""
     return carries * 64 + codes[0] * 16 + codes[1] * 4 + codes[2]
 
 
 def begun(epsilon: Any, q: Any) -> Run:
-    """A run at the start of an episode."""
+    """Return a run at the start of an episode."""
     cell, heading = jnp.int32(_WORLD.cell), jnp.int32(_WORLD.heading)
     none, no = jnp.int32(0), jnp.bool_(False)
     run = Run(cell, heading, no, _GROUND, _TRAIL, none, none, none, epsilon, q)
@@ -72,7 +71,7 @@ def begun(epsilon: Any, q: Any) -> Run:
 
 
 def step(run: Run, numbers: Settings, words: Any, max_steps: int) -> tuple[Run, Any]:
-    """One step of one run; what is given besides are six random numbers from 0 to 1, (6,)."""
+    """Return a run after one step, and its outcome; `words` are random numbers 0 to 1, (6,)."""
     values = run.q[run.state]
     allowed = (values == values.max()) | (words[5] < run.epsilon)
     action = jnp.where(allowed, words[:5], -1.0).argmax()
@@ -108,14 +107,16 @@ def step(run: Run, numbers: Settings, words: Any, max_steps: int) -> tuple[Run, 
     ended = gives | (after.steps >= max_steps)
     decayed = jnp.maximum(numbers.least, run.epsilon * numbers.decay)
     fresh = begun(decayed, q)
-    # The table goes on in both, and is not to be copied.
+    # Both share the table, which should not be copied.
     chosen = jax.tree.map(partial(jnp.where, ended), fresh[:-1], after[:-1])
     return Run(*chosen, q), (ended, after.returned, after.steps)
 
 
 def follow(runs: Run, numbers: Settings, words: Any, max_steps: int) -> tuple[Run, Any]:
-    """Steps of all runs by random numbers (steps, n, 6); of each step whose episode ended, returns
-    and steps, (steps, n)."""
+    """Return all runs after steps with random numbers (steps, n, 6), and outcomes (steps, n).
+
+    The outcomes are whether the episode ended, its return and its steps.
+    """
 
     def of_all(runs: Run, words: Any) -> tuple[Run, Any]:
         return jax.vmap(partial(step, max_steps=max_steps))(runs, numbers, words)
@@ -125,13 +126,13 @@ def follow(runs: Run, numbers: Settings, words: Any, max_steps: int) -> tuple[Ru
 
 @partial(jax.jit, static_argnames="max_steps", donate_argnames="runs")
 def advance(runs: Run, numbers: Settings, key: Any, max_steps: int) -> tuple[Run, Any]:
-    """Some steps of all runs with new random numbers, see `follow`."""
+    """Return all runs after steps with new random numbers, and outcomes; see `follow`."""
     words = jax.random.uniform(key, (_STEPS, len(runs.cell), 6))
     return follow(runs, numbers, words, max_steps)
 
 
 def first(configs: Sequence[TrainingConfig], each: int) -> tuple[Run, Settings]:
-    """All runs at their start, and their settings."""
+    """Return all runs at their start, and their settings."""
     numbers = Settings(*map(jnp.asarray, settings(configs, each)))
     q = jnp.zeros((len(numbers.epsilon), N_STATES, N_ACTIONS), jnp.float32)
     return jax.jit(jax.vmap(begun))(jnp.copy(numbers.epsilon), q), numbers
@@ -140,7 +141,7 @@ def first(configs: Sequence[TrainingConfig], each: int) -> tuple[Run, Settings]:
 def train(
     configs: Sequence[TrainingConfig], each: int, episodes: int, max_steps: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns and steps of the first episodes of all runs, (n, episodes)."""
+    """Return the returns and steps of the first episodes of all runs, (n, episodes)."""
     runs, numbers = first(configs, each)
     n, key, pieces = len(numbers.epsilon), jax.random.key(0), []
     done = np.zeros(n, np.int64)
@@ -157,7 +158,7 @@ def train(
 
 
 def training(each: int) -> Callable[[], int]:
-    """Work on the paper's grid: 100 steps of all runs, which go on from piece to piece."""
+    """Return work on the paper's grid: the next 100 steps of all runs."""
     runs, numbers = first(CONFIGS, each)
     key = jax.random.key(0)
 

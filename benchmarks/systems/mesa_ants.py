@@ -1,8 +1,8 @@
-"""Ants on Mesa's hexagonal grid: agents as objects, that forage by a fixed rule.
+"""Ants on Mesa's hexagonal grid: agents as objects that forage by a fixed rule.
 
-An ant with food steps to the free neighbour that is nearest to the nest and lays a trail; one
-without takes food beside it, follows the strongest trail around it, or steps at random. Trails
-evaporate by 1 a tick, as ours do. Nobody learns.
+A carrier moves to the free neighbour that is nearest to the nest, and deposits on it. A forager
+takes adjacent food, follows the strongest adjacent trail, or moves at random. Trails evaporate by 1
+per tick, like ours. The ants do not learn.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ _LEVEL = 500
 
 
 class Ant(CellAgent):
-    """An ant, which has food or has none."""
+    """An ant."""
 
     def __init__(self, model: Colony, cell: Cell) -> None:
         super().__init__(model)
         self.cell, self.carries = cell, False
 
     def step(self) -> None:
-        """See the six cells around, and act."""
+        """Observe the six neighbours, and act."""
         model, cells = self.model, self.cell.neighborhood.cells
         if self.carries and model.nest in cells:
             self.carries = False
@@ -46,7 +46,7 @@ class Ant(CellAgent):
 
 
 class Colony(mesa.Model):
-    """A nest in the middle, 3 % of the cells with food, ants anywhere."""
+    """A colony with a nest in the middle, food in 3 % of the cells, and ants anywhere."""
 
     def __init__(self, ants: int, width: int) -> None:
         super().__init__(rng=0)
@@ -65,14 +65,14 @@ class Colony(mesa.Model):
             Ant(self, cell)
 
     def step(self) -> None:
-        """Let all ants act in random order, and trails evaporate."""
+        """Let all ants act in random order, and let trails evaporate."""
         self.agents.shuffle_do("step")
         trail = self.grid.trail.data
         trail[trail > 0] -= 1
 
 
 def colony(ants: int) -> Callable[[], int]:
-    """Ticks of a colony with ten cells an ant."""
+    """Return ticks of a colony with ten cells per ant."""
     model = Colony(ants, round((10 * ants) ** 0.5))
 
     def work() -> int:

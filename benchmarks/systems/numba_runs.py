@@ -1,6 +1,6 @@
-"""The paper's world and Q-learning as plain loops that numba compiles, one run after another.
+"""The paper's world and Q-learning as plain loops, which numba compiles.
 
-The random numbers and the arithmetic are ours, so that the same runs come out, to the bit.
+Random numbers and arithmetic are the same as ours, so the runs are equal to the bit.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from taichi_ants.grid.randomness import GAMMA, stream_state
 
 _WORD = np.uint64(0xFFFFFFFF)
 _GAMMA = np.uint64(GAMMA)
-_EACH = 4  # runs of each configuration in a piece of work
+_EACH = 4  # runs of each configuration in a call of the work
 
 
 @numba.njit
@@ -92,7 +92,7 @@ def _choose(q, state, bits, explore_below):
 
 @numba.njit
 def _goal(state):
-    """The position of the goal in view, -1."""
+    """Return the position of the goal in view, or -1."""
     for k in range(3):
         if state >> (4 - 2 * k) & 3 == GOAL:
             return k
@@ -101,7 +101,7 @@ def _goal(state):
 
 @numba.njit
 def _run(world, stream, rate, discount, epsilon, decay, least, max_steps, q, returns, steps):
-    """Train one run; q (128, 5), returns and steps (episodes,) are written."""
+    """Train one run; write q (128, 5), returns and steps (episodes,)."""
     ground, trail = np.empty_like(world.ground), np.empty_like(world.trail)
     for episode in range(len(returns)):
         ground[:], trail[:] = world.ground, world.trail
@@ -158,7 +158,7 @@ def train(
     max_steps: int,
     parallel: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns and steps of all runs with seeds 0, 1, ..., (n, episodes)."""
+    """Return the returns and steps of all runs with seeds 0, 1, ..., (n, episodes)."""
     runs = list(itertools.product(configs, range(each)))
     streams = np.array([stream_state(seed, STREAM_ANT, 0) for _, seed in runs], np.uint64)
     numbers = [[getattr(config, name) for config, _ in runs] for name in _NUMBERS]
@@ -180,10 +180,10 @@ def _training(parallel: bool) -> Callable[[], int]:
 
 
 def one_by_one() -> Callable[[], int]:
-    """Work on the paper's grid, one run after the other."""
+    """Return work on the paper's grid, one run after another."""
     return _training(parallel=False)
 
 
 def in_parallel() -> Callable[[], int]:
-    """Work on the paper's grid, runs handed to threads."""
+    """Return work on the paper's grid, with runs distributed to threads."""
     return _training(parallel=True)

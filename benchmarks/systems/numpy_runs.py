@@ -22,16 +22,16 @@ from taichi_ants import TrainingConfig
 
 
 class NumpyRuns:
-    """n runs side by side; a run whose episode has ended begins the next one at once.
+    """n runs that step together; a run starts its next episode at once.
 
     Args:
-        configs: Each is trained in `each` runs.
-        each: How many.
-        max_steps: Of an episode.
-        seed: Of all random numbers.
+        configs: Configurations.
+        each: Number of runs per configuration.
+        max_steps: Number of steps after which an episode is truncated.
+        seed: Seed of all random numbers.
 
     Attributes:
-        ended: A tuple for each step in which episodes ended: which runs, returns, steps.
+        ended: For each step in which episodes ended, a tuple of runs, returns and steps.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class NumpyRuns:
         self.look()
 
     def look(self) -> None:
-        """Update what the ants see: the cells in view, their codes, and the row of the table."""
+        """Update the cells in view, their codes, and the rows of the table."""
         self.view = self.cell + self.world.ahead[:, self.heading]
         places = self.view + self.first_cell
         looks = self.ground.take(places)
@@ -69,7 +69,7 @@ class NumpyRuns:
         self.row = self.first_row + state
 
     def step(self) -> None:
-        """Let every run choose and take a step."""
+        """Choose an action and take a step in every run."""
         values = self.q[self.row]
         explores = self.random.random(self.n, np.float32) < self.epsilon
         allowed = (values == values.max(axis=1, keepdims=True)) | explores[:, None]
@@ -77,7 +77,7 @@ class NumpyRuns:
         self.learn(np.where(allowed, ties, -1.0).argmax(axis=1))
 
     def learn(self, action: np.ndarray) -> None:
-        """Do these actions (n,), and learn from what comes of them."""
+        """Take these actions (n,), and learn from the transitions."""
         row = self.row
         rewards, delivered = self.act(action)
         self.look()
@@ -92,7 +92,7 @@ class NumpyRuns:
             self.begin(ended)
 
     def act(self, action: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Move, pick up and give; rewards and who has delivered."""
+        """Return the rewards of actions, and whether each ant has delivered, (n,)."""
         moves, position = action < PICK_UP, np.minimum(action, 2)
         code = self.codes[position, self.runs]
         enters = moves & ((code & 1) == 0)
@@ -117,7 +117,7 @@ class NumpyRuns:
         return rewards, delivered
 
     def begin(self, some: np.ndarray) -> None:
-        """Note what came of the episodes of some runs, and let these begin the next ones."""
+        """Record the outcomes of the episodes of some runs, and start their next episodes."""
         self.ended.append((some, self.returns[some], self.steps[some]))
         self.ground[some], self.trail[some] = self.world.ground, self.world.trail
         self.cell[some], self.heading[some] = self.world.cell, self.world.heading
@@ -131,7 +131,7 @@ class NumpyRuns:
 def train(
     configs: Sequence[TrainingConfig], each: int, episodes: int, max_steps: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Returns and steps of the first episodes of all runs, (n, episodes)."""
+    """Return the returns and steps of the first episodes of all runs, (n, episodes)."""
     runs = NumpyRuns(configs, each, max_steps)
     outcomes, done = np.zeros((2, runs.n, episodes), np.int64), np.zeros(runs.n, np.int64)
     while done.min() < episodes:
@@ -145,7 +145,7 @@ def train(
 
 
 def training(each: int) -> Callable[[], int]:
-    """Work on the paper's grid: 100 steps of all runs, which go on from piece to piece."""
+    """Return work on the paper's grid: the next 100 steps of all runs."""
     runs = NumpyRuns(CONFIGS, each, 600)
 
     def work() -> int:

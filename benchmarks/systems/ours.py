@@ -14,19 +14,19 @@ from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.task import foraging
 
 _TRUNCATES = Task(delivery="truncates")
-_BATCHES = 16  # of actions drawn beforehand
-# As in the colony's study.
+_BATCHES = 16  # of actions that are drawn before the measurement
+# The settings of the colony study.
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.98, initial_q=10.0)
 
 
 def training(each: int) -> Callable[[], int]:
-    """Work on the paper's grid: all of its runs, of which each configuration has so many."""
-    train(worlds.paper(), CONFIGS, 0, 1, 1)  # compiles
+    """Return work on the paper's grid, with `each` runs per configuration."""
+    train(worlds.paper(), CONFIGS, 0, 1, 1)  # compiles kernels
     return lambda: int(train(worlds.paper(), CONFIGS, range(each), task=_TRUNCATES).steps.sum())
 
 
 def environments(n: int) -> Callable[[], int]:
-    """Steps of n environments of one ant at random, the actions drawn beforehand."""
+    """Return steps of n environments of one ant, with random actions drawn before."""
     runtime.start()
     env = gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=n)
     env.reset(seed=0)
@@ -42,7 +42,7 @@ def environments(n: int) -> Callable[[], int]:
 
 
 def colony(ants: int, ranges: int | None = None) -> Callable[[], int]:
-    """Ticks of a colony that forages and learns into one table; ten cells an ant if no ranges."""
+    """Return ticks of a colony that forages and learns into one table; default 10 cells per ant."""
     side = ranges or max(10, round((10 * ants / 3) ** 0.5))
     world = worlds.open_world(0, (side, side, side))
     colony = Colony(world, foraging(), SARSA, ants=ants, start="spread")

@@ -1,7 +1,7 @@
-"""The paper's world and grid as plain arrays, for those who do the same task with other means.
+"""The paper's world and grid as plain arrays, for the same task with other libraries.
 
-One food, one queen, a trail that does not evaporate, deliveries that truncate: what `throughput.py`
-trains.
+The task is that of `throughput.py`: one food item, trails that do not evaporate, and deliveries
+that truncate.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ CONFIGS = [TrainingConfig("q_learning", *point) for point in GRID]
 
 
 class Layout(NamedTuple):
-    """The world; cells lie in flat arrays of one size, a neighbour is a fixed step away.
+    """The world in flat arrays, in which neighbours are a fixed step apart.
 
     Attributes:
-        ground: int8 (size,), how a cell looks: two bits without food, above them two with food.
+        ground: int8 (size,), the code of a cell: two bits for foragers, and above two for carriers.
         trail: int16 (size,), levels at the start of an episode.
-        closer: bool (3, size, 6): whether the cell in view at a position, from a cell at a heading,
+        closer: bool (3, size, 6), by position in view, cell and heading: whether the cell in view
             is nearer to the queen.
         ahead: int32 (3, 6), steps to the cells in view at a heading.
-        cell, heading: where the ant starts.
+        cell, heading: The start of the ant.
     """
 
     ground: np.ndarray
@@ -43,7 +43,7 @@ class Layout(NamedTuple):
 
 
 def layout() -> Layout:
-    """The paper's world."""
+    """Return the paper's world."""
     world = worlds.paper()
     (cell,), (heading,) = world.start(0)
     seen = (np.arange(6) + np.arange(-1, 2)[:, None]) % 6  # the headings of the cells in view
@@ -58,7 +58,7 @@ def layout() -> Layout:
 
 
 class Settings(NamedTuple):
-    """Of n runs, arrays (n,)."""
+    """The settings of n runs, arrays (n,)."""
 
     learning_rate: np.ndarray
     discount: np.ndarray
@@ -68,7 +68,7 @@ class Settings(NamedTuple):
 
 
 def settings(configs: Sequence[TrainingConfig], each: int) -> Settings:
-    """Every configuration so many times, one configuration after the other; float32."""
+    """Return the settings of `each` runs for every configuration, in this order; float32."""
     rows = [
         (one.learning_rate, one.discount, one.epsilon, one.epsilon_decay, one.least_epsilon)
         for one in configs

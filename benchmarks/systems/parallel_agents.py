@@ -1,4 +1,4 @@
-"""Several agents at random through PettingZoo's parallel interface."""
+"""Several agents with random actions in PettingZoo's parallel interface."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-_STEPS = 50  # of a piece of work
+_STEPS = 50  # in a call of the work
 
 
 def knights() -> Callable[[], int]:
-    """Steps of PettingZoo's own example, knights and archers against zombies; it draws nothing."""
+    """Return steps of PettingZoo's example of knights and archers, without rendering."""
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # no display is needed
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     from pettingzoo.butterfly import knights_archers_zombies_v11
@@ -21,7 +21,7 @@ def knights() -> Callable[[], int]:
 
 
 def ants() -> Callable[[], int]:
-    """Steps of a colony of 64 ants in the open world."""
+    """Return steps of a colony of 64 ants in the open world."""
     from taichi_ants.envs import colony_v0
 
     return _agents(colony_v0.parallel_env(world="open", ants=64))

@@ -1,5 +1,4 @@
-"""Tabular Q-learning in Python, as in Gymnasium's tutorials, in one environment whose observations
-and actions are numbers."""
+"""Tabular Q-learning in Python, as in Gymnasium's tutorials, in one discrete environment."""
 
 from __future__ import annotations
 
@@ -8,7 +7,7 @@ from collections.abc import Callable
 import gymnasium
 import numpy as np
 
-_STEPS = 2000  # of a piece of work
+_STEPS = 2000  # in a call of the work
 
 
 def _learning(name: str, **settings: object) -> Callable[[], int]:
@@ -35,10 +34,10 @@ def _learning(name: str, **settings: object) -> Callable[[], int]:
 
 
 def frozen_lake() -> Callable[[], int]:
-    """Work on Gymnasium's example."""
+    """Return steps of learning in Gymnasium's FrozenLake."""
     return _learning("FrozenLake-v1")
 
 
 def hex_forage() -> Callable[[], int]:
-    """Work on one ant of ours."""
+    """Return steps of learning in our environment with one ant."""
     return _learning("taichi_ants/HexForage-v0", observation_format="index")

@@ -57,7 +57,7 @@ def test_the_command_and_its_guard(library, capsys, monkeypatch):
     )
     code, said = run(few, capsys)
     assert code != 0
-    assert "gives other results" in said.err
+    assert "returns other results" in said.err
 
 
 def test_without_a_compiler(capsys, monkeypatch):
@@ -71,5 +71,5 @@ def test_results_that_differ_are_no_comparison(library, monkeypatch):
     colony = colony_in_c.scattered(colony_in_c.TASKS["foraging"], 50)
     lived = colony_in_c.live_in_c
     monkeypatch.setattr(colony_in_c, "live_in_c", lambda *given: lived(*given)._replace(blocked=-1))
-    with pytest.raises(AntsError, match="gives other results"):
+    with pytest.raises(AntsError, match="returns other results"):
         colony_in_c.check_same(library, colony, 5, 1)

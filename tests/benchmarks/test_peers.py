@@ -105,7 +105,7 @@ def test_the_tables():
     ]
     text = plain_text([table, below], 120)
     assert "16 ants, trails, right of way" in text
-    assert "Absent is left out for lack of no_such_package." in text
+    assert "Absent is skipped, because it requires no_such_package." in text
 
 
 def test_a_page_takes_tables_in_their_place(tmp_path):
@@ -117,7 +117,7 @@ def test_a_page_takes_tables_in_their_place(tmp_path):
         text = page.read_text()
         assert text.startswith("before\n<!-- one -->\n\n**A title**\n\n| a | b |\n")
         assert text.endswith("| c | 1 |\n\n<!-- /one -->\nafter\n")
-    with pytest.raises(AntsError, match="has no place <!-- two -->"):
+    with pytest.raises(AntsError, match="lacks the lines <!-- two -->"):
         measuring.publish("two", [table], page)
     assert page.read_text() == text
 

@@ -39,12 +39,12 @@ def put_trail(colony):
 
 
 FAULTS = {
-    "food was lost, or came from nowhere": put_food,
+    "food has vanished or appeared": put_food,
     "ants share a cell": share_a_cell,
     "ants share a number": share_a_number,
     "ants were lost": change(WorldRow.LIVING, lambda living: living - 1),
-    "a trail is no number, below 0, or on rock": put_trail,
-    "clocks disagree": change(WorldRow.TICKS, lambda ticks: ticks + 1),
+    "a trail is not finite, is negative, or is on rock": put_trail,
+    "the clocks of world and colony differ": change(WorldRow.TICKS, lambda ticks: ticks + 1),
     "a counter has overflowed": overflow,
 }
 
@@ -65,5 +65,5 @@ def test_a_small_soak_holds(capsys):
         soak.main(["--ants", "300", "--ticks", "9000"])
     assert end.value.code == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[-1] == "All held."
+    assert lines[-1] == "All checks passed."
     assert len(lines) == 2 + 2 * 10
