@@ -1,12 +1,12 @@
-"""Proximal policy optimisation (PPO) in one file, on many environments at once.
+"""Train an ant to fetch food by proximal policy optimisation (PPO), on many environments at once.
 
-A network learns to fetch food from what the ant sees, one-hot. At the end it becomes a table, as
-any policy over so few states can, which is evaluated and kept as a policy file. With it,
-`python experiments/render.py episode --policy ppo.npz --out ppo.gif` shows the ant.
+A network learns from one-hot observations. After training, it is converted to a table, evaluated
+and saved as a policy file. Then `python experiments/render.py episode --policy ppo.npz --out
+ppo.gif` draws an animation of the ant.
 
-Needs torch: `pip install -e ".[torch]"`. A seed takes about 20 seconds on one core. Prints the mean
-reward of a step now and then, at the end the greedy return and steps; the best possible is 45 in 34
-steps.
+Requires torch: `pip install -e ".[torch]"`. A seed takes about 20 seconds on one core. Prints the
+mean reward per step five times, then the mean return and steps of greedy rollouts; the best is 45
+in 34 steps.
 """
 
 import argparse
@@ -21,18 +21,18 @@ from torch.distributions import Categorical
 import taichi_ants
 import taichi_ants.envs  # registers the environments
 
-N_ENVS, N_STEPS = 64, 32  # environments, and steps of each between two updates
+N_ENVS, N_STEPS = 64, 32  # environments, and steps in each between two updates
 EPOCHS, MINIBATCHES = 5, 4
 LEARNING_RATE, DISCOUNT, GAE_LAMBDA = 1e-3, 0.9, 0.95
 CLIP, ENTROPY, VALUE, LARGEST_GRADIENT = 0.2, 0.1, 0.5, 0.5
 
 
 class Agent(nn.Module):
-    """Two networks: the actor gives logits of the actions, the critic the value of a state."""
+    """Two networks: the actor returns logits of the actions, the critic the value of a state."""
 
     def __init__(self, n_inputs: int, n_actions: int) -> None:
         super().__init__()
-        # At first all actions are about as probable.
+        # A small gain makes all actions about equally probable at first.
         self.actor = perceptron(n_inputs, n_actions, gain=0.01)
         self.critic = perceptron(n_inputs, 1, gain=1.0)
 
@@ -54,9 +54,10 @@ def perceptron(n_inputs: int, n_outputs: int, gain: float) -> nn.Module:
 def train(
     envs: VectorEnv, seed: int, steps: int, n_steps: int = N_STEPS, entropy: float = ENTROPY
 ) -> Agent:
-    """An agent after `steps` steps of all environments together, an update every `n_steps`.
+    """Return an agent, trained for `steps` steps in all environments together.
 
-    The more `entropy` counts, the longer it tries all actions.
+    It is updated after every `n_steps` steps in each environment. `entropy` is the weight of the
+    entropy bonus; with a larger one, the agent explores longer.
     """
     torch.manual_seed(seed)
     n, n_inputs = envs.num_envs, envs.single_observation_space.shape[0]
@@ -77,7 +78,7 @@ def train(
             log_probs[t] = policy.log_prob(actions[t])
             now, reward, terminated, truncated, infos = envs.step(actions[t].numpy())
             paid_now += reward.mean() / n_steps
-            if truncated.any():  # the step limit: what would have come is estimated
+            if truncated.any():  # bootstrap from the last observation of the episode
                 with torch.no_grad():
                     after = agent.value(np.stack(infos["final_obs"][truncated])).numpy()
                 reward[truncated] += DISCOUNT * after
@@ -94,14 +95,14 @@ def train(
         batch = seen, actions, log_probs, advantages, advantages + values
         learn(agent, optimizer, entropy, *(part.flatten(0, 1) for part in batch))
         if (update + 1) % max(1, updates // 5) == 0:
-            print(f"  after {(update + 1) * n_steps * n} steps: {paid_now:.2f} a step", flush=True)
+            print(f"  {(update + 1) * n_steps * n} steps: mean reward {paid_now:.2f}", flush=True)
     return agent
 
 
 def learn(
     agent: Agent, optimizer: torch.optim.Optimizer, entropy: float, *batch: torch.Tensor
 ) -> None:
-    """Update the agent by what the environments gave."""
+    """Update the agent by a batch of steps."""
     for _ in range(EPOCHS):
         for picked in torch.randperm(len(batch[0])).chunk(MINIBATCHES):
             seen, actions, log_probs, advantages, targets = (part[picked] for part in batch)
@@ -119,17 +120,17 @@ def learn(
 
 
 def table(agent: Agent, observation: str = "paper") -> np.ndarray:
-    """The logits of each action in each state: a table whose best action is the agent's."""
+    """Return the logits of each action in each state, as a table (n_states, 5)."""
     with torch.no_grad():
         return taichi_ants.tabulate(lambda seen: agent.policy(seen).logits, observation)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
-    parser.add_argument("--steps", type=int, default=200_000)
-    parser.add_argument("--entropy", type=float, default=ENTROPY, help="how much it counts")
-    parser.add_argument("--out", default="ppo.npz", help="the policy file of the last seed")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="train these seeds")
+    parser.add_argument("--steps", type=int, default=200_000, help="take this many steps per seed")
+    parser.add_argument("--entropy", type=float, default=ENTROPY, help="weight the entropy bonus")
+    parser.add_argument("--out", default="ppo.npz", help="save the last seed's policy as this file")
     args = parser.parse_args()
     torch.set_num_threads(1)  # the networks are small
     envs = gymnasium.make_vec(
@@ -147,4 +148,4 @@ if __name__ == "__main__":
         )
     made_by = {"made by": "PPO", "seed": seed, "steps": args.steps}
     taichi_ants.save_policy(args.out, logits, made_by)
-    print(f"the last one is in {args.out}")
+    print(f"The policy of the last seed is in {args.out}.")

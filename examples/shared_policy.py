@@ -1,13 +1,12 @@
-"""One neural policy for all ants of a colony, beside the table that they can share.
+"""Train one network for all ants of a colony by PPO, and compare it with a shared table.
 
-Every ant is an environment of its own for the trainer of `ppo.py`, which knows nothing of colonies;
-but they live in one world, see each other, and follow each other's trails. Ants under the same
-rules learn a shared table by SARSA, as in `python experiments/colony.py study`, from as many steps
-in all. Then nobody learns any more, and all are tried in colonies of their own.
+The trainer of `ppo.py` treats each ant as a separate environment, although 64 ants share a world.
+Other ants learn a shared table by SARSA under the same rules, from the same number of steps, as in
+`python experiments/colony.py study`. Afterwards both policies are evaluated without learning.
 
-Needs torch: `pip install -e ".[torch]"`. A seed takes about three minutes on one core. Prints the
-foods that 64 ants deliver per 1000 ticks: with the network as it was trained, which draws actions;
-greedily, as a table; and with the shared table.
+Requires torch: `pip install -e ".[torch]"`. A seed takes about three minutes on one core. Prints
+the food items that 64 ants deliver per 1000 ticks: by the network with sampled actions, by the
+network with greedy actions, and by the shared table.
 """
 
 import argparse
@@ -40,12 +39,12 @@ def environments() -> VectorEnv:
 
 
 def neural(seed: int, episodes: int) -> Agent:
-    """A network that 64 ants in each of four worlds have trained together."""
+    """Return a network that 64 ants in each of four worlds have trained together."""
     return train(environments(), seed, episodes * TICKS * ANTS, n_steps=64, entropy=0.03)
 
 
 def foods_by_chance(agent: Agent) -> float:
-    """Foods per 1000 ticks and colony of ants that draw their actions, as in training."""
+    """Return the deliveries of a colony per 1000 ticks with sampled actions, as in training."""
     envs, foods = environments(), 0
     seen, _ = envs.reset(seed=TEST_SEED)
     for _ in range(TICKS):
@@ -57,7 +56,7 @@ def foods_by_chance(agent: Agent) -> float:
 
 
 def tabular(seed: int, episodes: int) -> np.ndarray:
-    """The table that 64 ants in one world have learned together."""
+    """Return a table that 64 ants in one world have learned together."""
     training = scheduled(TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0), episodes)
     colony = Colony(worlds.paper(), FORAGING, training, seed, ANTS, sharing="shared")
     colony.run(episodes, TICKS)
@@ -65,7 +64,7 @@ def tabular(seed: int, episodes: int) -> np.ndarray:
 
 
 def foods(q_values: np.ndarray) -> float:
-    """Foods per 1000 ticks and colony of ants that follow a table, but at one tick in a hundred."""
+    """Return the deliveries of a colony per 1000 ticks by a table, with epsilon 0.01."""
     follow = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.01, epsilon_decay=1.0)
     seeds = range(TEST_SEED, TEST_SEED + WORLDS)
     colony = Colony(
@@ -76,11 +75,11 @@ def foods(q_values: np.ndarray) -> float:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=range(3))
-    parser.add_argument("--episodes", type=int, default=EPISODES, help="of 1000 ticks")
-    parser.add_argument(
-        "--out", default="shared_policy.npz", help="the policy file of the last network"
-    )
+    parser.add_argument("--seeds", type=int, nargs="+", default=range(3), help="train these seeds")
+    about = "train for this many episodes of 1000 ticks"
+    parser.add_argument("--episodes", type=int, default=EPISODES, help=about)
+    about = "save the network of the last seed as this policy file"
+    parser.add_argument("--out", default="shared_policy.npz", help=about)
     args = parser.parse_args()
     torch.set_num_threads(1)  # the networks are small
     for seed in args.seeds:
