@@ -11,6 +11,7 @@ import io
 import math
 import os
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -23,6 +24,7 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
+_LONGEST_LOCK = 60.0  # seconds
 
 # What tells a quota and the period that it is for: cgroups of version 2, or of version 1.
 _QUOTAS = (
@@ -211,4 +213,9 @@ def _cache_folder() -> Path:
     folder = Path(chosen) if chosen else Path(base) / "taichi_ants" / "kernels"
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
+        # Taichi holds this lock for moments. One that a killed process has left stops all others
+        # from adding kernels.
+        lock = folder / "ticache.lock"
+        if time.time() - lock.stat().st_mtime > _LONGEST_LOCK:
+            lock.unlink()
     return folder if is_writable_folder(str(folder)) else Path(fallback_folder()) / "kernels"

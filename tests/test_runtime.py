@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
@@ -96,6 +97,18 @@ assert dict(os.environ) == before
     )
     assert list((tmp_path / "chosen").iterdir())
     assert not (tmp_path / "kernels").exists()
+
+
+@pytest.mark.parametrize(("age", "keeps_kernels"), [(3600, True), (0, False)])
+def test_a_lock_that_a_killed_process_left_is_removed(tmp_path, age, keeps_kernels):
+    folder = tmp_path / "taichi_ants" / "kernels"
+    folder.mkdir(parents=True)
+    lock = folder / "ticache.lock"
+    lock.touch()
+    os.utime(lock, (time.time() - age,) * 2)
+    python(BEGINNING + "trained()", tmp_path, XDG_CACHE_HOME=str(tmp_path))
+    assert lock.exists() != keeps_kernels  # one that is in use stays
+    assert bool(list(folder.glob("*.tic"))) == keeps_kernels
 
 
 def test_beside_a_taichi_of_the_callers(tmp_path):

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from command_lines import assert_one_sentence, call, command, contents, environment, load
 
+from taichi_ants.report import results
 from taichi_ants.studies import runner
 from taichi_ants.studies.sweep import read_sweep
 
@@ -61,8 +62,8 @@ def comparison_of(seeds, folder):
     study = command.build_study(settings)
 
     def measure(blocks):
-        arrays = command.measured(study, blocks, None, None)
-        comparison = command.comparison_of(settings, study, arrays)
+        arrays = results.measured(study, blocks, {})
+        comparison = results.comparison_of(settings, study, arrays)
         return {name: comparison.measures[name] for name in ("return_all", "greedy_steps")}
 
     return measure
