@@ -1,6 +1,6 @@
-"""The only place where Taichi is started.
+"""The start of Taichi, which no other module starts.
 
-Importing the package does not start Taichi; the first call that needs a kernel does.
+Importing the package does not start Taichi; the first call that needs a kernel starts it.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
 _LONGEST_LOCK = 60.0  # seconds
 
-# What tells a quota and the period that it is for: cgroups of version 2, or of version 1.
+# Files with the quota of CPU time and its period: in cgroups of version 2, and of version 1.
 _QUOTAS = (
     ("/sys/fs/cgroup/cpu.max",),
     ("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us"),
 )
 
-# Taichi compiles and launches for one thread at a time; environments of several threads hold this.
+# A lock for environments in several threads, because Taichi compiles and launches for one thread.
 alone = threading.RLock()
 
 _kept: list[object] = []  # see start_for_plugin_check
@@ -40,21 +40,21 @@ _kept: list[object] = []  # see start_for_plugin_check
 
 @dataclass(frozen=True)
 class Runtime:
-    """How Taichi runs: `arch` is "cpu" or "cuda", `threads` the number of CPU threads."""
+    """The settings of Taichi: `arch` is "cpu" or "cuda", `threads` the number of CPU threads."""
 
     arch: str
     threads: int
 
 
 def available_threads() -> int:
-    """The number of CPU threads that this process may use; in a container, how much time it has."""
+    """Return the number of CPU threads that this process may use, within a container's quota."""
     n = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return min(n, _quota(_QUOTAS))
 
 
 @cache
 def _quota(places: tuple[tuple[str, ...], ...]) -> int:
-    """How many processors' time Linux grants to this container, at least 1."""
+    """Return the number of processors that Linux grants to this container, at least 1."""
     for files in places:
         with contextlib.suppress(OSError, ValueError):
             words = " ".join(Path(name).read_text() for name in files).split()
@@ -65,19 +65,19 @@ def _quota(places: tuple[tuple[str, ...], ...]) -> int:
 
 
 def start(threads: int | None = None, arch: str | None = None) -> Runtime:
-    """Start Taichi, or restart it if other settings are asked for, and return those in force.
+    """Return the settings of Taichi, after it was started, or restarted for other settings.
 
-    All that launches kernels calls this first, because the caller may have reset Taichi in between.
-    A Taichi that the caller has started, or that holds the caller's fields, is used as it is.
+    Call this before each kernel launch, because the user may have reset Taichi. If the user has
+    started Taichi, or has fields, this function never restarts it.
 
     Args:
-        threads: CPU threads, 1 to 1024; None keeps what runs, or takes all that are available.
-        arch: "cpu" or "cuda"; None keeps what runs, or takes the CPU.
+        threads: CPU threads, 1 to 1024; None keeps the present number, or starts with all threads.
+        arch: "cpu" or "cuda"; None keeps the present one, or starts on the CPU.
 
     Raises:
-        AntsError: A setting is not allowed, or "cuda" finds no device; the Taichi that runs cannot
-            be restarted, has fast_math on, which would change results in the last bit, or runs on
-            hardware that was never tried; or this process was forked from one in which Taichi ran.
+        AntsError: A setting is not allowed, there is no CUDA device, or the process was forked from
+            one in which Taichi ran. Or Taichi is running already, and cannot be restarted, uses
+            fast_math, which changes results in the last bit, or uses untested hardware.
     """
     if arch is not None:
         check_one_of("arch", arch, ARCHITECTURES)
@@ -95,20 +95,20 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     if running is not None:
         ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
         if not ours or holds_data():
-            why = "holds fields or arrays" if ours else "was not started by taichi_ants"
+            why = "has fields or arrays" if ours else "was not started by taichi_ants"
             raise AntsError(
-                f"arch {wanted.arch!r} with threads {wanted.threads} needs a restart of Taichi, "
-                f"which runs with {running.arch!r} and {running.threads} and {why}; leave out "
-                "threads and arch, or call ti.reset() first, which destroys all fields and arrays."
+                f"arch={wanted.arch!r}, threads={wanted.threads} requires a restart of Taichi, but "
+                f"it runs with {running.arch!r}, {running.threads}, and {why}; leave out threads "
+                "and arch, or call ti.reset() first, which destroys all fields and arrays."
             )
     _init(ti, wanted)
     return wanted
 
 
 def start_for_plugin_check() -> None:
-    """Start a Taichi that checks the bounds of arrays, in a forked process.
+    """Start Taichi with checks of array bounds, in a forked process.
 
-    The process must end by `os._exit`: the parent's Taichi can be left, but not be destroyed here.
+    The process must end by `os._exit`, because it cannot destroy the Taichi of its parent.
     """
     import taichi as ti
 
@@ -117,7 +117,7 @@ def start_for_plugin_check() -> None:
 
 
 def holds_data() -> bool:
-    """Whether the Taichi that runs holds fields or arrays; taichi_ants itself makes none."""
+    """Return whether Taichi has fields or arrays of the user; taichi_ants itself makes none."""
     import taichi as ti
 
     runtime, root = ti.lang.impl.get_runtime(), ti.lang.impl._root_fb
@@ -126,20 +126,19 @@ def holds_data() -> bool:
     trees = range(runtime.prog.get_snode_tree_size())
     return bool(
         any(runtime.prog.get_snode_root(tree).get_num_ch() for tree in trees)
-        or runtime.global_vars  # fields that are declared, but have no place yet
+        or runtime.global_vars  # fields that are declared but not placed
         or not root.empty
-        or len(runtime.unfinalized_fields_builder) > 1  # the root is one
+        or len(runtime.unfinalized_fields_builder) > 1  # one is the root
         or any(issubclass(type(one), (ti.Ndarray, ti.Texture)) for one in gc.get_objects())
     )
 
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Compile kernels of ours inside: without Taichi's warnings, whatever the caller has set.
+    """Return a context in which Taichi compiles our kernels without warnings.
 
-    Numbers are narrowed there on purpose. Errors name their line without a mark below the place in
-    it: to draw one for each expression takes half of Taichi's time for a kernel that it has in its
-    cache.
+    Our kernels narrow numbers on purpose. Errors show their line without a mark of the place,
+    because marks for all expressions take half of the time in which Taichi loads a cached kernel.
     """
     from taichi._lib import core
     from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context
@@ -156,43 +155,43 @@ def quiet() -> Iterator[None]:
 
 
 def _line_of(context: Any, node: Any) -> str:
-    """The line of a node of a kernel, as Taichi words it."""
+    """Return the line of a node of a kernel, in Taichi's format."""
     number, function = context.lineno_offset + node.lineno, context.func.func.__name__
     return f'File "{context.file}", line {number}, in {function}:\n{context.src[node.lineno - 1]}\n'
 
 
 def _running(ti: ModuleType) -> Runtime | None:
-    """What runs now, whoever has started it; None if nothing does."""
+    """Return the settings of a running Taichi, or None."""
     runtime = ti.lang.impl.get_runtime()
     if runtime.prog is None:
         return None
     if getattr(runtime, "is_forked", False):
         raise AntsError(
-            "this process was forked from one in which Taichi runs, and would wait for its threads "
-            'for ever; make processes with multiprocessing.get_context("spawn") or "forkserver".'
+            "this process was forked from one in which Taichi runs, and Taichi does not work after "
+            'a fork; start processes with multiprocessing.get_context("spawn") or "forkserver".'
         )
     config = ti.lang.impl.current_cfg()
     arch = {ti.x64: "cpu", ti.arm64: "cpu", ti.cuda: "cuda"}.get(config.arch)
     if arch is None or config.fast_math:
         how = "with fast_math=True, which changes results in the last bit"
-        how = how if arch else f"on {config.arch}, where the kernels were never tried"
+        how = how if arch else f"on {config.arch}, on which the kernels are not tested"
         raise AntsError(
             f"Taichi is running {how}; call ti.init(arch=ti.cpu, fast_math=False), or ti.reset() "
-            "and let taichi_ants start Taichi; both destroy the fields and arrays that it holds."
+            "before taichi_ants starts Taichi; both destroy all fields and arrays."
         )
     return Runtime(arch, int(config.cpu_max_num_threads))
 
 
 def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
     settings = {
-        "fast_math": False,  # no reordering of floats: the same bits everywhere
+        "fast_math": False,  # so that results are the same bits everywhere
         "cpu_max_num_threads": wanted.threads,
-        "make_cpu_multithreading_loop": False,  # hand out runs one by one, they are uneven
+        "make_cpu_multithreading_loop": False,  # distribute runs one by one, as they are uneven
         "offline_cache_file_path": str(_cache_folder()),
         **others,
     }
     arch = ti.cuda if wanted.arch == "cuda" else ti.cpu
-    # With the environment's word on these Taichi would change them, or warn.
+    # These environment variables would change the settings, or make Taichi warn.
     names = [f"TI_{name.upper()}" for name in ("arch", "log_level", *settings)]
     hidden = {name: os.environ.pop(name) for name in names if name in os.environ}
     with contextlib.redirect_stdout(io.StringIO()):
@@ -203,18 +202,18 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
     ti.lang.impl.get_runtime().is_ours = True
     if wanted.arch == "cuda" and ti.lang.impl.current_cfg().arch != ti.cuda:
         ti.reset()
-        raise AntsError("arch is 'cuda', but no CUDA device can be used here; choose 'cpu'.")
+        raise AntsError("arch is 'cuda', but no CUDA device is usable here; choose 'cpu'.")
 
 
 def _cache_folder() -> Path:
-    """Where compiled kernels are kept between processes; a temporary folder if need be."""
+    """Return the folder of the kernel cache; a temporary folder if that one is not writable."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.environ["HOME"], ".cache")
     chosen = os.environ.get("TI_OFFLINE_CACHE_FILE_PATH")  # Taichi's own variable for it
     folder = Path(chosen) if chosen else Path(base) / "taichi_ants" / "kernels"
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
-        # Taichi holds this lock for moments. One that a killed process has left stops all others
-        # from adding kernels.
+        # Taichi uses this lock for moments. An old one is from a killed process, and would keep
+        # all others from adding kernels.
         lock = folder / "ticache.lock"
         if time.time() - lock.stat().st_mtime > _LONGEST_LOCK:
             lock.unlink()

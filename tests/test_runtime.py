@@ -139,7 +139,7 @@ for other in ({"threads": 1}, {"arch": "cuda"}):
     try:
         runtime.start(**other)
     except AntsError as error:
-        assert "with 'cpu' and 3 and was not started by taichi_ants; leave" in str(error), error
+        assert "with 'cpu', 3, and was not started by taichi_ants; leave" in str(error), error
     else:
         raise AssertionError("it was restarted")
 assert field.to_numpy().tolist() == [7] * 4
@@ -192,7 +192,7 @@ def kept(read):
     try:
         train(paper(), config, 1, 2, 20, threads=1)
     except AntsError as error:
-        assert "holds fields or arrays; leave out threads" in str(error), error
+        assert "has fields or arrays; leave out threads" in str(error), error
     else:
         raise AssertionError("Taichi was restarted")
     assert read() == before
