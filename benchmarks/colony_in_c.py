@@ -212,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add = parser.add_argument
     sizes = [10_000, 100_000, 1_000_000]
     several = {"type": whole_number(1), "nargs": "+", "default": sizes, "metavar": "N"}
-    add("--ants", **several, help="put N ants into one world (default: 10000 100000 1000000)")
+    add("--ants", **several, help="put N ants into one world")
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")
     about = "fail if a ratio to C is below RATIO"

@@ -91,7 +91,7 @@ def main(arguments: list[str] | None = None) -> None:
         nargs="+",
         default=[256, 4096, 65536],
         metavar="N",
-        help="step N environments at once (default: 256 4096 65536)",
+        help="step N environments at once",
     )
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")

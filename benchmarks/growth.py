@@ -1,4 +1,4 @@
-"""Measure speed by the number of runs, ants, cells, states and threads, and memory per run or ant.
+"""Measure how speed and memory depend on the number of runs, ants, cells, states and threads.
 
 Runs learn by Q-learning in the paper's world, for 500 episodes. Ants forage in open worlds and
 learn into one table. The command measures all sizes in turn, with 1 thread and with all threads,

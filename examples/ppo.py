@@ -126,11 +126,13 @@ def table(agent: Agent, observation: str = "paper") -> np.ndarray:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[0], help="train these seeds")
-    parser.add_argument("--steps", type=int, default=200_000, help="take this many steps per seed")
-    parser.add_argument("--entropy", type=float, default=ENTROPY, help="weight the entropy bonus")
-    parser.add_argument("--out", default="ppo.npz", help="save the last seed's policy as this file")
+    formatter = argparse.ArgumentDefaultsHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=formatter)
+    add = parser.add_argument
+    add("--seeds", type=int, nargs="+", default=[0], metavar="N", help="train these seeds")
+    add("--steps", type=int, default=200_000, metavar="N", help="take N steps per seed")
+    add("--entropy", type=float, default=ENTROPY, metavar="X", help="weight of the entropy bonus")
+    add("--out", default="ppo.npz", metavar="FILE", help="save the policy of the last seed")
     args = parser.parse_args()
     torch.set_num_threads(1)  # the networks are small
     envs = gymnasium.make_vec(

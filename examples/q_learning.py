@@ -29,8 +29,8 @@ def learn(seed, steps, learning_rate=0.1, discount=0.9, epsilon=0.1):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=range(10), help="train these seeds")
-    parser.add_argument("--steps", type=int, default=30_000, help="take this many steps per seed")
+    parser.add_argument("--seeds", type=int, nargs="+", default=range(10), help="default: 0 to 9")
+    parser.add_argument("--steps", type=int, default=30_000, help="per seed; default: %(default)s")
     args = parser.parse_args()
     best = 0
     for seed in args.seeds:

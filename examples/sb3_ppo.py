@@ -58,12 +58,12 @@ def tabulated(model: PPO) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=range(5), help="train these seeds")
-    about = "take this many steps per seed, in all environments together"
-    parser.add_argument("--steps", type=int, default=200_000, help=about)
-    about = "save the greedy policy of the last seed as this policy file"
-    parser.add_argument("--out", default="sb3_ppo.npz", help=about)
+    formatter = argparse.ArgumentDefaultsHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=formatter)
+    add = parser.add_argument
+    add("--seeds", type=int, nargs="+", default=range(5), metavar="N", help="train these seeds")
+    add("--steps", type=int, default=200_000, metavar="N", help="take N steps per seed")
+    add("--out", default="sb3_ppo.npz", metavar="FILE", help="save the policy of the last seed")
     args = parser.parse_args()
     torch.set_num_threads(1)  # the networks are small
     for seed in args.seeds:

@@ -74,12 +74,12 @@ def foods(q_values: np.ndarray) -> float:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, nargs="+", default=range(3), help="train these seeds")
-    about = "train for this many episodes of 1000 ticks"
-    parser.add_argument("--episodes", type=int, default=EPISODES, help=about)
-    about = "save the network of the last seed as this policy file"
-    parser.add_argument("--out", default="shared_policy.npz", help=about)
+    formatter = argparse.ArgumentDefaultsHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=formatter)
+    add = parser.add_argument
+    add("--seeds", type=int, nargs="+", default=range(3), metavar="N", help="train these seeds")
+    add("--episodes", type=int, default=EPISODES, metavar="N", help="N episodes of 1000 ticks")
+    add("--out", default="shared_policy.npz", metavar="FILE", help="save the last network")
     args = parser.parse_args()
     torch.set_num_threads(1)  # the networks are small
     for seed in args.seeds:
