@@ -147,7 +147,7 @@ assert runtime.start(threads=3, arch="cpu").threads == 3
 assert same()
 
 init(fast_math=True)
-refused("destroy the fields and arrays")
+refused("destroy all fields and arrays")
 ti.reset()
 assert same()
 

@@ -418,7 +418,7 @@ def test_edits_without_room_change_nothing():
     assert "the capacity of this colony is 40" in said
     queen = int(np.flatnonzero(snapshot.ground == 13)[0])
     for cell in (queen, foods[0], int(snapshot.ant_cells[0])):
-        assert "the queen cannot move there" in refused(session, {"kind": "queen", "cell": cell})
+        assert "the queen cannot move to cell" in refused(session, {"kind": "queen", "cell": cell})
     # What has been eaten is at the start of the next episode, so that only this takes all.
     assert "the last food" in refused(session, {"kind": "ground", "what": "empty", "cells": cells})
     session = Session(SETUPS["queueing"])  # nobody learns
