@@ -37,7 +37,7 @@ class Direction(NamedTuple):
     Attributes:
         of: The name in tables.
         step: A description of one step.
-        make: Makes the work for a size.
+        make: A function that returns the work for a size.
         sizes: The sizes to measure.
     """
 
@@ -65,17 +65,17 @@ def states(n_states: int) -> Work:
 
 
 def ants(n: int) -> Work:
-    """Return ticks of n ants with four cells per ant."""
+    """Return work: ticks of n ants with four cells per ant."""
     return ticks(n, max(10, round((4 * n / 3) ** 0.5)))
 
 
 def cells(side: int) -> Work:
-    """Return ticks of 10 000 ants in a world of the ranges (side, side, side)."""
+    """Return work: ticks of 10 000 ants in a world of the ranges (side, side, side)."""
     return ticks(10_000, side)
 
 
 def ticks(n: int, side: int) -> Work:
-    """Return ticks of a colony of n ants in a world of the ranges (side, side, side)."""
+    """Return work: ticks of a colony of n ants in a world of the ranges (side, side, side)."""
     colony, several = colony_of(n, side), max(1, 50_000 // n)
 
     def work() -> int:

@@ -105,7 +105,7 @@ def test_what_is_odd_is_named(name: str, colony: Colony) -> None:
 
 def test_results_and_policies_are_taken_for_their_tables() -> None:
     result = train(WORLD, CONFIG, 5, 2)
-    assert "seed: 5 alone (give seeds=range(5) for five runs)" in repr(result)
+    assert "seed: 5 (one run; seeds=range(5) trains five runs)" in repr(result)
     table = result.q_values[0, 0]
     policy = Policy(table, "paper", {})
     for given in (result, policy):

@@ -1,1 +1,1 @@
-"""What `peers.py` measures, one file for each system: ours, the same in other libraries, others."""
+"""The systems that `peers.py` measures, one file for each library."""

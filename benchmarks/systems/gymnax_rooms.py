@@ -12,7 +12,7 @@ _STEPS = 100  # in a scan
 
 
 def environments(n: int) -> Callable[[], int]:
-    """Return steps of n environments with random actions, in one compiled scan."""
+    """Return work: steps of n environments with random actions, in one compiled scan."""
     env, params = gymnax.make("FourRooms-misc")
 
     def one(state: Any, key: Any) -> tuple[Any, Any]:

@@ -72,7 +72,7 @@ class Colony(mesa.Model):
 
 
 def colony(ants: int) -> Callable[[], int]:
-    """Return ticks of a colony with ten cells per ant."""
+    """Return work: ticks of a colony with ten cells per ant."""
     model = Colony(ants, round((10 * ants) ** 0.5))
 
     def work() -> int:

@@ -26,7 +26,7 @@ def training(each: int) -> Callable[[], int]:
 
 
 def environments(n: int) -> Callable[[], int]:
-    """Return steps of n environments of one ant, with random actions drawn before."""
+    """Return work: steps of n environments of one ant, with random actions drawn before."""
     runtime.start()
     env = gymnasium.make_vec("taichi_ants/HexForage-v0", num_envs=n)
     env.reset(seed=0)
@@ -42,7 +42,7 @@ def environments(n: int) -> Callable[[], int]:
 
 
 def colony(ants: int, ranges: int | None = None) -> Callable[[], int]:
-    """Return ticks of a colony that forages and learns into one table; default 10 cells per ant."""
+    """Return work: ticks of a colony that forages and learns into one table; ten cells per ant."""
     side = ranges or max(10, round((10 * ants / 3) ** 0.5))
     world = worlds.open_world(0, (side, side, side))
     colony = Colony(world, foraging(), SARSA, ants=ants, start="spread")

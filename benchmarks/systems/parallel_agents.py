@@ -12,7 +12,7 @@ _STEPS = 50  # in a call of the work
 
 
 def knights() -> Callable[[], int]:
-    """Return steps of PettingZoo's example of knights and archers, without rendering."""
+    """Return work: steps of PettingZoo's example of knights and archers, without rendering."""
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")  # no display is needed
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     from pettingzoo.butterfly import knights_archers_zombies_v11
@@ -21,7 +21,7 @@ def knights() -> Callable[[], int]:
 
 
 def ants() -> Callable[[], int]:
-    """Return steps of a colony of 64 ants in the open world."""
+    """Return work: steps of a colony of 64 ants in the open world."""
     from taichi_ants.envs import colony_v0
 
     return _agents(colony_v0.parallel_env(world="open", ants=64))

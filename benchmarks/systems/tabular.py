@@ -34,10 +34,10 @@ def _learning(name: str, **settings: object) -> Callable[[], int]:
 
 
 def frozen_lake() -> Callable[[], int]:
-    """Return steps of learning in Gymnasium's FrozenLake."""
+    """Return work: steps of learning in Gymnasium's FrozenLake."""
     return _learning("FrozenLake-v1")
 
 
 def hex_forage() -> Callable[[], int]:
-    """Return steps of learning in our environment with one ant."""
+    """Return work: steps of learning in our environment with one ant."""
     return _learning("taichi_ants/HexForage-v0", observation_format="index")

@@ -87,7 +87,7 @@ class _Pack(ArgPack):
     """A pack whose memory is deleted by `_delete`."""
 
     def __del__(self) -> None:
-        """Do nothing; Taichi would crash if its program no longer exists."""
+        """Do nothing, because Taichi's own method crashes if its program no longer exists."""
 
 
 def _delete(taichi: ref, memory: Any) -> None:

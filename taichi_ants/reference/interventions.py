@@ -21,8 +21,8 @@ REACH = 8  # the most cells by which an ant is moved aside
 class Interventions:
     """Changes of a colony during an episode; ants observe again after each change.
 
-    A cell on which something cannot be placed stays as it is. Actions already drawn are still
-    done. `ants` is the number of ants at the start of later episodes.
+    Ants still take the actions that they have already drawn. A cell on which something cannot be
+    placed stays as it is. `ants` is the number of ants at the start of later episodes.
     """
 
     def __init__(self, colony: ReferenceColony) -> None:

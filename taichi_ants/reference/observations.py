@@ -96,7 +96,7 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
 
 
 def trail_levels(world: WorldState, ant: Ant) -> int:
-    """Return the state index of the load and the cells ahead; trails have three levels."""
+    """Return the state index of load and cells ahead; trails count in thirds of the strongest."""
     strongest = strongest_in_view(world, ant)
     codes = []
     for code, cell in zip(codes_in_view(world, ant), cells_in_view(ant), strict=True):

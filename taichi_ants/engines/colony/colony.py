@@ -36,7 +36,7 @@ class Colony(ColonyState):
             are the first.
         capacity: Largest number of living ants. None: `ants` without births, else 2 * `ants` + 64.
         start: Start cells of ants that the world does not list: "nest" for the free cells nearest
-            to the queen, "spread" for free cells anywhere. The seed decides ties and headings.
+            to the queen, "spread" for any free cells. The seed decides which, and the headings.
         ends_at_delivery: Whether an episode ends at its first delivery, as when an ant trains
             alone. Requires one ant and no births.
         sharing: "shared" for one table per world, for learners with a TD error; "independent" for
@@ -63,7 +63,7 @@ class Colony(ColonyState):
         """Reset worlds and ants to the start of an episode, and let the ants observe.
 
         Args:
-            length: Number of ticks of the episode, for learners that update at the last tick.
+            length: Number of ticks, for learners that update at the last tick; None if unknown.
             world: The new worlds, as in the class; None keeps the present ones.
 
         Raises:

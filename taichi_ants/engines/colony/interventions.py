@@ -1,8 +1,8 @@
 """Interventions: changes of a colony of one world between two ticks.
 
 Changes of rocks, food and the queen persist in later episodes. Changes of trails and of single ants
-last for the present episode. After each change the ants observe again. Actions already drawn are
-still done.
+last for the present episode. After each change the ants observe again, but still take the actions
+that they have already drawn.
 
 Rock and food move ants aside to empty cells up to `REACH` steps away. Candidate cells are tried by
 distance, then by cube coordinates. If none is empty, the ant and its cell do not change.
@@ -118,7 +118,7 @@ class Interventions:
         return slots[to >= 0], to[to >= 0]
 
     def move_queen(self, cell: int) -> None:
-        """Move the queen; AntsError if the cell is not empty, or had the last food of the start."""
+        """Move the queen; AntsError if the cell is not empty, or later episodes would lack food."""
         arrays, grid = self.colony.arrays, self.colony.grid
         if arrays["ground"][cell] != EMPTY:
             raise AntsError(

@@ -197,7 +197,7 @@ class TrainingResult(Record):
             f"world: {self.world}",
             f"seeds: {len(self.seeds)}, from {min(self.seeds)} to {max(self.seeds)}"
             if len(self.seeds) > 1
-            else f"seed: {self.seeds[0]} alone (give seeds=range(5) for five runs)",
+            else f"seed: {self.seeds[0]} (one run; seeds=range(5) trains five runs)",
             f"episodes: {self.episodes}, of at most {self.max_steps} steps each",
             f"task: {self.task}",
             f"means over seeds and the last {min(_SUMMED_UP, self.episodes)} episodes:",
