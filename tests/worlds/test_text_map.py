@@ -167,9 +167,9 @@ def test_the_examples_of_the_guide_work() -> None:
     ("content", "message"),
     [
         (b"", "map.txt draws no cell"),
-        (b"\x89PNG\r\n\x1a\n", "map.txt' is not text in UTF-8"),
+        (b"\x89PNG\r\n\x1a\n", "map.txt' is not UTF-8 text"),
         (b"Q\n\x00\n", r"line 2, column 1 of .*map.txt has '\\x00'"),
-        ("Q\n  .".encode("utf-16"), "map.txt' is not text in UTF-8"),
+        ("Q\n  .".encode("utf-16"), "map.txt' is not UTF-8 text"),
         (b"Q\n  x", "line 2, column 3 of .*map.txt has 'x'"),
     ],
 )
