@@ -374,7 +374,7 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
         status, out, err = call("colony", [*arguments, *more], capsys)
         assert (status, out) == (2, "")
         assert_one_sentence(err)
-        assert "learner 'lost' made action values that are not finite" in err
+        assert "learner 'lost' computed action values that are not finite" in err
         monkeypatch.setattr(
             registry,
             "_LEARNERS",

@@ -127,7 +127,7 @@ def test_a_number_of_pythons_is_a_td_error(engine):
     values = engine("ones")
     assert np.isclose(values[values != 0].min(), 0.1)  # one update at the learning rate of 0.1
     register(td_learner("infinite", of_infinity))
-    with pytest.raises(AntsError, match="'infinite' made action values that are not finite"):
+    with pytest.raises(AntsError, match="'infinite' computed action values that are not finite"):
         engine("infinite")
 
 
@@ -500,7 +500,9 @@ def that_explodes(value, reward, discount, next_values, next_action, epsilon):
 )
 def test_values_that_are_not_finite_are_named(td_error):
     register(td_learner("mine", td_error))
-    named = r"^learner 'mine' made action values that are not finite, with .*rate=0\.1.* seed 0; "
+    named = (
+        r"^learner 'mine' computed action values that are not finite, with .*rate=0\.1.* seed 0; "
+    )
     with pytest.raises(AntsError, match=named):
         in_runs()
     for sharing in ("shared", "independent"):
@@ -517,7 +519,7 @@ def test_values_that_are_not_finite_are_named_while_a_colony_is_stepped(tmp_path
         colony.begin_episode()
         colony.tick(100)
         path = tmp_path / "colony.npz"
-        named = "^learner 'mine' made action values that are not finite"
+        named = "^learner 'mine' computed action values that are not finite"
         with pytest.raises(AntsError, match=named):
             colony.outcome()
         with pytest.raises(AntsError, match=named):

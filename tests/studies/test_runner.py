@@ -290,7 +290,7 @@ def test_bad_points_of_colonies_are_named(change, says):
     [
         ((), (0,), "no points"),
         (POINTS, (), "seeds is empty"),
-        (POINTS, (1, 1), "seeds holds 1 more than once"),
+        (POINTS, (1, 1), "seeds contains 1 more than once"),
         ((replace(POINTS[0], world=None),), (0,), "world is None"),
         ((replace(POINTS[0], world=World((2, 1, 1), (0, 0, 0), [(1, 0, 0)])),), (0,), "room for 0"),
         ((replace(POINTS[0], world=World((3, 3, 3), (0, 0, 0))),), (0,), "the world has no food"),
