@@ -301,10 +301,10 @@ def plain_function(value, reward, discount, next_values, next_action, epsilon):
         ),
         (
             natural_sarsa,
-            "looks at next_action, but no next action is drawn; give draws_next_action",
+            "uses next_action, but no next action is drawn; give draws_next_action",
         ),
-        (plain_function, "is no Taichi function"),
-        (None, "is no Taichi function"),
+        (plain_function, "is not a Taichi function"),
+        (None, "is not a Taichi function"),
     ],
 )
 def test_td_errors_that_are_refused_at_once(td_error, says):
@@ -432,8 +432,8 @@ FAILS = "learner 'mine' cannot be used: "
     [
         ({"learn": of_three}, "the function learn of 'mine' has 3 arguments; it needs 5: memory"),
         ({"begin": learn}, "the function begin of 'mine' has 5 arguments; it needs 2: memory and"),
-        ({"learn": plain_function}, "the function learn of 'mine' is no Taichi function"),
-        ({"plans": True, "td_error": natural_sarsa}, "the TD error of 'mine' looks at next_action"),
+        ({"learn": plain_function}, "the function learn of 'mine' is not a Taichi function"),
+        ({"plans": True, "td_error": natural_sarsa}, "the TD error of 'mine' uses next_action"),
         ({"hyperparameters": Clashing}, "'discount' is a setting of all learners"),
         (
             {"hyperparameters": OfText},
@@ -444,13 +444,13 @@ FAILS = "learner 'mine' cannot be used: "
             f"{FAILS}hyperparameters fails (`training.depth` is 3; it must be",
         ),
         ({"hyperparameters": 5}, f"{FAILS}hyperparameters fails"),
-        ({"memory": lambda settings, n: None}, f"{FAILS}memory fails (what it gives is None; it"),
+        ({"memory": lambda settings, n: None}, f"{FAILS}memory fails (its result is None; it"),
         ({"memory": lambda settings, n: Memory(floats=-3)}, f"{FAILS}memory fails (floats of a "),
         ({"memory": lambda settings, n: n / 0}, f"{FAILS}memory fails (division by zero)"),
         ({"memory": Memory(floats=9)}, f"{FAILS}memory fails ('Memory' object"),
         ({"cost": 5}, f"{FAILS}cost fails ('int' object"),
         ({"cost": lambda settings: "x"}, f"{FAILS}cost fails ("),
-        ({"cost": lambda settings: -1}, f"{FAILS}cost fails (it gives -1, but it must be above 0)"),
+        ({"cost": lambda settings: -1}, f"{FAILS}cost fails (it returns -1, which must be above"),
     ],
 )
 def test_learners_that_are_refused_when_they_are_registered(changes, says):
