@@ -31,16 +31,15 @@ class Pheromone(Settings, path="task.pheromone"):
       ticks, and removes it below 1.
     - Each neighbour gets a sixth of the share `diffusion`, except that the parts for obstacles and
       for cells outside the world stay.
-    - The deposit of an ant with food is "set": it sets the trail of a cell to `level`; "add": it
-      adds `level`, up to `cap`; or "fading": it raises the trail to `level` minus `slope` for each
-      tick for which it has carried food. Such trails rise towards food if `slope` exceeds the
-      evaporation per tick.
+    - By `deposit`, an ant with food changes the trail of its cell. "set" sets it to `level`. "add"
+      adds `level`, up to `cap`. "fading" raises it to `level` minus `slope` for each tick for which
+      the ant has carried food; such trails rise towards food if `slope` exceeds the evaporation.
     - By `view`, an ant without food sees trails of at least 1 on empty cells as T. "half" requires
       at least half the level of the strongest in view, "strongest" the same level.
       "strongest_under_carriers" also compares with trails under ants with food.
     """
 
-    evaporation: Annotated[Evaporation, Is("kind of evaporation of trails")] = "linear"
+    evaporation: Annotated[Evaporation, Is("evaporation of trails")] = "linear"
     half_life: Annotated[
         float | None,
         Is("time in which a trail halves", unit="ticks", above=0, usual=50.0),
@@ -49,7 +48,7 @@ class Pheromone(Settings, path="task.pheromone"):
     diffusion: Annotated[
         float, Is("share of a trail that spreads to the six neighbours per tick", least=0, most=1)
     ] = 0.0
-    deposit: Annotated[Deposit, Is("kind of deposit of ants with food")] = "set"
+    deposit: Annotated[Deposit, Is("rule for deposits of ants with food")] = "set"
     level: Annotated[
         int,
         Is("trail level of a new deposit", least=1, most=MAX_DEPOSIT),

@@ -23,25 +23,21 @@ Ticks = Annotated[int | None, Is(unit="ticks", least=1, most=MAX_STEPS)]
 class Traffic(Settings, path="task.traffic"):
     """Rules for entering a cell with an ant on it; by default, as in the paper, no ant may.
 
-    If any may, every ant that tries to move claims the cell ahead of it, unless a rock, food,
-    the queen or the edge of the world is there. If several ants claim a cell, the one with the
-    smallest hash wins; see `docs/colony.md`. With `swap`, an ant with food that wins a cell changes
-    places with the ant on it, if that ant has no food, does not move itself, and does not pick up
-    food in view. The pushed ant gets the reward of a move onto an empty cell. With `follow`, all
-    ants of a queue move at once; a ring of ants that claim each other's cells does not move.
+    If any may, every ant that tries to move claims the cell ahead of it, unless a rock, food, the
+    queen or the edge of the world is there. If several ants claim a cell, the one with the smallest
+    hash wins; see `docs/colony.md`. With `swap`, a carrier that wins a cell changes places with a
+    forager that neither moves nor picks up food in view. The pushed ant gets the reward of a move
+    onto an empty cell. With `follow`, all ants of a queue move at once; a ring of ants that claim
+    each other's cells does not move.
     """
 
-    swap: Annotated[bool, Is("let ants with food change places with ants without food")] = False
-    follow: Annotated[
-        bool, Is("let ants enter a cell that its ant leaves in the same tick")
-    ] = False
-    carriers_first: Annotated[
-        bool, Is("give ants with food precedence over ants without food that claim the same cell")
-    ] = False
+    swap: Annotated[bool, Is("allow carriers to change places with foragers")] = False
+    follow: Annotated[bool, Is("allow ants to enter a cell whose ant leaves in the same tick")] = (
+        False
+    )
+    carriers_first: Annotated[bool, Is("give carriers precedence over foragers")] = False
     grant: Annotated[
-        bool,
-        Is("reward a pushed ant for its own move if the push moves it that way"),
-        Is(only=("swap", True)),
+        bool, Is("reward a pushed ant for its move if the push makes it", only=("swap", True))
     ] = False
 
     def __post_init__(self) -> None:
@@ -110,9 +106,7 @@ class Task(Settings, path="task"):
     ] = "terminates"
     evaporation_in_training: Annotated[bool, Is("evaporate trails while ants learn")] = False
     evaporation_in_evaluation: Annotated[bool, Is("evaporate trails while no ant learns")] = True
-    life: Annotated[Life, Is("births, deaths and changes of food (colonies only)")] = field(
-        default_factory=Life
-    )
+    life: Annotated[Life, Is("changes of ants and food in colonies")] = field(default_factory=Life)
 
     @classmethod
     def named(cls) -> Mapping[str, Task]:

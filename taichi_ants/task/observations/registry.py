@@ -83,11 +83,10 @@ _OBSERVATIONS: dict[str, Observation] = {}
 
 
 def register(observation: Observation) -> Observation:
-    """Register an observation by its name, and return it.
+    """Return an observation after registering it, in place of your own one of the same name.
 
-    It replaces your own observation of the same name. Raises AntsError if the name is not an
-    identifier or belongs to a built-in observation, a field does not have the right form, or a
-    state index is outside its range.
+    Raises AntsError if the name is not an identifier or belongs to a built-in observation, a field
+    does not have the right form, or a state index is outside its range.
     """
     expect("what is registered", observation, Observation)
     name = observation.name
@@ -166,7 +165,6 @@ def _try_functions(observation: Observation) -> None:
 
 
 def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
-    """Yield random views of ants, in the number types of kernels."""
     import numpy as np
 
     rng, shape = np.random.default_rng(0), (_VIEWS, len(observation.cells))
