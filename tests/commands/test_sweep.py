@@ -219,7 +219,7 @@ WRONG = {
     "seed of one world": (
         "[task]",
         "[world]\nseed = 1\n[task]",
-        ["world.seed is for a world drawn"],
+        ["world.seed has no effect on"],
     ),
     "part of a text": (
         "[vary]",
