@@ -143,7 +143,7 @@ def checked_max_steps(value: int, task: Task) -> int:
 
 
 def checked_share(name: str, value: float) -> float:
-    """Return a number from 0 to 1 as a float; AntsError for other values."""
+    """Return a number from 0 to 1 as a float, or raise AntsError."""
     if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= value <= 1:
         raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
     return float(value)

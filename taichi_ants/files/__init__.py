@@ -80,15 +80,10 @@ def _remove(path: Path) -> None:
 
 
 def check_writable_file(path: PathLike) -> Path:
-    """Check that `write_atomically` can write a file, before long work.
+    """Return the path, after a check that `write_atomically` can write it, before long work.
 
     Creates nothing. The folder may be missing if it can be created, unless the path is a link.
-
-    Returns:
-        The path.
-
-    Raises:
-        AntsError: The file cannot be written, or is a folder, a device or a pipe.
+    Raises AntsError also for folders, devices and pipes.
     """
     with writing(path):
         target = _target_of(path)
@@ -189,14 +184,9 @@ def smallest(array: np.ndarray) -> np.ndarray:
 
 
 def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Path:
-    """Create a folder if it is missing and check that files can be written to it.
+    """Return the path of a writable folder, which is created if it is missing.
 
-    Args:
-        path: The folder.
-        chosen: The folder to name in messages instead, for example the parent that the user chose.
-
-    Returns:
-        The path.
+    Messages name `chosen`, for example the parent folder that the user chose, instead of the path.
     """
     folder = Path(path)
     with writing(chosen or path):
@@ -220,7 +210,7 @@ def check_room(folder: PathLike, needed: int) -> None:
 
 @contextmanager
 def writing(path: PathLike) -> Iterator[None]:
-    """Yield; errors of the operating system become an AntsError that names the path."""
+    """Yield once, and turn errors of the operating system into an AntsError with the path."""
     try:
         yield
     except (OSError, UnicodeError) as error:
@@ -253,7 +243,6 @@ def named(path: PathLike) -> str:
 
 
 def _reason(error: Exception) -> str:
-    """Return the reason of an error, without the path and the number that OSError adds."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text[:1].lower() + text[1:]
 

@@ -168,7 +168,7 @@ class Kind:
 
     @contextmanager
     def building(self, path: files.PathLike) -> Iterator[None]:
-        """Yield; errors while an object is built from a file become an AntsError that names it."""
+        """Yield once, and turn errors while an object is built from a file into an AntsError."""
         what = f"the {self.name} in {files.named(path)}"
         try:
             yield

@@ -179,7 +179,6 @@ class ResultFolder:
             self._unfinished.rmdir()
 
     def _listed(self) -> dict[str, str]:
-        """Return the files of finished results, with their checksums."""
         return read_manifest(self.path)["files"] if (self.path / MANIFEST).exists() else {}
 
 
