@@ -122,7 +122,7 @@ class Setting(NamedTuple):
     def about(self, value: Any) -> str:
         """Return the help of the command-line option whose default is `value`."""
         words = self.allowed_words or (self.is_group and self.kind.named())  # type: ignore[attr-defined]
-        allowed = ", ".join(words) if words else self._range
+        allowed = f"one of {', '.join(words)}" if words else self._range
         parts = [self.rule.help, *([f"in {self.rule.unit}"] if self.rule.unit else [])]
         parts = [", ".join(parts), *([allowed] if allowed else [])]
         if self.rule.only is not None:

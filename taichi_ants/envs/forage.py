@@ -242,7 +242,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         return ACTION_MASKS[self._arrays["percepts"][0]].astype(bool)
 
     def render(self) -> Any:
-        """Return a picture or a text map of the world, by `render_mode`, or None."""
+        """Return a picture or a text map of the world, depending on `render_mode`, or None."""
         if not self._begun:
             raise ResetNeeded("no episode has begun; call reset() before render().")
         return None if self.render_mode is None else self._ants.draw(0)

@@ -1,7 +1,7 @@
 """Conversion of data sets to and from Minari; requires the extra `minari`.
 
-All functions raise AntsError if a data set does not exist or is not of such ants, or if its name is
-taken or not allowed.
+All functions raise AntsError if a data set does not exist or is not from these environments, or if
+its name is taken or not allowed.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def _spec(data: Dataset, observation_format: ObservationFormat) -> EnvSpec | Non
 def from_minari(
     dataset: str | MinariDataset, world: World | None = None, task: Task | None = None
 ) -> Dataset:
-    """Return a data set of Minari, from `to_minari` or from other software in these environments.
+    """Return a data set that `to_minari` wrote, or that Minari recorded in these environments.
 
     Args:
         dataset: The data set, or its name.

@@ -185,9 +185,9 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         """Begin an episode in all or some worlds.
 
         Args:
-            seed: World number w has the seed `seed + w`, or a list has a seed or None for each
-                world. A seed determines all random numbers, so that episodes repeat exactly. None
-                continues the random numbers of a world, or draws a seed in the first reset.
+            seed: A whole number, for the seed `seed + w` of each world w, or a list with a seed or
+                None for each world. A seed determines all random numbers, so that episodes repeat
+                exactly. None continues a world's random numbers; the first reset draws a seed.
             options: {"reset_mask": the environments to reset, bool (num_envs,), whole worlds}.
 
         Returns:

@@ -141,8 +141,8 @@ def update_weights(alpha: float, most: int) -> np.ndarray:
     """Return the weight of the mean of n TD errors in an update of a shared value, by n.
 
     The weight is 1 - (1 - alpha)^n, the effect of n successive updates with learning rate alpha
-    towards the same target. Kernels and reference both use these float32 numbers, (at most most +
-    1,), because powers differ in the last bit between libraries. Larger n have the last weight.
+    towards the same target. Kernels and reference both use these float32 numbers, at most `most` +
+    1, because powers differ in the last bit between libraries. Larger n have the last weight.
     """
     import numpy as np
 

@@ -39,7 +39,7 @@ class Policy(NamedTuple):
 
     @property
     def task(self) -> Task:
-        """The rules in its metadata, by default the paper's; AntsError if they are not allowed."""
+        """The rules in the metadata, by default the paper's; AntsError if they are not allowed."""
         try:
             task = Task.from_dict(self.metadata.get("task", {}))
         except AntsError as error:
@@ -110,7 +110,7 @@ def trail_follower(observation: str = "paper") -> ActionValues:
     """Return a hand-written policy, a table of the `RULES`, float32 (n_states, 5).
 
     Without food, an ant picks up food in view, follows a trail, and otherwise walks straight over
-    open ground and turns at random next to obstacles. With food, it gives it to the queen, moves
+    open ground and turns at random next to obstacles. With food, it delivers to the queen, moves
     nearer to her, pushes ants without food out of the way, and otherwise walks at random until it
     sees a nearer cell. An ant without food that sees an ant with food on a stronger trail (P) waits
     until that ant pushes it along the trail. With the observation `queues`, it moves against that

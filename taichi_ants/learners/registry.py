@@ -37,7 +37,7 @@ def register(learner: Learner) -> Learner:
     functions. Raises AntsError if the name is not an identifier or belongs to a built-in learner,
     or a field does not have the form that `Learner` describes.
     """
-    expect("what is registered", learner, Learner)
+    expect("learner", learner, Learner)
     name = learner.name
     check_new_name("learner", name, BUILT_IN)
     parts = ["memory", "at", "step", "rates", "random_state"]
@@ -80,14 +80,14 @@ def get(name: str) -> Learner:
         return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
     if name not in _LEARNERS:
         raise AntsError(
-            f"there is no learner {shown(name)}; choose one of {', '.join(names())}, or add a "
-            "--plugin."
+            f"there is no learner {shown(name)}; choose one of {', '.join(names())}, or give the "
+            "file that registers it with --plugin."
         )
     return _LEARNERS[name]
 
 
 def label(name: str) -> str:
-    """Return the name for readers, for example "Dyna-Q"; learners of plugins have only `name`."""
+    """Return the label for readers, for example "Dyna-Q"; for learners of plugins, the name."""
     expect("name", name, str)
     return BUILT_IN.get(name, name)
 

@@ -30,7 +30,7 @@ MOST_REWARD = 1000
 
 # The trail level that a carrier sets.
 DEPOSIT_LEVEL = 250
-# A 32-bit integer stores the tick at which a trail has evaporated, so the sum of both must fit.
+# A trail stores the tick at which it has evaporated, so a level plus a step must fit into 32 bits.
 MAX_TRAIL_LEVEL = 1_000_000_000
 MAX_STEPS = 10_000_000
 

@@ -23,7 +23,7 @@ Ticks = Annotated[int | None, Is(unit="ticks", least=1, most=MAX_STEPS)]
 class Traffic(Settings, path="task.traffic"):
     """Rules for entering a cell with an ant on it; by default, as in the paper, no ant may.
 
-    If any may, every ant that tries to move claims the cell ahead of it, unless a rock, food, the
+    Otherwise, every ant that tries to move claims the cell ahead of it, unless a rock, food, the
     queen or the edge of the world is there. If several ants claim a cell, the one with the smallest
     hash wins; see `docs/colony.md`. With `swap`, a carrier that wins a cell changes places with a
     forager that neither moves nor picks up food in view. The pushed ant gets the reward of a move
@@ -35,7 +35,7 @@ class Traffic(Settings, path="task.traffic"):
     follow: Annotated[bool, Is("allow ants to enter a cell whose ant leaves in the same tick")] = (
         False
     )
-    carriers_first: Annotated[bool, Is("give carriers precedence over foragers")] = False
+    carriers_first: Annotated[bool, Is("give carriers precedence over foragers for cells")] = False
     grant: Annotated[
         bool, Is("reward a pushed ant for its move if the push makes it", only=("swap", True))
     ] = False

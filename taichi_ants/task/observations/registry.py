@@ -88,7 +88,7 @@ def register(observation: Observation) -> Observation:
     Raises AntsError if the name is not an identifier or belongs to a built-in observation, a field
     does not have the right form, or a state index is outside its range.
     """
-    expect("what is registered", observation, Observation)
+    expect("observation", observation, Observation)
     name = observation.name
     check_new_name("observation", name, (one for one in _OBSERVATIONS if _is_built_in(one)))
     expect(f"letters of {name!r}", observation.letters, str)

@@ -27,7 +27,7 @@ HAS_FOOD, TAKES_FOOD, WINS = 16, 32, 64
 
 @ti.func
 def conflict_key(cell, tick):
-    """Return the key, of which the smallest wins."""
+    """Return the key of the ant on a cell; the smallest key wins."""
     inner = bits_of(advance(ti.cast(cell, ti.u64)))
     return bits_of(advance(inner ^ ti.cast(tick, ti.u64)))
 
