@@ -51,9 +51,9 @@ def double_bridge(
 
     The queen is at the origin, in the middle of a room. The food is a pile in the middle of another
     room. There are no trails and no listed ants. Lengths are steps from junction to junction;
-    `long` is at most 2 * short - 3 - aside. With `aside` 0, the first cells of both branches are as
-    far from the queen as the food's junction. With larger values, the first cell of the short
-    branch is nearer to her, and that of the long branch is not.
+    `long` is at most 2 * short - 3 - aside. With `aside` 0, the first cells of both branches at the
+    food's junction are as far from the queen as the junction. With larger values, the first cell of
+    the short branch is nearer to her, and that of the long branch is not.
     """
     grid = AxialGrid(bridge_ranges(short, long, mirrored, aside))
     queen = (0, 0, 0)
