@@ -118,9 +118,7 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
         if not -(2**63) <= seed < 2**64:
             raise AntsError(f"seeds contains {shown(seed)}; a seed must fit into 64 bits.")
         if seed % 2**64 in taken:
-            raise AntsError(
-                f"seeds contains {seed} more than once; seeds must differ modulo 2**64."
-            )
+            raise AntsError(f"seeds contains {seed} more than once; they must differ in 64 bits.")
         taken.add(seed % 2**64)
     return several
 

@@ -101,7 +101,6 @@ class ColonyWorlds(Ants):
     def advance(
         self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the results of the actions of all ants; see the base."""
         self.step(actions.reshape(self.acted.shape))
         rewards, ended = self.rewards.reshape(-1), self.ended & ~waiting
         truncated = np.repeat(ended, self.colony.capacity)
@@ -120,7 +119,6 @@ class ColonyWorlds(Ants):
         return rewards, terminated, truncated
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
-        """Return the infos of all slots; see the base."""
         return (
             self._last
             if last

@@ -187,7 +187,6 @@ class HexColonyParallelEnv(ParallelEnv):
     def _told(
         self, names: list[str], slots: list[int]
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Return observations and infos of the agents in these slots."""
         facts = {key: values[slots] for key, values in self._worlds.facts().items()}
         observations = dict(zip(names, self._worlds.shown.show(facts["state"]), strict=True))
         infos = {

@@ -83,7 +83,6 @@ class LoneAnts(Ants):
     def advance(
         self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the results of the actions of all ants; see the base."""
         begins = waiting if mode is AutoresetMode.NEXT_STEP else 0
         self.batched.step(actions, begins, same_step=mode is AutoresetMode.SAME_STEP)
         arrays = self.batched.arrays
@@ -91,7 +90,6 @@ class LoneAnts(Ants):
         return arrays["rewards_of"].copy(), *ends
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
-        """Return the infos of all ants; see the base."""
         arrays, when = self.batched.arrays, "final_" if last else ""
         packed = _PACKED_MASKS.take(arrays[f"{when}percepts"], mode="clip")
         return {

@@ -1,7 +1,7 @@
 """Conversion of data sets to and from Minari; requires the extra `minari`.
 
-All functions raise AntsError if a data set does not exist or is not from these environments, or if
-its name is taken or not allowed.
+AntsError means that a data set does not exist or is not from these environments, or that its name
+is taken or not allowed.
 """
 
 from __future__ import annotations

@@ -210,7 +210,6 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         return self._ants.shown.show(facts["state"]), self._infos(facts, mask)
 
     def _mask(self, options: dict[str, Any] | None) -> np.ndarray:
-        """The environments to reset, bool (num_envs,)."""
         if not isinstance(options, (dict, type(None))):
             raise TypeError(f"options is {shown(options)}; it must be a dict or None.")
         mask, n = (options or {}).get("reset_mask"), self.num_envs

@@ -26,7 +26,6 @@ _SQRT_3 = math.sqrt(3.0)
 
 
 def _cells(values: object) -> np.ndarray:
-    """Return cube coordinates in any form as int64 (..., 3)."""
     array = array_of("cells", values)
     if array.dtype.kind not in "iu" or array.ndim == 0 or array.shape[-1] != 3:
         raise AntsError(

@@ -1,9 +1,8 @@
 """A model of the world: the latest transition of each visited pair of state and action.
 
 The integers of a learner's memory store it. Index 0 is the number of visited pairs. From index 2,
-in the order of first visits, each slot holds a pair (its offset in the table) and its packed
-transition. After the room for all pairs follows, for each pair, its slot plus 1, or 0 if not
-visited.
+in the order of first visits, each slot has a pair (its offset in the table) and its packed
+transition. After the slots of all pairs follows, for each pair, its slot plus 1, or 0 if unvisited.
 """
 
 from dataclasses import dataclass

@@ -25,12 +25,10 @@ _KIND = Kind("policy", 2, "save_policy", most=1 << 26, foreign=True)
 
 
 class Policy(NamedTuple):
-    """The contents of a policy file.
+    """The contents of a policy file: action values, float32 (n_states, 5), and their origin.
 
-    Attributes:
-        q_values: Action values, float32 (n_states, 5).
-        observation: Name of the registered observation whose states index the rows.
-        metadata: Origin of the policy (configuration, seed, world ...).
+    `observation` is the name of the registered observation whose states index the rows; `metadata`
+    has the origin of the policy (configuration, seed, world ...).
     """
 
     q_values: ActionValues

@@ -39,7 +39,7 @@ class World:
             or such an array.
         trails: Cells with trails, int32 (T, 4) = x, y, z, level (ticks until the trail has
             evaporated). Give a sequence of ((x, y, z), level), or such an array. Level 0 means no
-            trail. Levels above 2**24 are rounded if `Pheromone.dense`, to float32.
+            trail. If `Pheromone.dense`, levels are float32, so those above 2**24 are rounded.
         ants: Listed ants, int32 (A, 4) = x, y, z, heading. Give a sequence of ((x, y, z), heading),
             or such an array. `start` places additional ants.
 

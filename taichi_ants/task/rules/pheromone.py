@@ -2,8 +2,7 @@
 
 Trails with linear evaporation, or with none, are stored as expiry clocks: the value of the clock at
 which the level becomes 0. The clock (i32) advances by 1 per tick, or by 0 without evaporation, so
-evaporation costs no time. All other trails are stored as levels (f32), which change in every cell
-each tick.
+evaporation costs no time. All other trails are levels (f32), which change in every cell each tick.
 """
 
 import taichi as ti

@@ -81,7 +81,7 @@ BAD_SEEDS = [
     (2**64, f"seeds contains {2**64}; a seed must fit into 64 bits"),
     ([-(2**63) - 1], f"seeds contains {-(2**63) - 1}"),
     ([4, 5, 4], "seeds contains 4 more than once"),
-    ([-1, 2**64 - 1], f"seeds contains {2**64 - 1} more than once; seeds must differ"),
+    ([-1, 2**64 - 1], f"seeds contains {2**64 - 1} more than once; they must differ"),
 ]
 
 
