@@ -11,7 +11,7 @@ from contextlib import suppress
 def prepare_for_taichi() -> None:
     """Set the environment variables that Taichi reads at import, unless the user has set them.
 
-    They turn off its banner, its version check, its warning about a deprecated function, and its
+    This turns off its banner, its version check, its warning about a deprecated function, and its
     notebook message. Taichi aborts without a HOME, and crashes at exit if HOME is not writable, so
     HOME then becomes a temporary folder for this process.
     """
