@@ -1,7 +1,6 @@
 """Taichi Ants: ants on a hexagonal grid that lay pheromone trails and learn by reinforcement.
 
-The names below are imported when they are first used, so that `import taichi_ants` is quick and
-Taichi starts only where a kernel is needed.
+Names are imported on first use, so that `import taichi_ants` is quick and does not start Taichi.
 """
 
 import sys
@@ -87,7 +86,7 @@ __all__ = [
 
 
 def _show_pages_in_notebooks() -> None:
-    """Tell IPython, if it runs, to show colonies, traces and recordings as pages."""
+    """Register colonies, traces and recordings with IPython, if it runs, to be shown as pages."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if shell is None:
         return

@@ -1,4 +1,4 @@
-"""Checks of what callers pass to the engines; kernels assume valid input."""
+"""Checks of the arguments that users pass to engines; kernels assume valid input."""
 
 from __future__ import annotations
 
@@ -33,30 +33,30 @@ MAX_ANTS = 1 << 24
 
 
 def checked_world(world: World, learns: bool = False) -> World:
-    """The world, if it is one; to learn in, it has food, or nothing could ever be delivered."""
+    """Return the world; AntsError if it is not a World or, with `learns`, has no food."""
     expect("world", world, World)
     if learns and not len(world.foods):
-        raise AntsError("the world has no food, so there is nothing to learn; give it some.")
+        raise AntsError("the world has no food, so ants cannot learn in it; add food.")
     return world
 
 
 def checked_task(task: Task) -> Task:
-    """The task, if it is one."""
+    """Return the task; AntsError if it is not a Task."""
     expect("task", task, Task)
     return task
 
 
 def checked_runs_task(task: Task | None) -> Task:
-    """The task, the paper's if it is None, if independent runs can have it."""
+    """Return the task, by default the paper's; AntsError if runs of one ant cannot have it."""
     task = checked_task(Task() if task is None else task)
     if task.life.changes:
         raise AntsError(
-            f"life of the task is {task.life}; runs of one ant have none, so use a Colony."
+            f"life of the task is {task.life}; only colonies support it, so use a Colony."
         )
     if task.pheromone.dense:
         raise AntsError(
-            f"pheromone of the task is {task.pheromone}; runs of one ant know neither exponential "
-            "evaporation nor diffusion, so use a Colony."
+            f"pheromone of the task is {task.pheromone}; runs of one ant support neither "
+            "exponential evaporation nor diffusion, so use a Colony."
         )
     return task
 
@@ -64,14 +64,14 @@ def checked_runs_task(task: Task | None) -> Task:
 def checked_capacity(
     task: Task, ants: int, capacity: int | None, start: str, ends_at_delivery: bool
 ) -> int:
-    """How many ants a colony can have at once; the arguments are those of `Colony`."""
+    """Return the largest number of ants at once; the arguments are those of `Colony`."""
     checked_whole("ants", ants, 1, MAX_ANTS)
     check_one_of("start", start, STARTS)
     births = task.life.births
     if checked_flag("ends_at_delivery", ends_at_delivery) and (ants != 1 or births):
         raise AntsError(
-            f"ends_at_delivery is set with {ants} ants and births {births}; it is for one ant "
-            "without births, so leave it out."
+            f"ends_at_delivery is True with {ants} ants and births {births}; it requires one ant "
+            "and no births, so leave it out."
         )
     if capacity is None:
         return min(2 * ants + 64, MAX_ANTS) if births else int(ants)
@@ -85,16 +85,16 @@ def checked_capacity(
 
 
 def check_sharing(learner: Learner, sharing: str) -> None:
-    """Refuse a learner that cannot learn into a table that others share."""
+    """Raise AntsError if the ants cannot share the learner's table, but `sharing` is "shared"."""
     if sharing == "shared" and learner.td_error is None:
         raise AntsError(
-            f"learner {learner.name!r} has no TD error that can be summed over ants, so they "
-            'cannot share its table; make sharing "independent".'
+            f"learner {learner.name!r} has no TD error that can be summed over ants, so ants "
+            'cannot share its table; set sharing to "independent".'
         )
 
 
 def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple:
-    """One configuration or several as a tuple, with all hyperparameters of their learners."""
+    """Return one or several configurations as a tuple, with the defaults of hyperparameters."""
     several = [configs] if isinstance(configs, TrainingConfig) else entries_of(configs)
     if several is None:
         raise AntsError(f"configs is {shown(configs)}; it must be one TrainingConfig or several.")
@@ -106,7 +106,7 @@ def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple
 
 
 def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
-    """One seed or several different ones as a tuple."""
+    """Return one or several seeds as a tuple; AntsError if two are equal."""
     if isinstance(seeds, np.ndarray):
         seeds = seeds.ravel().tolist()
     given = entries_of(seeds)
@@ -116,39 +116,39 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
     taken: set[int] = set()
     for seed in several:
         if not -(2**63) <= seed < 2**64:
-            raise AntsError(f"seeds holds {shown(seed)}; a seed must fit into 64 bits.")
+            raise AntsError(f"seeds contains {shown(seed)}; a seed must fit into 64 bits.")
         if seed % 2**64 in taken:
-            raise AntsError(f"seeds holds {seed} more than once; in 64 bits each must differ.")
+            raise AntsError(f"seeds contains {seed} more than once; they must differ in 64 bits.")
         taken.add(seed % 2**64)
     return several
 
 
 def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.ndarray:
-    """A seed for each table of the given leading shape, as flat Python integers (object array)."""
+    """Return a seed for each table of the given leading shape, as a flat object array."""
     several = checked_seeds(seeds)
     if len(several) != 1 and (not shape or shape[-1] != len(several)):
         raise AntsError(
             f"there are {len(several)} seeds for tables of leading shape {shape}; give one seed, "
-            "or as many as the last leading axis is long."
+            "or one for each entry of the last leading axis."
         )
     return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
 
 
 def checked_max_steps(value: int, task: Task) -> int:
-    """The step limit of an episode, whose return must fit into 32 bits."""
+    """Return the step limit; AntsError unless the return of an episode fits into 32 bits."""
     most = (2**31 - 1) // max(1, task.rewards.largest)
     return checked_whole("max_steps", value, most=min(MAX_STEPS, most))
 
 
 def checked_share(name: str, value: float) -> float:
-    """A number from 0 to 1."""
+    """Return a number from 0 to 1 as a float, or raise AntsError."""
     if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= value <= 1:
         raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
     return float(value)
 
 
 def check_progress(progress: object) -> None:
-    """Refuse what cannot be called with the share of the work that is done; None is no function."""
+    """Raise AntsError unless `progress` is None or a function (of the share of work done)."""
     if progress is not None and not callable(progress):
         raise AntsError(f"progress is {shown(progress)}; it must be a function or None.")
 
@@ -156,21 +156,21 @@ def check_progress(progress: object) -> None:
 def check_finite(
     tables: np.ndarray, configs: Sequence[TrainingConfig], seeds: Sequence[int]
 ) -> None:
-    """Refuse what a learner has made if it is not finite, tables (configurations * seeds, ...)."""
+    """Raise AntsError if learnt tables (configurations * seeds, ...) are not finite."""
     with np.errstate(all="ignore"):
-        if np.isfinite(tables.sum()):  # one pass without a copy; tables of a colony can be large
+        if np.isfinite(tables.sum()):  # a copy of a colony's tables could take much memory
             return
     finite = np.isfinite(tables).reshape(len(configs), len(seeds), -1).all(axis=-1)
     for c, s in np.argwhere(~finite)[:1]:
         raise AntsError(
-            f"learner {configs[c].learner!r} made action values that are not finite, with "
-            f"{configs[c]} and seed {seeds[s]}; mend its TD error, or make rewards and action "
-            "values smaller."
+            f"learner {configs[c].learner!r} computed action values that are not finite, with "
+            f"{configs[c]} and seed {seeds[s]}; correct its TD error, or use smaller rewards and "
+            "action values."
         )
 
 
 def checked_table(q_values: Any, task: Task) -> np.ndarray:
-    """The only table of `checked_q_values`, float32 (n_states, 5)."""
+    """Return the one table of `q_values`, float32 (n_states, 5); AntsError if it has several."""
     tables = checked_q_values(q_values, task)
     if tables.ndim == 2:
         return tables
@@ -179,13 +179,13 @@ def checked_table(q_values: Any, task: Task) -> np.ndarray:
         places = ", ".join("0" * (tables.ndim - 2))
         raise AntsError(
             f"q_values has shape {tables.shape}, which is {math.prod(tables.shape[:-2])} tables; "
-            f"give one of them, such as {whose}q_values[{places}]."
+            f"give one of them, for example {whose}q_values[{places}]."
         )
     return tables.reshape(tables.shape[-2:])
 
 
 def checked_q_values(q_values: Any, task: Task) -> np.ndarray:
-    """Action values as float32 (..., n_states, 5), finite.
+    """Return action values as float32 (..., n_states, 5); AntsError unless they are finite.
 
     Also accepts an object with `q_values`: a `TrainingResult`, a `Policy` or a `Colony`.
     """

@@ -1,4 +1,4 @@
-"""Prepares the process for Taichi before anything imports it."""
+"""Preparation of the process for Taichi, before Taichi is imported."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from contextlib import suppress
 
 
 def prepare_for_taichi() -> None:
-    """Set what Taichi reads from the environment when it is imported, unless the user has set it.
+    """Set the environment variables that Taichi reads at import, unless the user has set them.
 
-    No banner, no search for newer versions, no warning about an old function that Taichi calls, no
-    message that this is a notebook. Without a HOME Taichi aborts, with one that cannot be written
-    it crashes at exit: then HOME becomes a temporary folder for this process.
+    This turns off its banner, its version check, its warning about a deprecated function, and its
+    notebook message. Taichi aborts without a HOME, and crashes at exit if HOME is not writable, so
+    HOME then becomes a temporary folder for this process.
     """
     warnings.filterwarnings("ignore", ".*getlocale", DeprecationWarning, r"taichi\._lib\.utils")
     if hasattr(os, "register_at_fork"):
@@ -26,18 +26,18 @@ def prepare_for_taichi() -> None:
 
 
 def _mark_forked_taichi() -> None:
-    """In a forked process, mark a Taichi that runs in the parent: its threads are not here."""
-    with suppress(KeyError, AttributeError):  # Taichi is not imported, or not to its end
+    """Mark the parent's Taichi in a forked process, which does not have Taichi's threads."""
+    with suppress(KeyError, AttributeError):  # Taichi is not, or not completely, imported
         sys.modules["taichi"].lang.impl.get_runtime().is_forked = True
 
 
 def is_writable_folder(path: str) -> bool:
-    """Whether there is a folder in which files can be made."""
+    """Return whether the path is a folder in which this process can create files."""
     return os.path.isdir(path) and os.access(path, os.W_OK | os.X_OK)
 
 
 def fallback_folder() -> str:
-    """A folder among the temporary files that belongs to this user."""
+    """Return a temporary folder that belongs to this user."""
     import tempfile
 
     user = os.getuid() if hasattr(os, "getuid") else 0
@@ -46,4 +46,4 @@ def fallback_folder() -> str:
         os.makedirs(folder, mode=0o700, exist_ok=True)
     if is_writable_folder(folder) and os.lstat(folder).st_uid == user:
         return folder
-    return tempfile.mkdtemp(prefix="taichi_ants-")  # others could have put kernels in the usual one
+    return tempfile.mkdtemp(prefix="taichi_ants-")  # other users could plant kernels in `folder`

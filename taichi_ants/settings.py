@@ -1,8 +1,8 @@
-"""Settings, declared once.
+"""Declarations of settings.
 
-A class of settings is a frozen dataclass whose fields carry range, unit, condition and help as
-`Annotated[type, Is(...)]`. Checks, keys of sweep files, command-line options, controls of pages and
-the tables of the documentation are all made from these declarations.
+A class of settings is a frozen dataclass whose fields declare range, unit, condition and help as
+`Annotated[type, Is(...)]`. These declarations generate checks, keys of sweep files, command-line
+options, controls of pages, and the tables of the documentation.
 
     @dataclass(frozen=True)
     class Pheromone(Settings, path="task.pheromone"):
@@ -16,7 +16,7 @@ the tables of the documentation are all made from these declarations.
     >>> Pheromone("exponential", half_life=0)
     AntsError: `task.pheromone.half_life` is 0; it must be above 0.
 
-Nothing here needs NumPy, so that command lines show their help quickly.
+This module does not import NumPy, so that commands show their help quickly.
 """
 
 from __future__ import annotations
@@ -55,16 +55,16 @@ _KINDS: dict[type, str] = {
 
 @dataclass(frozen=True)
 class Is:
-    """Facts about a setting besides its type; several of them in one annotation add up.
+    """The declaration of a setting, except its type; several in one annotation are combined.
 
     Attributes:
-        help: A phrase or sentence that says what the setting does.
-        unit: Of the number, such as "ticks".
-        least, most, above: Bounds; the first two are allowed themselves.
-        only: The name of another setting of the class, and the values of it with which this one
-            means something; with others it has its default.
-        usual: The value it takes where it means something and is None.
-        choices: Return the words that are allowed, for those that can be registered.
+        help: A phrase that describes the setting.
+        unit: The unit of a number, for example "ticks".
+        least, most, above: Bounds: the smallest and the largest value, and an excluded lower bound.
+        only: The name of another setting of the class, and the values of it that this setting
+            requires; with other values it must have its default.
+        usual: The value that replaces None where the setting has an effect.
+        choices: A function that returns the allowed words, if plugins can register more.
     """
 
     help: str = ""
@@ -77,7 +77,7 @@ class Is:
     choices: Callable[[], tuple[str, ...]] | None = None
 
     def but(self, other: Is) -> Is:
-        """Both, of which `other` counts where it says something."""
+        """Return the combination of both; where `other` declares something, it takes precedence."""
         given = {one.name: getattr(other, one.name) for one in fields(other)}
         usual = vars(Is())
         return replace(self, **{k: v for k, v in given.items() if v is not usual[k] and v != ""})
@@ -90,10 +90,10 @@ Flag = Annotated[bool, Is()]
 
 
 class Setting(NamedTuple):
-    """One setting as it was declared.
+    """A declared setting.
 
     `path` is its full name; `kind` is bool, int, float, str, list, or a class of settings; `words`
-    are those that are allowed, where they are fixed; `default` is MISSING if it has none.
+    are the allowed words if they are fixed; `default` is MISSING if the setting is required.
     """
 
     name: str
@@ -106,23 +106,23 @@ class Setting(NamedTuple):
 
     @property
     def is_group(self) -> bool:
-        """Whether it is a class of settings."""
+        """Whether the setting is a class of settings."""
         return issubclass(self.kind, Settings)
 
     @property
     def has_names(self) -> bool:
-        """Whether it is a class of settings of which some values have names."""
+        """Whether the setting is a class of settings with named values."""
         return self.is_group and bool(self.kind.named())  # type: ignore[attr-defined]
 
     @property
     def allowed(self) -> str:
-        """The values that are allowed, as messages and tables name them."""
+        """The allowed values, in the words of messages and tables."""
         return self._kind_in_words + (f" {self._range}" if self._range else "")
 
     def about(self, value: Any) -> str:
-        """The help of a command-line option for this setting with the default `value`."""
+        """Return the help of the command-line option whose default is `value`."""
         words = self.allowed_words or (self.is_group and self.kind.named())  # type: ignore[attr-defined]
-        allowed = ", ".join(words) if words else self._range
+        allowed = f"one of {', '.join(words)}" if words else self._range
         parts = [self.rule.help, *([f"in {self.rule.unit}"] if self.rule.unit else [])]
         parts = [", ".join(parts), *([allowed] if allowed else [])]
         if self.rule.only is not None:
@@ -133,9 +133,9 @@ class Setting(NamedTuple):
         return "; ".join(parts) + (given.lower() if self.kind is bool else given)
 
     def checked(self, value: Any) -> Any:
-        """A value as a Python object of the setting's kind; AntsError if it is not allowed."""
+        """Return a value as a Python object of the setting's kind; AntsError if not allowed."""
         if self.optional and (value is None or (value == "none" and self.kind is not str)):
-            return None  # files and command lines have no None, so they write "none"
+            return None  # files and command lines write "none", because they have no None
         found = self._converted(value)
         if found is None:
             self._refuse(value, self.allowed)
@@ -144,7 +144,7 @@ class Setting(NamedTuple):
         return found
 
     def _converted(self, value: Any) -> Any:
-        """The value as one of the kind; None if it is of another one."""
+        """Return the value converted to the setting's kind; None if that is impossible."""
         if self.kind is bool or is_flag(value):
             return bool(value) if self.kind is bool and is_flag(value) else None
         try:
@@ -152,13 +152,13 @@ class Setting(NamedTuple):
                 return operator.index(value)
             if self.kind is float:
                 return float(value) if isinstance(value, Real) and math.isfinite(value) else None
-        except (TypeError, OverflowError):  # the latter of integers beyond all floats
+        except (TypeError, OverflowError):  # integers can be too large for a float
             return None
         if self.kind is str:
             allowed = self.allowed_words
             fits = isinstance(value, str) and (not allowed or value in allowed)
             return value if fits else None
-        if self.kind is list:  # what it must hold is checked where it is used
+        if self.kind is list:  # the code that uses the list checks its entries
             return entries_of(value)
         if issubclass(self.kind, Settings) and isinstance(value, str):
             value = self.kind.named().get(value)
@@ -178,7 +178,7 @@ class Setting(NamedTuple):
 
     @property
     def allowed_words(self) -> tuple[str, ...]:
-        """The words of which one has to be given; empty where others are allowed, too."""
+        """The allowed words; empty if any text is allowed."""
         return self.rule.choices() if self.rule.choices else self.words
 
     @property
@@ -208,9 +208,9 @@ class Setting(NamedTuple):
 class Settings:
     """Base of the classes of settings, which are frozen dataclasses.
 
-    `path` is the full name of the settings, as in sweep files and messages. The names that a class
-    returns from `named` are taken for their values wherever the class is a setting of another one.
-    AntsError if a value is outside its range, or would change nothing.
+    `path` is the full name of the settings in sweep files and messages. If the class is a setting
+    of another class, the names that `named` returns are allowed as values. Raises AntsError if a
+    value is not allowed, or would have no effect.
     """
 
     path: ClassVar[str] = ""
@@ -224,11 +224,11 @@ class Settings:
 
     @classmethod
     def named(cls) -> Mapping[str, Any]:
-        """The values of this class that have names."""
+        """Return the named values of this class."""
         return {}
 
     def check(self) -> None:
-        """Take each value as one of its kind."""
+        """Check each value, and convert it to its kind."""
         for one in declared(type(self)):
             object.__setattr__(self, one.name, one.checked(getattr(self, one.name)))
         for one in declared(type(self)):
@@ -236,7 +236,7 @@ class Settings:
                 self._settle(one)
 
     def _settle(self, one: Setting) -> None:
-        """Refuse a setting that would change nothing; give it its usual value where it counts."""
+        """Refuse a setting that has no effect; replace None by the usual value if it has one."""
         assert one.rule.only is not None
         other, *values = one.rule.only
         value = getattr(self, one.name)
@@ -250,10 +250,9 @@ class Settings:
             )
 
     def but(self: Self, **changes: Any) -> Self:
-        """The same with some changes; settings that mean nothing any more have their defaults.
+        """Return the settings with changes; settings that lose their effect get their defaults.
 
-        A group can be changed by a mapping of its own settings, in which "" names the value to
-        start from.
+        To change a group, give a mapping of its settings; its entry "" is the value to start from.
         """
         return self._changed(changes)
 
@@ -278,7 +277,7 @@ class Settings:
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
-        """The settings of a mapping, with groups as mappings or names, checked."""
+        """Return the settings in a mapping, checked; groups are mappings or names."""
         if not isinstance(facts, Mapping):
             raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
         return cls()._changed(facts)
@@ -288,7 +287,7 @@ _DECLARED: dict[Any, tuple[Setting, ...]] = {}
 
 
 def declared(cls: Any) -> tuple[Setting, ...]:
-    """The settings of a class or function: its fields or arguments with an `Is`, in order."""
+    """Return the settings of a class or function: its fields or arguments with an `Is`."""
     if cls not in _DECLARED:
         _DECLARED[cls] = tuple(_read(cls))
     return _DECLARED[cls]
@@ -305,7 +304,7 @@ def _read(cls: Any) -> Iterator[Setting]:
         for more in rules:
             rule = rule.but(more)
         kind, words, optional = _kind_of(kind)
-        path = _below(getattr(cls, "path", "world"), name)  # functions make worlds
+        path = _below(getattr(cls, "path", "world"), name)  # functions build worlds
         yield Setting(name, path, kind, words, optional, default, rule)
 
 
@@ -320,9 +319,9 @@ def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
 
 
 def checked(function: Function, path: str = "world") -> Function:
-    """Check the arguments of a function that are declared, whenever it is called: a decorator.
+    """Return a function that checks its declared arguments in each call; use as a decorator.
 
-    Messages name them below `path`, by default `world.NAME`, because most such functions make one.
+    Messages call the arguments `path.NAME`: `world.NAME`, because most such functions build worlds.
     """
     form = signature(function)
     function.path = path  # type: ignore[attr-defined]
@@ -340,11 +339,11 @@ def checked(function: Function, path: str = "world") -> Function:
     return calls  # type: ignore[return-value]
 
 
-checked_arguments = partial(checked, path="")  # of functions that do not make worlds
+checked_arguments = partial(checked, path="")  # for functions that do not build worlds
 
 
 def all_of(cls: Any) -> Iterator[Setting]:
-    """The settings of a class and of its groups, those of a group behind it."""
+    """Yield the settings of a class, each group followed by its own settings."""
     for one in declared(cls):
         yield one
         if one.is_group:
@@ -352,9 +351,9 @@ def all_of(cls: Any) -> Iterator[Setting]:
 
 
 def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
-    """The end of a message about a name that does not exist, with the names that are near it."""
+    """Return the end of a message about an unknown name, with the most similar known names."""
     several = list(known)
-    # Names of some length are alike by chance.
+    # Longer names are similar by chance.
     near = difflib.get_close_matches(str(name), several, 3, 0.6 if len(str(name)) < 9 else 0.75)
     near = near or several
     of = f" of {group}" if group else ""
@@ -365,7 +364,7 @@ def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
 
 
 def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
-    """Mappings in mappings as settings by their full names; `before` stands before all."""
+    """Return nested mappings as settings by their full names, which begin with `before`."""
     named: dict[str, Any] = {}
     for name, value in tree.items():
         path = _below(before, name)
@@ -374,7 +373,7 @@ def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def nested(named: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by their full names as mappings in mappings, as `Settings.but` takes them."""
+    """Return settings by full names as nested mappings, the form that `Settings.but` takes."""
     tree: dict[str, Any] = {}
     for path, value in named.items():
         *outer, last = path.split(".")
@@ -405,7 +404,7 @@ def _below(path: str, name: object) -> str:
 
 
 def _plain(bound: float) -> str:
-    """A bound as people write it: 1 000 000."""
+    """Return a bound with spaces between thousands: 1 000 000."""
     if isinstance(bound, int) and abs(bound) >= 10_000:
         return f"{bound:_}".replace("_", " ")
     return f"{bound:g}"

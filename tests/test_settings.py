@@ -95,7 +95,8 @@ def table(cls: type) -> str:
         if not one.is_group:
             unit = f", in {one.rule.unit}" if one.rule.unit else ""
             usual = one.default if one.rule.usual is None else one.rule.usual
-            default, meaning = "none" if usual is MISSING else f"`{usual!r}`", one.rule.help
+            words = {MISSING: "required", None: "none" if one.kind is list else "off"}
+            default, meaning = words.get(usual, f"`{usual!r}`"), one.rule.help
             if one.rule.only is not None:
                 other, *values = one.rule.only
                 meaning += f"; only with `{other}` {' or '.join(map(repr, values))}"

@@ -1,6 +1,6 @@
-"""Environments for your own agents: Gymnasium, batches of environments, PettingZoo.
+"""Environments for your own agents: Gymnasium, vector environments, PettingZoo.
 
-Importing this package registers them with Gymnasium, which has no entry point for that.
+Importing this package registers them with Gymnasium.
 """
 
 from gymnasium.envs.registration import register

@@ -1,4 +1,4 @@
-"""Worlds of ants whose actions are given, and the vector environment in which each is one."""
+"""Colonies whose ants take given actions, and the vector environment of their ants."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, RIGHT
 from taichi_ants.task.events import Event
 
-# The usual length of an episode of a colony, in ticks.
+# The default length of a colony's episode, in ticks.
 MAX_STEPS = 1000
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
 class ColonyWorlds(Ants):
-    """W worlds of ants that do what is given; all arrays are by world and slot, (W, slots).
+    """Worlds of ants that take given actions; arrays are by world and slot, (W, slots).
 
     Attributes:
         colony: The ants.
-        acted: Which slots held an ant that acted in the last step.
-        rewards: float64, what that paid.
-        events: The result, int64, an `Event`; NONE where no ant acted.
+        acted: Whether the slot had an ant that acted in the last step, bool.
+        rewards: The rewards of these actions, float64.
+        events: The results of these actions, `Event` as int64; NONE if no ant acted.
     """
 
     def __init__(
@@ -68,16 +68,16 @@ class ColonyWorlds(Ants):
         self._last: dict[str, np.ndarray] = {}
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
-        """Begin an episode in some worlds, `which` bool (W,).
+        """Begin an episode in the worlds `which`, bool (W,).
 
-        A world with a seed, of all W, begins a new life; one with None goes on, with other random
-        numbers.
+        `seeds` has an entry for each of the W worlds. A world with a seed is reset completely; None
+        continues its random numbers.
         """
         if seeds is None:
             seeds = [None] * len(which)
         new = np.array([seed is not None for seed in seeds]) & which
         if new.any():
-            # As for one ant, only 64 bits of a seed count.
+            # As for one ant, seeds count modulo 2**64.
             given = [seed % 2**64 for seed, one in zip(seeds, new, strict=True) if one]  # type: ignore[operator]
             self.colony.begin_some(new, given)
         if (which & ~new).any():
@@ -85,7 +85,7 @@ class ColonyWorlds(Ants):
         self.events = np.where(which[:, None], Event.NONE, self.events)
 
     def step(self, actions: np.ndarray) -> None:
-        """Let each ant do what is given, integers 0 to 4; stopped worlds stand still."""
+        """Take the actions of all ants, integers 0 to 4; stopped worlds do not change."""
         colony = self.colony
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
@@ -95,13 +95,12 @@ class ColonyWorlds(Ants):
 
     @property
     def ended(self) -> np.ndarray:
-        """In which worlds the episode has come to its last step, bool (W,)."""
+        """Whether the episode of each world has had its last step, bool (W,)."""
         return self.colony.episode_ticks >= self.max_steps
 
     def advance(
         self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Let all ants act; see the base."""
         self.step(actions.reshape(self.acted.shape))
         rewards, ended = self.rewards.reshape(-1), self.ended & ~waiting
         truncated = np.repeat(ended, self.colony.capacity)
@@ -120,7 +119,6 @@ class ColonyWorlds(Ants):
         return rewards, terminated, truncated
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
-        """The infos of all slots; see the base."""
         return (
             self._last
             if last
@@ -132,11 +130,11 @@ class ColonyWorlds(Ants):
         )
 
     def action_masks(self) -> np.ndarray:
-        """Which actions can succeed, int8 (W, slots, 5).
+        """Return 1 for actions that can succeed, int8 (W, slots, 5).
 
-        A move onto another ant counts if the traffic lets ants of this load enter such cells at
-        all. Whether it does succeed depends on what the others do in the same tick. In a dead end
-        the moves count, which turn the ant.
+        A move onto another ant counts if the traffic rules ever allow it for this load. Its success
+        depends on the actions of other ants in the same tick. In a dead end all moves count,
+        because they turn the ant.
         """
         colony, traffic = self.colony, self.task.traffic
         masks = ACTION_MASKS.take(colony.percepts, axis=0, mode="clip")
@@ -152,7 +150,7 @@ class ColonyWorlds(Ants):
         return masks
 
     def draw(self, world: int) -> np.ndarray:
-        """A picture of a world, uint8 (height, width, 3)."""
+        """Return a picture of a world, uint8 (height, width, 3)."""
         from taichi_ants.rendering import Scene, Status
 
         if self._scene is None:
@@ -169,32 +167,32 @@ class ColonyWorlds(Ants):
 
 
 class HexColonyVectorEnv(AntVectorEnv):
-    """Ants of one or more worlds, each of them an environment of a `gymnasium.vector.VectorEnv`.
+    """The ants of one or more worlds, each as an environment of a `gymnasium.vector.VectorEnv`.
 
     Environment number w * ants + i is ant number i of world number w. The ants of a world share its
-    cells, its food and its trails, and act at the same time. Any library that trains one agent on a
-    vector environment so trains one policy that all ants follow ("parameter sharing"). Actions,
-    observations and rewards are those of `HexForageEnv`, infos those of `HexForageVectorEnv` except
-    `reason`; each ant gets what its own action pays, and its mask is 1 for what can succeed if no
-    other ant is faster.
+    cells, its food and its trails, and act at the same time. A library that trains one agent on a
+    vector environment therefore trains one policy for all ants ("parameter sharing"). Actions,
+    observations and rewards are those of `HexForageEnv`, and infos are those of
+    `HexForageVectorEnv` except `reason`. Each ant gets the reward of its own action. Its mask is 1
+    for actions that succeed unless another ant comes first.
 
     ## Episode End
-    After `max_steps` steps all ants of a world are truncated at once. A delivery ends nothing in
-    the world; its ant goes on from where it stands. If the task's delivery is "terminates", the
-    default, the delivering ant is nevertheless `terminated`, and its next observation begins its
-    next episode: what comes later is not credited to the delivery. Since it begins in the step in
-    which it ends, this needs the autoreset mode `SAME_STEP`; with delivery "truncates" no ant is
-    ever terminated, and all modes are possible. All three modes reset whole worlds.
+    After `max_steps` steps, all ants of a world are truncated. A delivery does not reset the world,
+    and its ant continues from its cell. If the task's `delivery` is "terminates", the default, the
+    ant is nevertheless `terminated` and its next observation begins its next episode, so that later
+    rewards do not count for the delivery. This requires the autoreset mode `SAME_STEP`, because the
+    next episode begins in the same step. If `delivery` is "truncates", no ant is terminated, and
+    all modes are possible. All modes reset whole worlds.
 
     ## Arguments
-    num_envs: How many ants there are in all worlds together, a multiple of `ants`.
-    world: A registered name, the path of a map, a `World`, or a list of these, of the same
-        ranges: world number w is number w modulo their number.
-    task: The rules; None: the paper's. Ants are neither born nor do they die here.
-    ants: How many live in each world.
-    start, max_steps, observation_format, evaporation: As of `HexColonyParallelEnv`.
-    autoreset_mode, max_episode_steps: As of `HexForageVectorEnv`.
-    render_mode: "rgb_array": `render` gives a picture of each world. None: it is not called.
+    - `num_envs`: The number of ants in all worlds together, a multiple of `ants`.
+    - `world`: A registered name, the path of a map, a `World`, or a list of n of these with the
+      same ranges, of which world number w has number w modulo n.
+    - `task`: The rules, without births and lifespan; by default, the paper's.
+    - `ants`: The number of ants in each world.
+    - `start`, `max_steps`, `observation_format`, `evaporation`: See `HexColonyParallelEnv`.
+    - `autoreset_mode`, `max_episode_steps`: See `HexForageVectorEnv`.
+    - `render_mode`: "rgb_array" for a picture of each world, or None.
     """
 
     metadata = METADATA
@@ -216,7 +214,7 @@ class HexColonyVectorEnv(AntVectorEnv):
         n, ants = checked_whole("num_envs", num_envs), checked_whole("ants", ants)
         if n % ants:
             raise AntsError(
-                f"num_envs is {num_envs}; it counts ants, so make it a multiple of ants, {ants}."
+                f"num_envs is {num_envs}; it counts ants, so it must be a multiple of ants, {ants}."
             )
         worlds = ColonyWorlds(
             *(world, n // ants, task, ants, start, None, max_steps),
@@ -227,11 +225,12 @@ class HexColonyVectorEnv(AntVectorEnv):
         if rules.life.births or rules.life.lifespan is not None:
             raise AntsError(
                 f"life of the task is {rules.life}; a vector environment has a fixed number of "
-                "ants, so leave out births and lifespan, or take the parallel_env of colony_v0."
+                "ants, so leave out births and lifespan, or use the parallel_env of colony_v0."
             )
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
         if rules.delivery == "terminates" and not same_step:
             raise AntsError(
-                f"autoreset_mode is {self.autoreset_mode.value!r}, but an ant that delivers goes "
-                'on at once; take "SameStep", or a task with delivery "truncates".'
+                f"autoreset_mode is {self.autoreset_mode.value!r}, but the next episode of an ant "
+                'begins in the step of its delivery; use "SameStep", or a task with delivery '
+                '"truncates".'
             )

@@ -1,4 +1,4 @@
-"""A colony as a PettingZoo environment: agents that act at once, are born and die."""
+"""A colony as a PettingZoo environment, whose agents act in parallel, are born and die."""
 
 from __future__ import annotations
 
@@ -28,35 +28,37 @@ except ImportError as error:
 class HexColonyParallelEnv(ParallelEnv):
     """The ants of one world, as agents of a `pettingzoo.ParallelEnv`.
 
-    Agent `"ant_7"` is ant number 7. The ants that start an episode have the numbers 0, 1, ...; each
-    ant that is born has the next one, is in `agents` from then on, and acts from the next step on.
-    All agents act at once. Actions, observations and rewards are those of `HexForageEnv`; each ant
-    gets what its own action pays. `state()` is a map of the whole world, for centralised critics.
+    Agent `"ant_7"` is ant number 7. The ants that start an episode have the numbers 0, 1, ... Each
+    ant that is born gets the next number, is in `agents` from its birth, and acts from the next
+    step. All agents act at once. Actions, observations and rewards are those of `HexForageEnv`.
+    Each ant gets the reward of its own action. `state()` is a map of the whole world, for
+    centralised critics.
 
     ## Episode End
-    An ant that dies of age is terminated, and leaves `agents`; its number does not come back. After
-    `max_steps` steps all are truncated. A delivery ends nothing, whatever the task's `delivery`
-    says: its ant goes on, and `info["event"]` is DELIVERED.
+    An ant that dies of age is terminated and leaves `agents`; its number is not used again. After
+    `max_steps` steps, all ants are truncated. A delivery does not end the episode, for any
+    `delivery` of the task: the ant continues, and `info["event"]` is DELIVERED.
 
     ## Info
-    As of `HexForageEnv`, without `reason`. The `action_mask` is 1 for what can succeed if no other
-    ant is faster; `event` is NONE in the step of an ant's birth, too.
+    Infos are those of `HexForageEnv` except `reason`. `action_mask` is 1 for actions that succeed
+    unless another ant comes first. `event` is also NONE in the step of an ant's birth.
 
     ## Arguments
-    world: A registered name, the path of a map, or a `World`.
-    task: The rules; None: the paper's.
-    ants: How many start.
-    start: "nest", near the queen, or "spread", anywhere.
-    capacity: How many can live at once; None: `ants` if none are born, else 2 * `ants` + 64.
-    max_steps: Steps of an episode.
-    observation_format: "cells", "index" or "one_hot".
-    evaporation: Whether trails fall; None: as the task says for training.
-    render_mode: "rgb_array": `render` gives a picture. None: it is not called.
+    - `world`: A registered name, the path of a map, or a `World`.
+    - `task`: The rules; by default, the paper's.
+    - `ants`: The number of ants at the start.
+    - `start`: "nest" for cells near the queen, or "spread" for any cells.
+    - `capacity`: The largest number of living ants; by default, `ants`, or 2 * `ants` + 64 if the
+      task has births.
+    - `max_steps`: The number of steps of an episode.
+    - `observation_format`: "cells", "index" or "one_hot".
+    - `evaporation`: Whether trails evaporate; by default, the task's `evaporation_in_training`.
+    - `render_mode`: "rgb_array" for pictures, or None.
 
     Attributes:
-    possible_agents: All that can ever live in one episode: the ants that start, and as many as
-        food can become, see `most_births`.
-    agents: Those that live now; only after the first reset.
+        possible_agents: All agents that can live in an episode: the ants at the start and those
+            that can be born, see `most_births`.
+        agents: The living agents, after the first reset.
     """
 
     metadata: ClassVar[dict] = {**METADATA, "name": "colony_v0", "is_parallelizable": True}
@@ -90,11 +92,11 @@ class HexColonyParallelEnv(ParallelEnv):
         self.state_space = spaces.Box(0, 2**31 - 1, form, np.int32)
 
     def observation_space(self, agent: str) -> spaces.Space:
-        """What the agent can see; the same object for each."""
+        """Return the observation space, the same object for each agent."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space:
-        """What the agent can do; an object of its own, so that each can be seeded."""
+        """Return the action space, a different object for each agent, so that you can seed it."""
         return self.action_spaces[agent]
 
     def reset(
@@ -103,19 +105,19 @@ class HexColonyParallelEnv(ParallelEnv):
         """Begin an episode.
 
         Args:
-            seed: The same seed gives the same episodes from then on. None: random numbers go on; in
-                the first reset a seed is drawn.
+            seed: The seed of this and all further episodes, which then repeat exactly. None
+                continues the random numbers, or draws a seed in the first reset.
             options: Not used.
 
         Returns:
             Observations and infos by agent.
         """
         if seed is not None:
-            seeding.np_random(seed)  # says what Gymnasium says of what is no seed
+            seeding.np_random(seed)  # raises Gymnasium's error for invalid seeds
         elif not self._begun:
             seed = int(np.random.default_rng().integers(2**63))
         self._worlds.begin(np.ones(1, bool), [seed])
-        self._slots = list(range(self._worlds.colony.ants))  # of the agents
+        self._slots = list(range(self._worlds.colony.ants))  # the slots of `agents`
         self.agents = self._names(self._slots)
         return self._told(self.agents, self._slots)
 
@@ -132,18 +134,17 @@ class HexColonyParallelEnv(ParallelEnv):
         dict[str, bool],
         dict[str, dict[str, Any]],
     ]:
-        """Let all agents act at once.
+        """Take the actions of all agents.
 
         Args:
-            actions: 0 to 4 for each of `agents`.
+            actions: An action, 0 to 4, for each of `agents`.
 
         Returns:
-            Observations, rewards, terminations, truncations and infos, of those that acted, and of
-            those that were born.
+            Observations, rewards, terminations, truncations and infos, of agents that acted and of
+            agents that were born.
 
         Raises:
-            AssertionError: `reset` was not called before; or an action is missing, or not in its
-                space.
+            AssertionError: No episode has begun, or an action is missing or does not exist.
         """
         if not self._begun:
             EnvLogger.error_step_before_reset()
@@ -186,7 +187,6 @@ class HexColonyParallelEnv(ParallelEnv):
     def _told(
         self, names: list[str], slots: list[int]
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-        """Return observations and infos of the agents in these slots."""
         facts = {key: values[slots] for key, values in self._worlds.facts().items()}
         observations = dict(zip(names, self._worlds.shown.show(facts["state"]), strict=True))
         infos = {
@@ -195,10 +195,10 @@ class HexColonyParallelEnv(ParallelEnv):
         return observations, infos
 
     def state(self) -> np.ndarray:
-        """The world from above, int32 (4, rows, columns); cells in axial coordinates.
+        """Return a map of the world, int32 (4, rows, columns), in axial coordinates.
 
-        What each cell holds (0 nothing, 5 rock or outside, 7 food, 13 the queen); its trail level,
-        rounded down; its ant (1 without food, 2 with food); the ant's heading, from 0.
+        Its layers are the content of each cell (0 nothing, 5 rock or outside, 7 food, 13 queen);
+        its trail level, rounded down; its ant (1 without food, 2 with food); the ant's heading.
         """
         if not self._begun:
             EnvLogger.error_state_before_reset()
@@ -210,16 +210,16 @@ class HexColonyParallelEnv(ParallelEnv):
         return layers.reshape(self.state_space.shape)
 
     def render(self) -> np.ndarray | None:
-        """A picture, uint8 (height, width, 3); None without a render mode."""
+        """Return a picture, uint8 (height, width, 3), or None without a render mode."""
         if not self._begun:
             EnvLogger.error_render_before_reset()
         return None if self.render_mode is None else self._worlds.draw(0)
 
 
 def most_births(life: Life, foods: int, ticks: int) -> int:
-    """How many ants can be born at most in so many ticks: by her free neighbours, and by food.
+    """Return the largest number of births in `ticks`, by the queen's free neighbours and by food.
 
-    Each food becomes one ant; it can be taken again `life.regrowth` + 1 ticks later.
+    Each food item becomes an ant, and can be taken again `life.regrowth` + 1 ticks later.
     """
     if not life.births:
         return 0

@@ -1,4 +1,4 @@
-"""One ant as a Gymnasium environment, and many such ants as one vector environment."""
+"""A lone ant as a Gymnasium environment, and many such ants as a vector environment."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ _GROUNDS = {
     FOOD: text_map.FOOD,
     QUEEN: text_map.QUEEN,
 }
-# Of all environments together, with room for some more: 4 GiB.
+# The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
-# Rows as single numbers of 8 bytes, which NumPy takes three times as fast.
+# Each row as a number of 8 bytes, because `take` of numbers is three times as fast.
 _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
 
 
 class LoneAnts(Ants):
-    """n ants, each in a world of its own; all of them do a step in one launch."""
+    """Many ants, each alone in its world; a single launch steps all of them."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class LoneAnts(Ants):
         render_mode: str | None,
         max_episode_steps: int | None = None,
     ) -> None:
-        task = Task.from_dict(task) if isinstance(task, Mapping) else task  # as JSON holds it
+        task = Task.from_dict(task) if isinstance(task, Mapping) else task  # a spec read from JSON
         task = checks.checked_runs_task(task)
         super().__init__(
             *(world, n, task, max_steps, max_episode_steps, observation_format, evaporation),
@@ -67,14 +67,14 @@ class LoneAnts(Ants):
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size
         if n > most:
-            raise AntsError(f"num_envs is {n}; of this world there can be at most {most} at once.")
+            raise AntsError(f"num_envs is {n}; it must be at most {most} for a world of this size.")
         self._text = render_mode == "ansi"
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, self.evaporates
         )
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
-        """Begin an episode of the ants `which`, bool (n,), those with a seed by their seed."""
+        """Begin an episode of the ants `which`, bool (n,), with their seeds if they have one."""
         given = {i: one for i, one in enumerate(seeds) if which[i] and one is not None}
         if given:
             self.batched.seed(list(given.values()), np.array(list(given)))
@@ -83,7 +83,6 @@ class LoneAnts(Ants):
     def advance(
         self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Let all ants act; see the base."""
         begins = waiting if mode is AutoresetMode.NEXT_STEP else 0
         self.batched.step(actions, begins, same_step=mode is AutoresetMode.SAME_STEP)
         arrays = self.batched.arrays
@@ -91,7 +90,6 @@ class LoneAnts(Ants):
         return arrays["rewards_of"].copy(), *ends
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
-        """The infos of all ants; see the base."""
         arrays, when = self.batched.arrays, "final_" if last else ""
         packed = _PACKED_MASKS.take(arrays[f"{when}percepts"], mode="clip")
         return {
@@ -102,7 +100,7 @@ class LoneAnts(Ants):
         }
 
     def draw(self, world: int) -> Any:
-        """The world of an ant: uint8 (720, 1280, 3), or text."""
+        """Return a picture of an ant's world, uint8 (720, 1280, 3), or a text map."""
         arrays, sees = self.batched.arrays, self.task.sees
         now, state = self.batched.snapshot(world), int(arrays["states"][world])
         facts = (
@@ -121,7 +119,7 @@ class LoneAnts(Ants):
 
 
 def _text_of(now: Snapshot) -> str:
-    """A text map, see `worlds.text_map`; the ant is its heading."""
+    """Return a text map, see `worlds.text_map`; the heading of the ant marks its cell."""
     ground = np.where(now.grid.exists, now.ground, -1)
     where = [(ground == kind, mark) for kind, mark in _GROUNDS.items()]
     where.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
@@ -133,44 +131,42 @@ def _text_of(now: Snapshot) -> str:
 
 
 class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
-    """One ant on a hexagonal grid looks for food and carries it to its queen.
+    """An ant on a hexagonal grid that searches for food and carries it to its queen.
 
-    The rules, those of "Ants and Reinforcement Learning Algorithms", are in `docs/environments.md`.
+    The rules are those of "Ants and Reinforcement Learning Algorithms". See
+    `docs/environments_reference.md`.
 
     ## Observation Space
-    By `observation_format`, for a task whose observation has states of parts (p1, ..., pk), in the
-    paper's case 128 states of (2, 4, 4, 4): the load, then the codes of the cells left, forward and
-    right (0 empty, 1 obstacle, 2 trail or, with food, nearer to the queen, 3 food or, with food,
-    queen).
+    Observations have k parts of sizes p1, ..., pk, which depend on the task. The paper's have the
+    sizes (2, 4, 4, 4): the load, then a code for each of the cells left, forward and right. Codes
+    are 0 (empty), 1 (obstacle), 2 (trail) and 3 (food) for an ant without food. For an ant with
+    food, 2 is a cell nearer to the queen, and 3 is the queen.
 
     - "cells": `MultiDiscrete([p1, ..., pk])`, int64 (k,).
     - "index": `Discrete(p1 * ... * pk)`, the state index.
     - "one_hot": `Box(0, 1, (p1 + ... + pk,), float32)`, each part one-hot.
 
     ## Action Space
-    `Discrete(5)`: 0, 1, 2 turn to the cell left, forward or right and enter it; 3 picks up a food
-    in view, 4 gives the food to the queen in view. A move that is blocked turns the ant all the
-    same.
+    `Discrete(5)`. 0, 1 and 2 turn the ant to the cell left, forward or right and enter it. 3 picks
+    up food in view, and 4 gives the food to the queen in view. A blocked move still turns the ant.
 
     ## Info
-    - `state`: int64, the state's index.
-    - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end for the moves, which
-      turn the ant. `action_masks()` returns it as bool, for MaskablePPO of sb3-contrib.
+    - `state`: int64, the state index.
+    - `action_mask`: int8 (5,), 1 for actions that can succeed; in a dead end, 1 for the moves,
+      which turn the ant. `action_masks()` returns it as bool, for MaskablePPO of sb3-contrib.
     - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
-    - `reason`: int64, why the action was blocked or failed, a `taichi_ants.envs.Reason`; NONE if
-      it did not fail.
+    - `reason`: int64, the reason why the action failed, a `taichi_ants.envs.Reason`, or NONE.
 
     ## Arguments
-    world: Name of a registered world, path of a text map, its text, or a World.
-    task: The rules, a `taichi_ants.Task`, or its `as_dict()`; None is the paper's. AntsError if it
-        has what only colonies have.
-    delivery: A delivery "terminates" or "truncates" the episode, or it "continues"; None is the
-        task's, by default "terminates".
-    evaporation: Whether trails evaporate; None is as the task says of training, by default not.
-    max_steps: Steps after which an episode is truncated.
-    observation_format: "cells", "index" or "one_hot".
-    render_mode: "rgb_array": `render` draws uint8 (720, 1280, 3). "ansi": it writes a text map of
-        the world as it is, its heading for the ant.
+    - `world`: The name of a registered world, the path or the text of a map, or a World.
+    - `task`: The rules, a `taichi_ants.Task` or its `as_dict()`; by default, the paper's. AntsError
+      if a rule is only for colonies.
+    - `delivery`: "terminates", "truncates" or "continues" the episode; by default, the task's.
+    - `evaporation`: Whether trails evaporate; by default, the task's `evaporation_in_training`.
+    - `max_steps`: The number of steps after which an episode is truncated.
+    - `observation_format`: "cells", "index" or "one_hot".
+    - `render_mode`: "rgb_array" for pictures, uint8 (720, 1280, 3), or "ansi" for text maps, in
+      which the heading of the ant marks its cell.
     """
 
     metadata = METADATA
@@ -196,7 +192,10 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        """Begin an episode. With a seed, which decides all chance, episodes repeat exactly."""
+        """Return the first observation and info of a new episode.
+
+        The seed determines all random numbers, so episodes with a seed repeat exactly.
+        """
         super().reset(seed=seed)
         if seed is None and not self._begun:
             seed = int(self.np_random.integers(2**63))
@@ -205,14 +204,17 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         return self._seen()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Do an action, 0 to 4.
+        """Take an action, 0 to 4.
+
+        Returns:
+            Observation, reward, terminated, truncated, info.
 
         Raises:
             ResetNeeded: No episode has begun, or it has ended.
-            InvalidAction: There is no such action.
+            InvalidAction: The action does not exist.
         """
         if self._over:
-            raise ResetNeeded("no episode is under way; call reset() before step().")
+            raise ResetNeeded("no episode has begun; call reset() before step().")
         if not self.action_space.contains(action):
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
         self._ants.batched.step(action)
@@ -223,7 +225,6 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         return observation, float(arrays["rewards_of"][0]), terminated, truncated, info
 
     def _seen(self) -> tuple[Any, dict[str, Any]]:
-        """The observation and the info."""
         arrays = self._arrays
         return self._ants.shown.show(arrays["states"])[0], {
             "state": np.int64(arrays["states"][0]),
@@ -233,31 +234,31 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         }
 
     def action_masks(self) -> np.ndarray:
-        """Return which actions can succeed now, bool (5,), as `info["action_mask"]` does."""
+        """Return the actions that can succeed now, bool (5,): `info["action_mask"]` as bool."""
         if not self._begun:
-            raise ResetNeeded("no episode is under way; call reset() before action_masks().")
+            raise ResetNeeded("no episode has begun; call reset() before action_masks().")
         return ACTION_MASKS[self._arrays["percepts"][0]].astype(bool)
 
     def render(self) -> Any:
-        """A picture or a text map of the world as it is, see `render_mode`; None without one."""
+        """Return a picture or a text map of the world, depending on `render_mode`, or None."""
         if not self._begun:
-            raise ResetNeeded("no episode is under way; call reset() before render().")
+            raise ResetNeeded("no episode has begun; call reset() before render().")
         return None if self.render_mode is None else self._ants.draw(0)
 
 
 class HexForageVectorEnv(AntVectorEnv):
-    """Many ants, each alone in a world of its own: all of them do a step in one launch.
+    """Many ants, each alone in its world; a single launch steps all of them.
 
-    Environment i is a `HexForageEnv` with seed `seed + i`, step by step; arrays have a leading axis
-    of `num_envs`, and infos are as those of Gymnasium's own vector environments.
+    Environment i equals a `HexForageEnv` with seed `seed + i` in each step. Arrays have a leading
+    axis of `num_envs`, and infos have the format of Gymnasium's vector environments.
 
     ## Arguments
-    num_envs: How many; each takes 4 bytes for each cell of its world.
-    world: As of `HexForageEnv`, or a list of worlds of the same ranges: environment i lives in
-        number i modulo their number.
-    autoreset_mode: A `gymnasium.vector.AutoresetMode` or its name; the default is "NextStep".
-    max_episode_steps: Another step limit, as `gymnasium.make` has; the lower one counts.
-    All others: as of `HexForageEnv`; `render` draws all worlds.
+    - `num_envs`: The number of environments; each takes 4 bytes for each cell of its world.
+    - `world`: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
+      i has number i modulo n.
+    - `autoreset_mode`: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
+    - `max_episode_steps`: The step limit of `gymnasium.make_vec`; the smaller limit counts.
+    - All others: See `HexForageEnv`; `render` draws all worlds.
     """
 
     metadata = METADATA

@@ -1,4 +1,4 @@
-"""Formats in which ants see their states: cells, index or one-hot; policies of them as tables."""
+"""Observation formats (cells, index, one-hot), and functions of observations as policy tables."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from taichi_ants.task.constants import N_ACTIONS
 
 ObservationFormat = Literal["cells", "index", "one_hot"]
 FORMATS: tuple[str, ...] = get_args(ObservationFormat)
-_MOST_NUMBERS = 1 << 25  # of the table of all states
+_MOST_NUMBERS = 1 << 25  # in the table of all states
 
 
 class Shown:
-    """What an ant sees, in one of the formats.
+    """The observations of an environment, in one of the formats.
 
-    A state is an index into a table of action values, see `taichi_ants.task.Observation`; in those
-    of this package it is made of the load (1 with food) and a code for each cell in view.
+    The parts of a state are the digits of its index, see `taichi_ants.task.Observation`: in
+    built-in observations, the load (1 with food) and a code for each cell in view.
 
     Attributes:
-        space: The space of one ant. "cells": MultiDiscrete (k,), int64: the k parts of a state.
-            "index": Discrete, the state itself. "one_hot": Box (sum of the sizes of all parts,),
-            float32: a 1 for each part, at its value, as `gymnasium.spaces.flatten` of "cells".
+        space: The space of one ant. "cells": MultiDiscrete (k,), int64, the k parts of a state.
+            "index": Discrete, the state index. "one_hot": Box (sum of the sizes of all parts,),
+            float32, with a 1 for the value of each part, as in `gymnasium.spaces.flatten`.
     """
 
     def __init__(self, observation: Observation, form: ObservationFormat) -> None:
@@ -45,13 +45,13 @@ class Shown:
             if sum(parts) * n_states > _MOST_NUMBERS:
                 raise AntsError(
                     f"observation_format is 'one_hot', but {observation.name!r} has {n_states} "
-                    'states of one part; use "index", or register it with a shape.'
+                    'states and no shape; use "index", or register it with a shape.'
                 )
             self.space = spaces.Box(0.0, 1.0, (sum(parts),), np.float32)
 
     @cached_property
     def table(self) -> np.ndarray:
-        """What each state is shown as: (n_states, ...) of the space's shape and dtype."""
+        """The observation of each state, (n_states, *space.shape), of the space's dtype."""
         states = np.arange(self.observation.n_states)
         if self.form == "index":
             return states
@@ -64,12 +64,12 @@ class Shown:
         return flat
 
     def show(self, states: np.ndarray) -> np.ndarray:
-        """What these states are shown as: integers of any shape (...) -> (..., *space.shape)."""
-        # Ten times as fast as `table[states]`.
+        """Return the observations (..., *space.shape) of states, integers of any shape (...)."""
+        # `take` with "clip" is ten times as fast as `table[states]`.
         return self.table.take(states, axis=0, mode="clip")
 
     def states(self, shown: np.ndarray) -> np.ndarray:
-        """The states of what was shown: (..., *space.shape) -> int64 (...)."""
+        """Return the states, int64 (...), of observations (..., *space.shape)."""
         shown = np.asarray(shown)
         if self.form == "index":
             return shown.astype(np.int64)
@@ -85,33 +85,33 @@ def tabulate(
     observation: str = "paper",
     observation_format: ObservationFormat = "one_hot",
 ) -> npt.NDArray[np.float32]:
-    """The table of a policy that is a function of what an ant sees.
+    """Return the table of a policy that is a function of observations.
 
-    The function is called once, with all states. The table acts greedily: of a policy with
-    probabilities it keeps the most probable action.
+    The function is called once, with the observations of all states. The table is a greedy policy:
+    if the function returns probabilities, the most probable action is taken.
 
         table = tabulate(lambda seen: model.predict(seen, deterministic=True)[0])
 
     Args:
-        function: Takes all states as an environment shows them, (n_states, ...) of the dtype of its
-            observation space. Returns action values, logits or probabilities, real (n_states, 5);
-            or the action in each state, integers (n_states,).
+        function: A function of the observations of all states, (n_states, ...) of the dtype of the
+            environment's observation space. It returns action values, logits or probabilities,
+            real (n_states, 5), or the action in each state, integers (n_states,).
         observation: Name of the registered observation.
-        observation_format: The environment's: "cells", "index" or "one_hot".
+        observation_format: "cells", "index" or "one_hot", as in the environment.
 
     Returns:
-        Action values, float32 (n_states, 5). Of actions: 1 for the action, 0 for the others.
+        Action values, float32 (n_states, 5). For actions, 1 for the action and 0 for all others.
     """
     if not callable(function):
-        raise AntsError(f"function is {shown(function)}; it must be a function of what is seen.")
+        raise AntsError(f"function is {shown(function)}; it must be a function of observations.")
     seen = Shown(observations.get(observation), observation_format).table
     n_states, returned = len(seen), function(seen)
     try:
         given = np.asarray(returned)
-    except (TypeError, ValueError, RuntimeError) as error:  # what NumPy and torch raise
+    except (TypeError, ValueError, RuntimeError) as error:  # NumPy and torch raise these
         raise AntsError(
-            f"function returned {shown(returned)}, which is no array ({shown(str(error))}); return "
-            "one array, without what else a library gives, and detached from gradients."
+            f"function returned {shown(returned)}, which is not an array ({shown(str(error))}); "
+            "return only one array, detached from gradients."
         ) from error
     if given.shape == (n_states,) and given.dtype.kind in "iu":
         if given.min() < 0 or given.max() >= N_ACTIONS:
@@ -121,6 +121,6 @@ def tabulate(
     if given.shape != (n_states, N_ACTIONS) or given.dtype.kind not in "fiu":
         raise AntsError(
             f"function returned an array of shape {given.shape} and type {given.dtype}; it must be "
-            f"real numbers of ({n_states}, {N_ACTIONS}), or actions, integers of ({n_states},)."
+            f"real numbers ({n_states}, {N_ACTIONS}), or integer actions ({n_states},)."
         )
     return finite("function returned", given)

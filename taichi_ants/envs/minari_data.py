@@ -1,6 +1,7 @@
-"""Data sets as those of Minari, which other libraries read; needs the extra `minari`.
+"""Conversion of data sets to and from Minari; requires the extra `minari`.
 
-AntsError if there is no such data set, it is not of such ants, or its name is taken or not allowed.
+AntsError means that a data set does not exist or is not from these environments, or that its name
+is taken or not allowed.
 """
 
 from __future__ import annotations
@@ -31,27 +32,26 @@ from taichi_ants.worlds.world import World
 if TYPE_CHECKING:
     from minari import MinariDataset
 
-_FACTS = "taichi_ants"  # the name of our description among the metadata
+_FACTS = "taichi_ants"  # the key of the description in Minari's metadata
 _FORMATS: dict[type, ObservationFormat] = {
     spaces.Discrete: "index",
     spaces.MultiDiscrete: "cells",
     spaces.Box: "one_hot",
 }
-# What each step tells besides what Minari asks for; the last observation of an episode, too.
+# Infos of each step, and of the last observation of an episode, in addition to Minari's fields.
 _INFOS = ("run", "agent", "step", "behaviour_probability")
 
 
 def to_minari(
     data: Dataset, dataset_id: str, observation_format: ObservationFormat = "cells"
 ) -> MinariDataset:
-    """Write a data set where Minari keeps its own, each episode of an ant as one of Minari's.
+    """Return a data set written to Minari's local storage, with an episode for each ant's episode.
 
     Args:
         data: The data set.
-        dataset_id: Its name there, for example "ants/random-v0".
-        observation_format: How states are shown: "cells", "index" or "one_hot", as in the
-            environments. Which run and ant it was, the tick, and with which probability the action
-            was taken are infos.
+        dataset_id: Its name in Minari, for example "ants/random-v0".
+        observation_format: "cells", "index" or "one_hot", as in the environments. Infos are the
+            run, the ant, the tick, and the probability of the action.
     """
     expect("data", data, Dataset)
     minari = _minari()
@@ -77,7 +77,7 @@ def to_minari(
         )
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # of all that could be told besides
+            warnings.simplefilter("ignore", UserWarning)  # about optional metadata
             written = minari.create_dataset_from_buffers(
                 dataset_id,
                 buffers,
@@ -91,14 +91,14 @@ def to_minari(
     except (TypeError, ValueError) as error:
         raise AntsError(
             f"Minari cannot write {shown(dataset_id)} ({' '.join(str(error).split())}); choose "
-            'another name, such as "ants/random-v0".'
+            'another name, for example "ants/random-v0".'
         ) from error
     written.storage.update_metadata({_FACTS: to_json(data.facts())})
     return written
 
 
 def _spec(data: Dataset, observation_format: ObservationFormat) -> EnvSpec | None:
-    """The environment that the ants were in, if each was alone: `recover_environment` makes it."""
+    """Return the environment for `recover_environment`, or None if ants were not alone."""
     if data.agent.any():
         return None
     task, learned = data.task, data.behaviour.get("policy") == "learner"
@@ -114,12 +114,12 @@ def _spec(data: Dataset, observation_format: ObservationFormat) -> EnvSpec | Non
 def from_minari(
     dataset: str | MinariDataset, world: World | None = None, task: Task | None = None
 ) -> Dataset:
-    """Read a data set of Minari's: one that `to_minari` wrote, or what others did as such ants.
+    """Return a data set that `to_minari` wrote, or that Minari recorded in these environments.
 
     Args:
         dataset: The data set, or its name.
-        world: Where the ants were, if `to_minari` did not write it.
-        task: The rules that they had, likewise; None: the paper's.
+        world: The world of the ants, required unless `to_minari` wrote the data set.
+        task: The rules of the ants, likewise; by default, the paper's.
     """
     minari = _minari()
     try:
@@ -132,7 +132,7 @@ def from_minari(
             raise FileNotFoundError
     except (OSError, ValueError, AttributeError):
         raise AntsError(
-            f"Minari has no data set {shown(dataset)}; see `minari list local`."
+            f"Minari has no data set {shown(dataset)}; run `minari list local` for the names."
         ) from None
     with _reading(path):
         source = minari.load_dataset(dataset) if isinstance(dataset, str) else dataset
@@ -142,7 +142,7 @@ def from_minari(
         if facts is not None:
             known = Dataset.described(json.loads(facts))
     if known["world"] is None:
-        raise AntsError("the data set does not tell the world of its ants; give world and task.")
+        raise AntsError("the data set does not contain a world and a task; give world and task.")
     form = Shown(known["task"].sees, _FORMATS.get(type(source.observation_space), "cells"))
     if (source.observation_space, source.action_space) != (form.space, spaces.Discrete(N_ACTIONS)):
         raise AntsError(
@@ -160,28 +160,27 @@ def from_minari(
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Turns what goes wrong with the files of a data set into one AntsError that names them."""
+    """Turn all errors while the files of a data set are read into an AntsError that names them."""
     try:
         yield
-    except Exception as error:  # h5py and Minari fail in many ways
+    except Exception as error:  # h5py and Minari raise many kinds
         text = " ".join(str(error).rstrip(".").split()) or type(error).__name__
         raise AntsError(
-            f"the data set in {str(path)!r} is damaged or not of such ants ({text}); "
-            "write it again or name another one."
+            f"the data set in {str(path)!r} is damaged or not of these environments ({text}); "
+            "write it again, or name another data set."
         ) from error
 
 
 def _rows(episode: Any, number: int, form: Shown) -> dict[str, np.ndarray]:
-    """The columns of one episode."""
     states, n = form.states(episode.observations), len(episode)
     rewards = np.rint(episode.rewards)
     if not np.array_equal(rewards, episode.rewards):
-        raise AntsError("the data set has rewards that are not whole; those of ants are.")
+        raise AntsError("the data set has rewards that are not whole; name a data set of ants.")
     infos = episode.infos or {}
     usual = {"run": np.zeros(n), "agent": np.zeros(n), "step": np.arange(n)}
     usual["behaviour_probability"] = np.full(n, np.nan)
     truncated = np.array(episode.truncations) & ~episode.terminations
-    truncated[-1] = not episode.terminations[-1]  # a data set may end in the middle of one
+    truncated[-1] = not episode.terminations[-1]  # a data set may end within an episode
     return {
         **{name: infos[name][:n] if name in infos else usual[name] for name in _INFOS},
         "episode": np.full(n, number),

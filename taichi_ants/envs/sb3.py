@@ -1,4 +1,4 @@
-"""Vector environments as Stable-Baselines3 wants them: `VecEnv`, on which its agents train."""
+"""Vector environments for Stable-Baselines3, as its class `VecEnv`."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ class SB3VecEnv(VecEnv):
         envs = HexForageVectorEnv(64, observation_format="one_hot", autoreset_mode="SameStep")
         PPO("MlpPolicy", SB3VecEnv(envs)).learn(100_000)
 
-    Infos are empty except where an episode has ended: there `terminal_observation` is what was seen
-    at its end, and `TimeLimit.truncated` is True if the step limit ended it. Wrap it in SB3's
-    `VecMonitor` for returns and lengths of episodes.
+    The info of an environment is empty unless its episode has ended. It then has the last
+    observation, `terminal_observation`, and `TimeLimit.truncated`, True if the step limit ended the
+    episode. For returns and lengths of episodes, use SB3's wrapper `VecMonitor`.
 
-    All environments are one object: attributes are those of `envs`, the same for each, and the only
-    method of single environments is `action_masks`, which MaskablePPO of sb3-contrib calls.
+    All environments are one object, so they share the attributes of `envs`. The only method of
+    single environments is `action_masks`, which MaskablePPO of sb3-contrib calls.
 
     Attributes:
         envs: The environments, with autoreset_mode "SameStep".
-        infos: What they said in the last step, or at the reset, in Gymnasium's form.
+        infos: The infos of the last step or reset, in Gymnasium's format.
     """
 
     def __init__(self, envs: VectorEnv) -> None:
@@ -43,15 +43,15 @@ class SB3VecEnv(VecEnv):
         if mode is not AutoresetMode.SAME_STEP:
             raise AntsError(
                 f"autoreset_mode of envs is {mode.value if mode else mode!r}; Stable-Baselines3 "
-                'needs "SameStep".'
+                'requires "SameStep".'
             )
         self.envs, self._actions = envs, np.zeros(0, np.int64)
         self.infos: dict[str, Any] = {}
         super().__init__(envs.num_envs, envs.single_observation_space, envs.single_action_space)
 
     def reset(self) -> np.ndarray:
-        """Begin all episodes anew, with the seeds that `seed` has set."""
-        seen, self.infos = self.envs.reset(seed=self._seeds[0])  # the others are the next ones
+        """Return the first observations of new episodes, with the seeds that `seed` has set."""
+        seen, self.infos = self.envs.reset(seed=self._seeds[0])  # further seeds are consecutive
         self._reset_seeds()
         return seen
 
@@ -59,7 +59,7 @@ class SB3VecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
-        """Do the actions: what is seen, rewards float32, which episodes ended, infos."""
+        """Return observations, float32 rewards, ends of episodes, and infos after the actions."""
         seen, rewards, terminated, truncated, self.infos = self.envs.step(self._actions)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = terminated | truncated
@@ -74,12 +74,12 @@ class SB3VecEnv(VecEnv):
         self.envs.close()
 
     def get_images(self) -> list[np.ndarray | None]:
-        """A picture of each environment."""
+        """Return a picture of each environment."""
         pictures: Any = self.envs.render()
         return [None] * self.num_envs if pictures is None else list(pictures)
 
     def action_masks(self) -> np.ndarray:
-        """Which actions can succeed now, bool (num_envs, 5)."""
+        """Return the actions that can succeed now, bool (num_envs, 5)."""
         return self.infos["action_mask"].astype(bool)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
@@ -87,7 +87,7 @@ class SB3VecEnv(VecEnv):
         return [getattr(owner, attr_name)] * len([*self._get_indices(indices)])
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Set an attribute of `envs`; AntsError if it is meant for some environments only."""
+        """Set an attribute of `envs`; AntsError if `indices` are not all environments."""
         if set(self._get_indices(indices)) != set(range(self.num_envs)):
             raise AntsError(
                 f"indices is {shown(indices)}; the environments are one object and share their "
@@ -98,14 +98,14 @@ class SB3VecEnv(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """The result of `action_masks`, the only method, for each environment."""
+        """Return the result of `action_masks`, the only method, for each environment."""
         if method_name != "action_masks":
             raise AntsError(
-                f"method_name is {shown(method_name)}; the environments are one object and have "
-                "only action_masks each, so call other methods of `envs` itself."
+                f"method_name is {shown(method_name)}; the environments are one object, and their "
+                "only method is action_masks, so call other methods of `envs`."
             )
         return list(self.action_masks()[[*self._get_indices(indices)]])
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:
-        """False for each: single environments have no wrappers."""
+        """Return False for each environment, because single environments have no wrappers."""
         return [False] * len([*self._get_indices(indices)])

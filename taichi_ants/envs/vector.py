@@ -1,4 +1,4 @@
-"""The part that all environments share: arguments, and the protocol of Gymnasium's vector ones."""
+"""The bases of all environments: their arguments, and Gymnasium's vector interface."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def _action_masks() -> np.ndarray:
         state = state_from_index(percept)
         mask[:PICK_UP] = [code % 2 == 0 for code in state.view]  # E, T and S can be entered
         mask[GIVE if state.carries else PICK_UP] = 3 in state.view
-        if not mask.any():  # a dead end, which an ant leaves by turning
+        if not mask.any():  # a dead end, in which moves turn the ant
             mask[:PICK_UP] = 1
     return masks
 
 
-ACTION_MASKS = _action_masks()  # what can succeed, by percept: int8 (128, 5)
+ACTION_MASKS = _action_masks()  # the actions that can succeed, by percept: int8 (128, 5)
 
 
 class Ants(ABC):
@@ -48,10 +48,10 @@ class Ants(ABC):
 
     Attributes:
         task: The rules.
-        worlds: All of the same ranges; world number w is number w modulo their number.
+        worlds: Worlds with the same ranges; world number w is worlds[w % len(worlds)].
         evaporates: Whether trails evaporate.
         max_steps: The step limit of an episode.
-        shown: How states are shown.
+        shown: The format of observations.
     """
 
     def __init__(
@@ -81,27 +81,27 @@ class Ants(ABC):
 
     @abstractmethod
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
-        """Begin an episode in the worlds `which`, bool (W,), those with a seed by their seed."""
+        """Begin an episode in the worlds `which`, bool (W,), with their seeds if they have one."""
 
     @abstractmethod
     def advance(
         self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Let all ants act, (n,); `waiting`, bool (W,), are worlds whose episode is over.
+        """Return rewards, float64 (n,), terminations and truncations, bool (n,), as copies.
 
-        Returns copies: rewards float64, terminations and truncations bool, (n,).
+        `actions` are those of all ants, (n,); `waiting`, bool (W,), are worlds at an episode's end.
         """
 
     @abstractmethod
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
-        """The infos of all ants, (n, ...), now or, if `last`, before `advance` began an episode."""
+        """Return infos of all ants, (n, ...): now or, if `last`, at the end of an episode."""
 
     @abstractmethod
     def draw(self, world: int) -> Any:
-        """A picture of a world."""
+        """Return a picture of a world."""
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_scene": None}  # it is drawn anew
+        return {**vars(self), "_scene": None}  # `draw` creates it again
 
 
 def _worlds_of(world: Any, most: int) -> tuple[World, ...]:
@@ -111,7 +111,7 @@ def _worlds_of(world: Any, most: int) -> tuple[World, ...]:
             f"world is {shown(world)}; give the name of a world, a World, or a list of them."
         )
     if len(given) > most:
-        raise AntsError(f"world lists {count(len(given), 'world')}; there is room for {most}.")
+        raise AntsError(f"world lists {count(len(given), 'world')}; it must list at most {most}.")
     several = tuple(
         checks.checked_world(
             one if not isinstance(one, str) else from_text(one) if "\n" in one else build(one)
@@ -120,14 +120,14 @@ def _worlds_of(world: Any, most: int) -> tuple[World, ...]:
     )
     ranges = {one.ranges for one in several}
     if len(ranges) > 1:
-        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must be the same.")
     return several
 
 
 class StepLimit:
-    """Base of environments whose `spec.max_episode_steps` is their own step limit.
+    """Base of environments that set `spec.max_episode_steps` to their own step limit.
 
-    Gymnasium leaves it out of the spec of an environment that it does not wrap in a `TimeLimit`.
+    Gymnasium sets it only if it wraps an environment in a `TimeLimit`.
     """
 
     _ants: Ants
@@ -135,7 +135,7 @@ class StepLimit:
 
     @property
     def spec(self) -> EnvSpec | None:
-        """The specification of an environment that Gymnasium has made, else None."""
+        """The specification if Gymnasium created the environment, else None."""
         return self._spec
 
     @spec.setter
@@ -151,9 +151,9 @@ class StepLimit:
 class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
     """Base of the vector environments.
 
-    With n worlds of k ants, environment number w * k + i is ant number i of world number w. Infos
-    are arrays with an entry for each environment and, for each name, `_name`, bool (num_envs,): the
-    environments that the entries are of.
+    With k ants in each world, environment number w * k + i is ant number i of world number w. Each
+    info is an array with an entry for each environment. Its mask `_name`, bool (num_envs,), is True
+    for environments that have this info.
     """
 
     def __init__(
@@ -173,7 +173,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.single_action_space = Discrete(N_ACTIONS)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._over: np.ndarray | None = None  # worlds whose episode is over; None: none has begun
+        self._over: np.ndarray | None = None  # worlds at an episode's end; None before any reset
         self._all = np.ones(num_envs, bool)
 
     def reset(
@@ -182,17 +182,20 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Begin an episode in all worlds, or in some; return observations and infos.
+        """Begin an episode in all or some worlds.
 
         Args:
-            seed: Of world number w, `seed + w`; or one for each world, None where it goes on. A
-                seed decides all chance: episodes repeat exactly. None: the random numbers of each
-                world go on; in the first reset seeds are drawn.
-            options: "reset_mask", bool (num_envs,): which environments to reset, whole worlds.
+            seed: A whole number, for the seed `seed + w` of each world w, or a list with a seed or
+                None for each world. A seed determines all random numbers, so that episodes repeat
+                exactly. None continues a world's random numbers; the first reset draws a seed.
+            options: {"reset_mask": the environments to reset, bool (num_envs,), whole worlds}.
+
+        Returns:
+            Observations (num_envs, ...) and infos.
 
         Raises:
-            TypeError, ValueError: Seeds or mask have not this form.
-            ResetNeeded: There is a mask, but there are no other episodes to go on with.
+            TypeError, ValueError: The seeds or the mask do not have these forms.
+            ResetNeeded: The first reset has a mask that leaves out worlds.
         """
         mask = self._mask(options)
         which = mask.reshape(self._n_worlds, -1)[:, 0]
@@ -207,7 +210,6 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         return self._ants.shown.show(facts["state"]), self._infos(facts, mask)
 
     def _mask(self, options: dict[str, Any] | None) -> np.ndarray:
-        """The environments to reset, bool (num_envs,)."""
         if not isinstance(options, (dict, type(None))):
             raise TypeError(f"options is {shown(options)}; it must be a dict or None.")
         mask, n = (options or {}).get("reset_mask"), self.num_envs
@@ -217,29 +219,29 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             raise TypeError(f"reset_mask is {shown(mask)}; it must be a NumPy array of bool.")
         if mask.shape != (n,) or not mask.any():
             raise ValueError(
-                f"reset_mask is {shown(mask)}; it must have shape ({n},) and hold a True."
+                f"reset_mask is {shown(mask)}; it must have shape ({n},) and contain a True."
             )
         by_world = mask.reshape(self._n_worlds, -1)
         if (by_world.any(axis=1) != by_world.all(axis=1)).any():
-            raise ValueError("reset_mask names some ants of a world alone; name all or none of it.")
+            raise ValueError("reset_mask has only some ants of a world; give all or none of them.")
         if self._over is None and not mask.all():
-            raise ResetNeeded("no episode is under way; call reset() without a reset_mask first.")
+            raise ResetNeeded("no episode has begun; call reset() without a reset_mask first.")
         return mask
 
     def step(
         self, actions: Any
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """Let all ants act, integers 0 to 4, (num_envs,).
+        """Take the actions of all ants, integers 0 to 4 (num_envs,).
 
         Returns:
             Observations; rewards, float64; terminated and truncated, bool (num_envs,); infos.
 
         Raises:
-            ResetNeeded: No episode has begun; or one has ended, and autoreset_mode is "Disabled".
-            InvalidAction: There are not as many actions, or one of them is none.
+            ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
+            InvalidAction: The number of actions is wrong, or an action does not exist.
         """
         if self._over is None:
-            raise ResetNeeded("no episode is under way; call reset() before step().")
+            raise ResetNeeded("no episode has begun; call reset() before step().")
         ants, mode = self._ants, self.autoreset_mode
         if mode is AutoresetMode.DISABLED and self._over.any():
             number = self._over.argmax() * (self.num_envs // self._n_worlds)
@@ -265,7 +267,6 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         return ants.shown.show(facts["state"]), rewards, terminated, truncated, infos
 
     def _infos(self, facts: dict[str, np.ndarray], have: np.ndarray) -> dict[str, Any]:
-        """The infos of the environments that `have` them, bool (num_envs,); 0 for the others."""
         infos: dict[str, Any] = dict(facts)
         if not have.all():
             infos = {
@@ -274,16 +275,16 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         return infos | {f"_{name}": have.copy() for name in facts}
 
     def render(self) -> tuple[Any, ...] | None:
-        """A picture or a text map of each world, see `render_mode`; None without one."""
+        """Return a picture or a text map of each world, by `render_mode`, or None."""
         if self.render_mode is None:
             return None
         if self._over is None:
-            raise ResetNeeded("no episode is under way; call reset() before render().")
+            raise ResetNeeded("no episode has begun; call reset() before render().")
         return tuple(map(self._ants.draw, range(self._n_worlds)))
 
 
 def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
-    """The seed of each of n worlds, None for those that go on, as Gymnasium counts them."""
+    """Return a seed or None for each of n worlds, as Gymnasium does."""
     if seed is None:
         return [None] * n
     if isinstance(seed, (int, np.integer)):
@@ -294,8 +295,8 @@ def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
         if one is None:
             continue
         if not isinstance(one, (int, np.integer)):
-            raise ValueError(f"a seed is {shown(one)}; it must be a whole number from 0 on.")
-        seeding.np_random(int(one))  # says what Gymnasium says of negative ones
+            raise ValueError(f"a seed is {shown(one)}; it must be a whole number, at least 0.")
+        seeding.np_random(int(one))  # raises Gymnasium's error for negative seeds
     return [None if one is None else int(one) for one in seed]
 
 

@@ -1,7 +1,7 @@
-"""Files: written whole or not at all, and read with limits.
+"""Atomic writing of files, and reading with limits on their size.
 
-All functions raise an AntsError that names the file if it cannot be written or read. `archives` has
-arrays with the facts about them (.npz), `results` folders of results.
+All functions raise an AntsError that names the file if it cannot be written or read. `archives`
+stores arrays with metadata (.npz), and `results` manages folders of results.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ else:
     import tomli as tomllib  # noqa: F401
 
 PathLike = str | os.PathLike[str]
-_ABANDONED = 3600.0  # seconds after which an unfinished file is that of a process that was killed
+_ABANDONED = 3600.0  # age in seconds at which an unfinished file must be from a killed process
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
-    """Write a file so that readers see the old content or all of the new one, never a part.
+    """Write a file so that readers see either the old content or the complete new content.
 
-    An existing file is replaced, a symbolic link followed; `writer` is called with a binary file,
-    and its own exceptions pass through.
+    Replaces an existing file and follows symbolic links. Calls `writer` with a binary file and lets
+    its exceptions pass through.
     """
     with writing(path):
         target = _target_of(path)
@@ -53,12 +53,12 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> No
 
 @contextmanager
 def unfinished(target: Path) -> Iterator[Path]:
-    """Yield a free path in the target's folder, to be moved to the target when complete.
+    """Yield a free path in the target's folder; the caller moves a complete file to the target.
 
-    What is still there at the end is removed; after a kill, when the target is next written an hour
-    or more later.
+    A file or folder that is still at this path is removed at the end. If the process is killed, a
+    later write to the same target removes it, at least an hour later.
     """
-    # A hash, because the name itself can already have the greatest length that is allowed.
+    # A hash, because the name itself can already have the greatest length allowed.
     name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
     for left in target.parent.glob(f".{name}.*.tmp"):
         with suppress(OSError):
@@ -80,10 +80,10 @@ def _remove(path: Path) -> None:
 
 
 def check_writable_file(path: PathLike) -> Path:
-    """Check before long work that `write_atomically` can write a file; return its path.
+    """Return the path, after a check that `write_atomically` can write it, before long work.
 
-    Nothing is written. The folder may be missing if it can be made, unless the path is a link.
-    Folders, devices and pipes are refused.
+    Creates nothing. The folder may be missing if it can be created, unless the path is a link.
+    Raises AntsError also for folders, devices and pipes.
     """
     with writing(path):
         target = _target_of(path)
@@ -95,12 +95,12 @@ def check_writable_file(path: PathLike) -> Path:
 
 
 def write_text(path: PathLike, text: str) -> None:
-    """Write text as UTF-8, line ends unchanged."""
+    """Write text as UTF-8, with its line ends unchanged."""
     write_atomically(path, lambda file: file.write(text.encode("utf-8")))
 
 
 def to_json(value: Any, indent: int | None = None) -> str:
-    """Return the JSON text of a value, which may hold NumPy scalars and arrays, and paths."""
+    """Return the JSON text of a value, which may contain NumPy scalars, arrays and paths."""
     return json.dumps(value, indent=indent, ensure_ascii=False, default=_plain)
 
 
@@ -109,14 +109,14 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, os.PathLike):
         return os.fspath(value)
-    raise TypeError(f"{type(value).__name__} has no form in JSON")
+    raise TypeError(f"JSON cannot represent {type(value).__name__}")
 
 
 def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> None:
-    """Write rows, numbers and text by column, as comma-separated values with a header.
+    """Write rows, which map columns to numbers or text, as comma-separated values with a header.
 
-    Rows are read one by one. Floats read back exactly; None, NaN and missing keys are empty fields.
-    ValueError if a row has a key that is not a column.
+    Takes rows one by one. Floats are written exactly; None, NaN and missing keys as empty fields.
+    Raises ValueError if a row has a key that is not a column.
     """
 
     def write(file: BinaryIO) -> None:
@@ -132,22 +132,22 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
 
 @contextmanager
 def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
-    """Open a regular file of at most `most` bytes to read from.
+    """Yield a regular file of at most `most` bytes, open for reading.
 
-    Pipes and devices are refused: a pipe could wait forever, and a device has no end.
+    Raises AntsError for pipes, which could block forever, and for devices, which have no end.
     """
     expect("path", path, str, os.PathLike)
     try:
         if "\0" in os.fspath(path):
             raise OSError("it contains a null character")
-        # Without O_NONBLOCK, opening a pipe would wait for somebody who writes to it.
+        # Without O_NONBLOCK, opening a pipe would wait for a writer.
         no_wait = getattr(os, "O_NONBLOCK", 0)
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise OSError("it is a device or a pipe")
             if status.st_size > most:
-                raise OSError(f"it has {status.st_size} bytes, and {most} are allowed")
+                raise OSError(f"it has {status.st_size} bytes, and at most {most} are allowed")
             yield file
     except (OSError, UnicodeEncodeError) as error:
         raise AntsError(
@@ -156,17 +156,17 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
 
 
 def read_text(path: PathLike, most: int = 1 << 26) -> str:
-    """Return the text of a UTF-8 file of at most `most` bytes, with line feeds as line ends."""
+    """Return the text of a UTF-8 file of at most `most` bytes; all its line ends become "\\n"."""
     with opened(path, most) as file:
         content = file.read(os.fstat(file.fileno()).st_size)
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeError as error:
-        raise AntsError(f"{named(path)} is not text in UTF-8; name another file.") from error
+        raise AntsError(f"{named(path)} is not UTF-8 text; name another file.") from error
 
 
 def read_csv(path: PathLike) -> list[dict[str, Any]]:
-    """Return the rows of a file of `write_csv`: numbers as float, empty fields as None."""
+    """Return the rows of a file that `write_csv` wrote: numbers as float, empty fields as None."""
     try:
         header, *lines = csv.reader(io.StringIO(read_text(path, 1 << 30)))
         rows = [zip(header, line, strict=True) for line in lines if line]
@@ -178,15 +178,15 @@ def read_csv(path: PathLike) -> list[dict[str, Any]]:
 
 
 def smallest(array: np.ndarray) -> np.ndarray:
-    """Return integers in the smallest type that holds them."""
+    """Return integers as an array of the smallest integer type that can hold them."""
     low, high = int(array.min(initial=0)), int(array.max(initial=0))
     return array.astype(np.promote_types(np.min_scalar_type(low), np.min_scalar_type(high)))
 
 
 def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Path:
-    """Make a folder if it is missing, check that files can be written to it, and return its path.
+    """Return the path of a writable folder, which is created if it is missing.
 
-    The message names `chosen` instead: the folder above it that a user chose.
+    Messages name `chosen`, for example the parent folder that the user chose, instead of the path.
     """
     folder = Path(path)
     with writing(chosen or path):
@@ -198,19 +198,19 @@ def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Pat
 
 
 def check_room(folder: PathLike, needed: int) -> None:
-    """Check before long work that the disk of a folder has `needed` bytes free."""
+    """Check that the disk of a folder has `needed` bytes free, before long work."""
     with writing(folder):
         free = shutil.disk_usage(folder).free
     if needed > free:
         raise AntsError(
             f"this needs {needed / 1e9:.3f} GB on the disk of {named(folder)}, and "
-            f"{free / 1e9:.3f} GB are free; make room there, ask for less, or choose another place."
+            f"{free / 1e9:.3f} GB are free; free some space, write less, or choose another place."
         )
 
 
 @contextmanager
 def writing(path: PathLike) -> Iterator[None]:
-    """Turn errors of the operating system into an AntsError that names the file or folder."""
+    """Yield once, and turn errors of the operating system into an AntsError with the path."""
     try:
         yield
     except (OSError, UnicodeError) as error:
@@ -220,7 +220,7 @@ def writing(path: PathLike) -> Iterator[None]:
 
 
 def _target_of(path: PathLike) -> Path:
-    """Return the regular file that a path names, links followed; it need not exist."""
+    """Return the file at the end of all links; raise AntsError if it exists and is not regular."""
     expect("path", path, str, os.PathLike)
     if "\0" in os.fspath(path):
         raise OSError("it contains a null character")
@@ -232,18 +232,17 @@ def _target_of(path: PathLike) -> Path:
 
 
 def _try_to_write(folder: Path) -> None:
-    """Write to a folder and leave nothing there; root passes permission bits, a full disk not."""
+    """Write a temporary file to a folder: permission bits do not show a full disk, or bind root."""
     with tempfile.TemporaryFile(dir=folder) as file:
         file.write(bytes(4096))
 
 
 def named(path: PathLike) -> str:
-    """Return a path as messages name it."""
+    """Return a path as messages show it."""
     return shown(str(path), 400)
 
 
 def _reason(error: Exception) -> str:
-    """Return a reason in lower case, without the path and the number that OSError adds."""
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text[:1].lower() + text[1:]
 

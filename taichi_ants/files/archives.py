@@ -1,4 +1,4 @@
-"""Archives of arrays (.npz) with a checksum, and with facts about the arrays as JSON."""
+"""Archives of arrays (.npz) with a checksum and JSON metadata."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ import numpy.typing as npt
 from taichi_ants import files
 from taichi_ants.errors import AntsError, shown
 
-MOST_BYTES = 1 << 36  # of a file, unpacked
-_CHECKSUM = "checksum"  # the array that holds the checksum of all others
-_COMPRESSION = 2  # NumPy's level, 6, takes five times as long to save a tenth of the bytes
+MOST_BYTES = 1 << 36  # the largest unpacked size of a file
+_CHECKSUM = "checksum"  # the array with the checksum of all other arrays
+_COMPRESSION = 2  # NumPy's level, 6, takes five times as long and saves a tenth of the bytes
 
 Arrays = dict[str, np.ndarray]
 
@@ -27,7 +27,7 @@ Arrays = dict[str, np.ndarray]
 def write(path: files.PathLike, arrays: Mapping[str, npt.ArrayLike], compress: bool = True) -> None:
     """Write named arrays and their checksum; equal arrays give equal bytes.
 
-    TypeError if an array holds Python objects.
+    Raises TypeError if an array holds Python objects.
     """
     content = {name: np.asarray(array) for name, array in arrays.items()}
     content[_CHECKSUM] = np.array(_checksum(content))
@@ -48,10 +48,13 @@ def read(
     most: int = MOST_BYTES,
     foreign: bool = False,
 ) -> Arrays:
-    """Read all arrays of an .npz file, without executing anything that it holds.
+    """Return all arrays of an .npz file, without executing anything in it.
 
-    Its bytes can be given as `content`, then `path` is its name in messages. File and arrays may
-    have `most` bytes each. If it is `foreign`, it needs no checksum.
+    Args:
+        path: The file, or its name in messages if `content` is given.
+        content: The bytes of the file.
+        most: The largest number of bytes of the file, and of its unpacked arrays.
+        foreign: Whether to accept a file without a checksum, from other software.
     """
     source = files.opened(path, most) if content is None else nullcontext(io.BytesIO(content))
     name = files.named(path)
@@ -62,42 +65,42 @@ def read(
                 size = sum(member.file_size for member in members)
                 if size > most:
                     raise AntsError(
-                        f"{name} unpacks to {size} bytes, and {most} are allowed; name another "
-                        "file."
+                        f"{name} unpacks to {size} bytes, and at most {most} are allowed; name "
+                        "another file."
                     )
                 arrays = {one.filename[:-4]: _array(archive, one) for one in members}
             written = arrays.pop(_CHECKSUM, None)
             if not (foreign if written is None else str(written) == _checksum(arrays)):
-                raise ValueError("the checksum is missing, or another one")
+                raise ValueError("the checksum is missing or differs")
             return arrays
         except (AntsError, OSError):
             raise
         except MemoryError as error:
             raise AntsError(
-                f"{name} takes more memory than there is; name a smaller file."
+                f"{name} needs more memory than is available; name a smaller file."
             ) from error
-        except Exception as error:  # zipfile, zlib, struct, tokenize ... fail in many ways
+        except Exception as error:  # zipfile, zlib, struct and tokenize raise many kinds
             raise AntsError(
-                f"{name} is damaged, or not an .npz file of this version; write it again or name "
+                f"{name} is damaged, or not an .npz file of this version; write it again, or name "
                 "another file."
             ) from error
 
 
 def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> np.ndarray:
-    """Return an array, read to the end of its member, where zipfile compares the CRC-32."""
-    # Other kinds of compression need memory that no file declares.
+    """Return an array; reads to the end of its member, where zipfile checks the CRC-32."""
+    # Other compressions can need memory that the file does not declare.
     is_known = member.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
     if not is_known or not member.filename.endswith(".npy"):
-        raise ValueError("it is not an array as NumPy writes one")
+        raise ValueError("it is not an array that NumPy wrote")
     with archive.open(member) as file:
         array = np.lib.format.read_array(file, allow_pickle=False)
         if file.read(1):
-            raise ValueError("an array is longer than it declares")
+            raise ValueError("an array is longer than its header declares")
     return array
 
 
 def _checksum(arrays: Arrays) -> str:
-    """Return the SHA-256 of the names, types, shapes and contents of arrays, hexadecimal."""
+    """Return the hexadecimal SHA-256 of the names, types, shapes and contents of arrays."""
     digest = hashlib.sha256()
     for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
@@ -107,14 +110,14 @@ def _checksum(arrays: Arrays) -> str:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of .npz file: arrays, and facts about them as JSON.
+    """A kind of .npz file: arrays, and metadata ("facts") as JSON.
 
     Attributes:
-        name: The name of its content, such as "colony".
-        version: The version of its format; files of other versions are refused.
-        writer: The function that writes it, for messages.
-        most, foreign: As of `read`.
-        most_lists: The largest number of lists in the facts.
+        name: The name of the content, for example "colony".
+        version: The version of the format; reading refuses all other versions.
+        writer: The function that writes such files, for messages.
+        most, foreign: See `read`.
+        most_lists: The largest number of lists in the metadata.
     """
 
     name: str
@@ -139,12 +142,12 @@ class Kind:
     def reading(
         self, path: files.PathLike, content: bytes | None = None
     ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
-        """Read a file of this kind and version, and build an object from it, as `building` does."""
+        """Yield the arrays and facts of a file of this kind and version, within `building`."""
         arrays = read(path, content, self.most, self.foreign)
         try:
             text = arrays.pop("facts").item()
             text = text.decode() if isinstance(text, bytes) else text
-            if text.count("[") > self.most_lists:  # each takes much time and memory
+            if text.count("[") > self.most_lists:  # because lists take much time and memory
                 raise ValueError("too many lists")
             facts = json.loads(text)
             kind, version = facts["kind"], facts["version"]
@@ -152,26 +155,26 @@ class Kind:
             kind = version = None
         if kind != self.name:
             raise AntsError(
-                f"{files.named(path)} holds no {self.name} of this version; name a file that "
-                f"{self.writer} wrote."
+                f"{files.named(path)} does not contain a {self.name} of this version; name a file "
+                f"that {self.writer} wrote."
             )
         if version != self.version:
             raise AntsError(
-                f"{files.named(path)} holds a {self.name} in version {shown(version)} of its "
-                f"format; only version {self.version} can be read, so make the file again."
+                f"{files.named(path)} contains a {self.name} in version {shown(version)} of its "
+                f"format; only version {self.version} can be read, so create the file again."
             )
         with self.building(path):
             yield arrays, facts
 
     @contextmanager
     def building(self, path: files.PathLike) -> Iterator[None]:
-        """Turn all errors that occur while an object is built from a file into AntsErrors."""
+        """Yield once, and turn errors while an object is built from a file into an AntsError."""
         what = f"the {self.name} in {files.named(path)}"
         try:
             yield
         except AntsError as error:
             raise AntsError(f"{what} cannot be used: {error}") from error
-        except Exception as error:  # wrong numbers fail in many ways
+        except Exception as error:  # wrong numbers raise many kinds of exceptions
             text = " ".join(f"{type(error).__name__}: {error}".rstrip(".").split())
             raise AntsError(
                 f"{what} is damaged ({text}); name a file that {self.writer} wrote."

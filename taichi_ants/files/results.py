@@ -1,7 +1,7 @@
-"""A folder of results: finished once, never mixed with others, never lost.
+"""Folders of results, which never mix results of different settings.
 
-Work lies in the subfolder `unfinished`: blocks, ready results, a manifest with the settings.
-At the end the results move up, the manifest last: then the work is finished.
+Work in progress is in the subfolder `unfinished`: blocks, ready results, and a manifest with the
+settings. At the end the results move up. The manifest moves last, which marks the work as finished.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from taichi_ants.errors import AntsError
 
 MANIFEST = "manifest.json"
 REPORT = "report.txt"  # the text that commands print
-PAGE = "report.html"  # the whole result
+PAGE = "report.html"  # the whole result as a page
 
 
 class ResultFolder:
@@ -28,8 +28,8 @@ class ResultFolder:
 
     Args:
         path: The folder; it need not exist.
-        settings: All that determines the results, as `files.to_json` knows it.
-        leading: Settings from which others follow: where these differ, only they are named.
+        settings: Everything that determines the results, in types that `files.to_json` accepts.
+        leading: Settings that determine others; if they differ, messages name only these.
     """
 
     def __init__(
@@ -43,9 +43,9 @@ class ResultFolder:
         self._blocks, self._ready = self._unfinished / "blocks", self._unfinished / "ready"
 
     def is_finished(self) -> bool:
-        """Return whether the folder holds finished results of these settings.
+        """Return whether the folder contains finished results of these settings.
 
-        AntsError if it holds anything else than these, or the work on them.
+        Raises AntsError if it contains anything other than these results or work on them.
         """
         for place, what in ((self._unfinished, "unfinished work"), (self.path, "results")):
             if not (place / MANIFEST).exists():
@@ -56,45 +56,45 @@ class ResultFolder:
             different = [key for key in different if key in self._leading] or different
             if different:
                 raise AntsError(
-                    f"{str(self.path)!r} holds {what} of other settings ({', '.join(different)} "
+                    f"{str(self.path)!r} contains {what} of other settings ({', '.join(different)} "
                     "differ); choose another --out, or give --force to replace them."
                 )
             return place == self.path
         if self.path.is_dir() and any(item != self._unfinished for item in self.path.iterdir()):
             raise AntsError(
-                f"{str(self.path)!r} holds files, but no finished results; "
+                f"{str(self.path)!r} contains files, but no finished results; "
                 "choose another --out, or give --force to write among them."
             )
         return False
 
     def check(self, may_lack: str | None = None) -> None:
-        """Check that no file of finished results is altered, or missing except `may_lack`."""
+        """Check that no file of finished results is altered or missing, except `may_lack`."""
         for name, checksum in self._listed().items():
             path = self.path / name
             if name == may_lack and not path.exists():
                 continue
             if not path.is_file() or checksum_of(path) != checksum:
                 raise AntsError(
-                    f"{str(path)!r}, a part of the results, is missing or was altered since they "
+                    f"{str(path)!r}, a part of the results, is missing or has changed since they "
                     "were finished; restore it, or give --force to run everything again."
                 )
 
     @contextmanager
     def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
-        """Provide a folder for blocks of work, which survive an interruption, and one for results.
+        """Yield a folder for blocks of work, which survive an interruption, and one for results.
 
-        With `replace` the work starts over, whatever the folder holds; old results stay until the
-        new ones are complete. Two processes can do the same work at once: blocks appear whole,
-        each process has its own folder for results. AntsError if the folder cannot be written, or
+        With `replace`, the work starts over; old results stay until the new ones are complete. Two
+        processes can do the same work at once, because blocks are written atomically and each
+        process has its own folder for results. Raises AntsError if the folder cannot be written or
         another process has finished the work.
         """
         self._listed()  # if the manifest is damaged, this raises before the work
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
         try:
-            # Without a manifest, nobody knows the settings of the blocks.
+            # Without a manifest, the settings of the blocks are unknown.
             if replace or not (self._unfinished / MANIFEST).exists():
                 self._clear()
-            for folder in (self._blocks, self._ready):  # in which a kill may leave a file
+            for folder in (self._blocks, self._ready):
                 files.check_writable_folder(folder, self.path)
             self.seconds_before = self._seconds_so_far()
             with tempfile.TemporaryDirectory(dir=self._ready) as name:
@@ -115,13 +115,13 @@ class ResultFolder:
             if not any(self._blocks.rglob("*.npz")):
                 self._clear()
             for folder in new:
-                with suppress(OSError, ValueError):  # it holds something, or was never made
+                with suppress(OSError, ValueError):  # it is not empty, or was never created
                     folder.rmdir()
 
     def publish(self, ready: Path, manifest: Mapping[str, Any]) -> None:
         """Move ready results into the folder, then a manifest with the settings.
 
-        Files that an older manifest lists are removed; others stay unless they have the same name.
+        Removes the files that an older manifest lists, and replaces others of the same name.
         """
         paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
         checksums = {path.as_posix(): checksum_of(ready / path) for path in paths}
@@ -129,37 +129,37 @@ class ResultFolder:
             file = self.path / name
             if file.is_file() and file.resolve().is_relative_to(self.path.resolve()):
                 file.unlink()
-                with suppress(OSError):  # the folder holds other files
+                with suppress(OSError):  # the folder contains other files
                     file.parent.rmdir()
         for path in paths:
             (self.path / path).parent.mkdir(parents=True, exist_ok=True)
             (ready / path).replace(self.path / path)
         contents = {**manifest, "files": checksums, "settings": self._settings}
         _write_manifest(contents, ready).replace(self.path / MANIFEST)
-        self._clear()  # now it is finished
+        self._clear()
 
     def add(self, name: str, text: str) -> None:
-        """Add a file to finished results, or write it again."""
+        """Add a file to finished results, or replace it."""
         self._ready.mkdir(parents=True, exist_ok=True)
         with files.writing(self.path), tempfile.TemporaryDirectory(dir=self._ready) as place:
             file = Path(place, name)
             files.write_text(file, text)
             manifest = read_manifest(self.path)
             manifest["files"][name] = checksum_of(file)
-            # The manifest first: the file can be missing, but never differ from the manifest.
+            # The manifest first, so that the file can be missing but never differ from it.
             _write_manifest(manifest, Path(place)).replace(self.path / MANIFEST)
             file.replace(self.path / name)
         self.tidy()
 
     def tidy(self) -> None:
-        """Remove what is left by a process that was killed after it had finished."""
+        """Remove the files that a process left if it was killed after it had finished the work."""
         if not (self._unfinished / MANIFEST).exists():
             self._clear()
 
     def _seconds_so_far(self) -> float:
-        """Return the time of all processes that have worked here, even if they were killed.
+        """Return the time that all processes have worked here, including killed ones.
 
-        Each begins by writing the manifest, with the time before it, and ends with its last block.
+        A process starts by writing a manifest with the time before, and ends with its last block.
         """
         manifest = self._unfinished / MANIFEST
         if not manifest.exists():
@@ -169,7 +169,7 @@ class ResultFolder:
         return read_manifest(self._unfinished)["seconds"] + max([started, *times]) - started
 
     def _clear(self) -> None:
-        """Remove our own files in `unfinished`, and the folder if nothing else is in it."""
+        """Remove the files of this class in `unfinished`, and the folder if it is then empty."""
         if not self._unfinished.is_dir():
             return
         (self._unfinished / MANIFEST).unlink(missing_ok=True)
@@ -179,7 +179,6 @@ class ResultFolder:
             self._unfinished.rmdir()
 
     def _listed(self) -> dict[str, str]:
-        """Return the files of finished results, with their checksums."""
         return read_manifest(self.path)["files"] if (self.path / MANIFEST).exists() else {}
 
 
@@ -192,8 +191,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         return manifest
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise AntsError(
-            f"{str(folder / MANIFEST)!r} is damaged or of another version, so it is not known "
-            "which files here are results; choose another --out."
+            f"{str(folder / MANIFEST)!r} is damaged or of another version, so the results among "
+            "these files are unknown; choose another --out."
         ) from error
 
 
@@ -210,7 +209,7 @@ def _checksum_of_manifest(manifest: Mapping[str, Any]) -> str:
 
 
 def checksum_of(path: Path) -> str:
-    """Return the SHA-256 of a file, hexadecimal."""
+    """Return the hexadecimal SHA-256 of a file."""
     digest = hashlib.sha256()
     with files.opened(path) as file:
         while chunk := file.read(1 << 20):

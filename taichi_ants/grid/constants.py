@@ -13,7 +13,7 @@ HEADING_STEPS: tuple[tuple[int, int, int], ...] = (
 )
 N_HEADINGS = 6
 
-# What the random streams of a seed are for. Streams of different purposes never meet.
+# The purposes of the random streams of a seed; streams of different purposes never overlap.
 STREAM_ANT = 0  # number: the ant
 STREAM_ROLLOUT = 1  # number: the greedy rollout
 STREAM_START_CELL = 2  # number: the cell, in lexicographic order of (x, y, z)
@@ -23,4 +23,4 @@ STREAM_QUEEN = 5  # number: 0
 STREAM_BRIDGE = 6  # number: the colony at the double bridge of `baselines.goss`
 STREAM_TOUR = 7  # number: colony * 2**32 + the ant of `baselines.ant_system`
 STREAM_FORAGER = 8  # number: colony * 2**32 + the ant of `baselines.utility`
-STREAM_INTERVENTION = 9  # number: 0; what is drawn for ants that an intervention adds
+STREAM_INTERVENTION = 9  # number: 0; for ants that an intervention adds

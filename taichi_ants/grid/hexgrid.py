@@ -16,17 +16,16 @@ import numpy as np
 from taichi_ants.errors import AntsError, array_of
 from taichi_ants.grid.constants import HEADING_STEPS
 
-# A grid's arrays are allocated whole; four bytes for each of this many cells are one gibibyte.
+# Arrays cover the whole grid; at four bytes a cell, this many cells take one gibibyte.
 MAX_ARRAY_CELLS = 1 << 28
 
-# Coordinates beyond this are in no world, and their differences would leave 64 bits.
+# No world has larger coordinates, and differences of larger ones could overflow 64 bits.
 FAR = 1 << 40
 
 _SQRT_3 = math.sqrt(3.0)
 
 
 def _cells(values: object) -> np.ndarray:
-    """Cube coordinates in any form as int64 (..., 3)."""
     array = array_of("cells", values)
     if array.dtype.kind not in "iu" or array.ndim == 0 or array.shape[-1] != 3:
         raise AntsError(
@@ -34,34 +33,34 @@ def _cells(values: object) -> np.ndarray:
             "shape (..., 3)."
         )
     if (far := (array > FAR) | (array < -FAR)).any():
-        raise AntsError(f"a coordinate is {array[far][0]}; it must be at most 2**40 either way.")
+        raise AntsError(f"a coordinate is {array[far][0]}; it must be between -2**40 and 2**40.")
     return array.astype(np.int64)
 
 
 def normal_form(cells: object) -> np.ndarray:
-    """The normal form of cube coordinates (..., 3): the shift whose minimum is 0. int64."""
+    """Return cube coordinates shifted so that their minimum is 0, int64 (..., 3)."""
     given = _cells(cells)
     return given - given.min(axis=-1, keepdims=True)
 
 
 def axial(cells: object) -> np.ndarray:
-    """Axial coordinates (..., 2) = (q, r) of cube coordinates (..., 3) in any form. int64."""
+    """Return the axial coordinates (q, r), int64 (..., 2), of cube coordinates (..., 3)."""
     given = _cells(cells)
     return given[..., :2] - given[..., 2:]
 
 
 def cube(axials: np.ndarray) -> np.ndarray:
-    """The normal form (..., 3) of axial coordinates (..., 2) = (q, r), whole numbers. int64."""
+    """Return the normal form, int64 (..., 3), of integer axial coordinates (..., 2) = (q, r)."""
     qr = np.asarray(axials, dtype=np.int64)
     low = np.minimum(qr.min(axis=-1, keepdims=True), 0)
     return np.concatenate([qr - low, -low], axis=-1)
 
 
 def centre_of(cells: object, size: float) -> np.ndarray:
-    """Pixel coordinates (x to the right, y downwards) of the centres of flat-topped hexagons.
+    """Return the pixel coordinates of the centres of flat-topped hexagons, float64 (..., 2).
 
-    `size` is from a hexagon's centre to its corners. The origin lies at (0, 0), heading 0 points
-    up, heading 1 up and to the right. float64 (..., 2).
+    x points right and y points down. `size` is the distance from a centre to a corner. The origin
+    is at (0, 0), heading 0 points up, and heading 1 up and to the right.
     """
     qr = axial(cells)
     q, r = qr[..., 0], qr[..., 1]
@@ -72,9 +71,9 @@ def centre_of(cells: object, size: float) -> np.ndarray:
 class AxialGrid:
     """The cells of a world of `ranges` (X, Y, Z) in a flat array.
 
-    The array holds the axial bounding box with a border of one void cell, row by row (r), so that a
-    step to a neighbour is an addition and needs no bounds check: index = (r + Z) * width + (q + Z).
-    AntsError if it would have more than `MAX_ARRAY_CELLS` cells.
+    The array covers the axial bounding box and a border of void cells, row by row (r). A step to a
+    neighbour is therefore an addition without a bounds check: index = (r + Z) * width + (q + Z).
+    Raises AntsError if the array would have more than `MAX_ARRAY_CELLS` cells.
     """
 
     ranges: tuple[int, int, int]
@@ -82,13 +81,13 @@ class AxialGrid:
     def __post_init__(self) -> None:
         if self.size > MAX_ARRAY_CELLS:
             raise AntsError(
-                f"ranges are {self.ranges}; a world of them needs arrays of {self.size} cells, "
+                f"ranges are {self.ranges}; such a world needs arrays of {self.size} cells, and "
                 f"at most {MAX_ARRAY_CELLS} are allowed, so choose smaller ranges."
             )
 
     @property
     def width(self) -> int:
-        """Cells of a row: the values of q, and a void cell at each end."""
+        """Number of cells in a row: the values of q, and a void cell at each end."""
         return self.ranges[0] + self.ranges[2] + 1
 
     @property
@@ -109,7 +108,7 @@ class AxialGrid:
 
     @cached_property
     def offsets(self) -> np.ndarray:
-        """int32 (6,), read-only: what a step at each heading adds to a flat index."""
+        """Change of the flat index in a step, by heading: int32 (6,), read-only."""
         steps = axial(HEADING_STEPS)
         offsets = (steps[:, 0] + steps[:, 1] * self.width).astype(np.int32)
         offsets.setflags(write=False)
@@ -117,7 +116,7 @@ class AxialGrid:
 
     @cached_property
     def exists(self) -> np.ndarray:
-        """bool (size,), read-only: whether a flat index belongs to a cell of the world."""
+        """Whether a flat index belongs to a cell of the world: bool (size,), read-only."""
         x, y, z = self.ranges
         q, r = self.axes()
         # In normal form x = max(0, q, q - r), y = max(0, r, r - q), z = max(0, -q, -r).
@@ -131,14 +130,14 @@ class AxialGrid:
         return inside.reshape(-1)
 
     def axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """The array's axes in two dimensions: q as int32 (1, width), r as int32 (height, 1)."""
+        """Return q, int32 (1, width), and r, int32 (height, 1), of the array in two dimensions."""
         z = self.ranges[2]
         q = np.arange(-z, self.width - z, dtype=np.int32)
         r = np.arange(-z, self.height - z, dtype=np.int32)
         return q[None, :], r[:, None]
 
     def index(self, cells: object) -> np.ndarray:
-        """Flat indices, int32 (...), of cells (..., 3) in any form, in the world or its border."""
+        """Return the flat indices, int32 (...), of cells (..., 3) of the world or its border."""
         qr = axial(cells) + self.ranges[2]
         beyond = ((qr < 0) | (qr >= (self.width, self.height))).any(axis=-1)
         if beyond.any():
@@ -147,11 +146,11 @@ class AxialGrid:
         return (qr[..., 1] * self.width + qr[..., 0]).astype(np.int32)
 
     def cells(self, index: object) -> np.ndarray:
-        """Normal forms, int32 (..., 3), of flat indices (...)."""
+        """Return the normal forms, int32 (..., 3), of flat indices (...)."""
         flat = array_of("index", index)
         if flat.dtype.kind not in "iu" or ((flat < 0) | (flat >= self.size)).any():
             raise AntsError(f"flat indices must be whole numbers from 0 to {self.size - 1}.")
-        # int32 throughout: a world has up to MAX_ARRAY_CELLS cells, and millions are usual.
+        # int32 throughout saves memory: worlds often have millions of cells.
         r, q = np.divmod(flat.astype(np.int32), np.int32(self.width))
         r -= self.ranges[2]
         q -= self.ranges[2]
@@ -159,7 +158,7 @@ class AxialGrid:
         return np.stack([q - low, r - low, -low], axis=-1)
 
     def distances(self, cell: tuple[int, int, int]) -> np.ndarray:
-        """int32 (size,): steps to `cell` from every place of the array, void ones too."""
+        """Return the steps to `cell` from each flat index, void cells included: int32 (size,)."""
         cell_q, cell_r = axial(cell).astype(np.int32)
         q, r = self.axes()
         q, r = q - cell_q, r - cell_r
@@ -169,7 +168,7 @@ class AxialGrid:
         return high.reshape(-1)
 
     def number(self, cells: object) -> np.ndarray:
-        """The places, int64 (...), of cells (..., 3) in the lexicographic order of the world."""
+        """Return the ranks, int64 (...), of cells (..., 3) in the lexicographic order of cells."""
         normal = normal_form(cells)
         _, y_range, z_range = self.ranges
         x, y, z = normal[..., 0], normal[..., 1], normal[..., 2]

@@ -1,4 +1,4 @@
-"""The learners: one file each, and policies that need no learning."""
+"""Learners, one file each, and policies that need no learning."""
 
 from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 from taichi_ants.learners.learner import Learner, Memory, td_learner

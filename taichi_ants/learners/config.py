@@ -1,4 +1,4 @@
-"""How an ant learns: the learner and its settings."""
+"""The configuration of a learner."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ if TYPE_CHECKING:
     import numpy as np
 
 Factor = Annotated[float, Is(above=0, most=1)]
-InitialValue = Annotated[float, Is(least=-1_000_000, most=1_000_000)]  # of an action
+InitialValue = Annotated[float, Is(least=-1_000_000, most=1_000_000)]
 
 
 @dataclass(frozen=True, init=False)
 class TrainingConfig(Settings, path="training"):
-    """The settings of one learner, each declared with its range and meaning.
+    """The learner and its settings, each declared with its range and meaning.
 
-    Bounds of a decay never raise a value: if `min_epsilon` is larger than `epsilon`, epsilon stays
-    as it is. An `initial_q` above what can be reached ("optimistic") makes ants try all actions.
-    `hyperparameters` are the learner's own, (name, number) pairs by name; given as a mapping, or as
-    keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. Those that are left out have
-    default values, see `taichi_ants.learners.get(name).hyperparameters()`. Training, not this
-    class, checks whether there is such a learner with these hyperparameters.
+    Lower bounds of a decay never raise a value: if `min_epsilon` is larger than `epsilon`, epsilon
+    does not change. If `initial_q` is larger than all possible returns ("optimistic"), ants try all
+    actions. `hyperparameters` are those of the learner, sorted (name, number) pairs. Give them as a
+    mapping or as keywords: `TrainingConfig("dyna_q", ..., planning_steps=5)`. All others have the
+    defaults of `taichi_ants.learners.get(name).hyperparameters()`. Training, not this class, checks
+    that the learner exists and has these hyperparameters.
     """
 
     learner: Annotated[str, Is("name of a learner")]
-    # Below this the step size is nothing in the 32 bits of an action value.
+    # Smaller step sizes could underflow to zero in float32.
     learning_rate: Annotated[float, Is("step size of the first episode", least=1e-37, most=1)]
     discount: Annotated[Share, Is("discount factor")]
     epsilon: Annotated[Share, Is("exploration rate of the first episode")]
@@ -45,7 +45,7 @@ class TrainingConfig(Settings, path="training"):
     ] = 0.0
     initial_q: Annotated[
         InitialValue,
-        Is("value of each action before learning; high ones make ants try every action"),
+        Is("value of each action before learning; high values make ants try every action"),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 
@@ -83,7 +83,7 @@ class TrainingConfig(Settings, path="training"):
 
     @property
     def least_epsilon(self) -> float:
-        """The epsilon at which decay ends: the smaller one of `min_epsilon` and `epsilon`."""
+        """The epsilon at which decay ends: the smaller of `min_epsilon` and `epsilon`."""
         return min(self.min_epsilon, self.epsilon)
 
     @property
@@ -92,7 +92,7 @@ class TrainingConfig(Settings, path="training"):
         return min(self.min_learning_rate, self.learning_rate)
 
     def _changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
-        """Besides: other names are hyperparameters; those of another learner are dropped."""
+        """Take other names as hyperparameters; drop those of the learner before."""
         own = [one.name for one in declared(TrainingConfig)]
         more = {name: value for name, value in changes.items() if name not in own}
         same = changes.get("learner", self.learner) == self.learner
@@ -101,29 +101,29 @@ class TrainingConfig(Settings, path="training"):
         return replace(changed, hyperparameters=tuple({**kept, **more}.items()))
 
     def next_learning_rate(self, rate: float) -> float:
-        """The learning rate of the episode that follows one with this learning rate."""
+        """Return the learning rate of the episode after one with learning rate `rate`."""
         return max(self.least_learning_rate, rate * self.learning_rate_decay)
 
     def next_epsilon(self, epsilon: float) -> float:
-        """The epsilon of the episode that follows one with this epsilon."""
+        """Return the epsilon of the episode after one with this epsilon."""
         return max(self.least_epsilon, epsilon * self.epsilon_decay)
 
     @property
     def planning_steps(self) -> int:
-        """Updates from a model after each step: the hyperparameter of that name, or 0."""
+        """The hyperparameter of this name, or 0: updates from a model after each step."""
         return int(dict(self.hyperparameters).get("planning_steps", 0))
 
     def as_dict(self) -> dict[str, Any]:
-        """The settings as names and numbers, for files; `TrainingConfig(**facts)` reads them."""
+        """Return the settings as names and numbers; `TrainingConfig(**facts)` reads them."""
         return {**asdict(self), "hyperparameters": dict(self.hyperparameters)}
 
 
 @dataclass(frozen=True)
 class Hyperparameters(Settings, path="training"):
-    """Base of the hyperparameters of a learner; as such, none.
+    """Base of the hyperparameters of a learner; by itself, no hyperparameters.
 
-    Each field is declared as `Annotated[int, Is(...)]` or `Annotated[float, Is(...)]`, for kernels
-    i32 and f32.
+    Declare each field as `Annotated[int, Is(...)]` or `Annotated[float, Is(...)]`; in kernels it is
+    i32 or f32.
     """
 
     def __post_init__(self) -> None:
@@ -138,19 +138,19 @@ class Hyperparameters(Settings, path="training"):
 
 
 def update_weights(alpha: float, most: int) -> np.ndarray:
-    """Return by how much the mean of n TD errors moves a shared value: 1 - (1 - alpha)^n, by n.
+    """Return the weight of the mean of n TD errors in an update of a shared value, by n.
 
-    So far n updates in turn, each with learning rate alpha, go towards one target. Kernels and
-    reference take these float32 numbers (at most most + 1,) from here, because powers differ in the
-    last bit between libraries. The last number is that of all larger n as well.
+    The weight is 1 - (1 - alpha)^n, the effect of n successive updates with learning rate alpha
+    towards the same target. Kernels and reference both use these float32 numbers, at most `most` +
+    1, because powers differ in the last bit between libraries. Larger n have the last weight.
     """
     import numpy as np
 
     rate = np.float32(alpha)
     kept = 1.0 - np.float64(rate)
-    # A power below 2^-26 is lost when the weight is rounded.
+    # Rounding the weight to float32 drops a power below 2^-26.
     different = math.ceil(26 / -math.log2(kept)) if 0 < kept < 1 else 2
     weights = (1.0 - kept ** np.arange(min(most, max(2, different)) + 1)).astype(np.float32)
-    # In float64 1 - (1 - alpha) may differ from alpha by a rounding.
+    # In float64, 1 - (1 - alpha) can differ from alpha by a rounding error.
     weights[1:2] = rate
     return weights

@@ -1,4 +1,4 @@
-"""Double Q-learning (van Hasselt 2010): one table chooses the best action, the other values it."""
+"""Double Q-learning (van Hasselt 2010): one table selects the best action, the other rates it."""
 
 import taichi as ti
 
@@ -10,7 +10,7 @@ from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_wor
 
 @ti.func
 def learn(memory: ti.template(), at, step, rates, random_state):
-    """Update table A or B, by chance; the ant acts by their mean."""
+    """Update table A or B, drawn at random; the ant acts by their mean."""
     rng = advance(random_state)
     drawn = below(high_word(bits_of(rng)), 2)
     table = memory.n_states * ROW
@@ -34,5 +34,5 @@ DOUBLE_Q = Learner(
     "double_q",
     learn,
     memory=lambda settings, n_states: Memory(tables=2),
-    summary="Q-learning with two tables, which does not overrate the best action",
+    summary="Q-learning with two tables, which do not overestimate the best action",
 )

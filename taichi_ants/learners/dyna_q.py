@@ -1,4 +1,4 @@
-"""Dyna-Q (Sutton 1990): Q-learning, and updates from a model of what was seen last."""
+"""Dyna-Q (Sutton 1990): Q-learning with additional updates from a model of the world."""
 
 import taichi as ti
 
@@ -11,7 +11,7 @@ from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_wor
 
 @ti.func
 def update(memory: ti.template(), at, rates, pair, transition):
-    """Update a pair by its TD error, which is returned."""
+    """Update a pair and return its TD error."""
     error = model.error_of(memory, at, rates, pair, transition)
     memory.q[at.table + pair] = memory.q[at.table + pair] + rates.learning_rate * error
     return error
@@ -19,7 +19,7 @@ def update(memory: ti.template(), at, rates, pair, transition):
 
 @ti.func
 def learn(memory: ti.template(), at, step, rates, random_state):
-    """Q-learning from the step, then from pairs of the model that are drawn."""
+    """Update from the step, then from random pairs of the model."""
     pair = step.state * ROW + step.action
     transition = model.pack_transition(step.next_state, step.reward, step.terminated)
     error = update(memory, at, rates, pair, transition)

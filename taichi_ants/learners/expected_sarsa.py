@@ -8,12 +8,12 @@ from taichi_ants.task.rules.policy import best_value
 
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
-    """reward + discount * E Q(s', a') - Q(s, a) under the epsilon-greedy policy."""
+    """Return reward + discount * E Q(s', a') - Q(s, a) under the epsilon-greedy policy."""
     best = best_value(next_values)
     expected = best + epsilon * (next_values.sum() * ti.f32(0.2) - best)
     return reward + discount * expected - value
 
 
 EXPECTED_SARSA = td_learner(
-    "expected_sarsa", td_error, summary="on-policy, towards the mean over the next actions"
+    "expected_sarsa", td_error, summary="on-policy, bootstraps from the mean over next actions"
 )

@@ -1,4 +1,4 @@
-"""What a learner is: functions that update a table of action values, and the memory they need."""
+"""The class of learners: functions that update a table of action values, and their memory."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 
 @dataclass(frozen=True)
 class Memory:
-    """Numbers that a learner keeps for each run, besides the table that the ant acts by.
+    """The size of a learner's memory for each run, in addition to the table that the ant acts by.
 
-    Further `tables` of action values start as copies of that one; f32 `floats` and i32 `integers`
-    as 0.
+    Additional `tables` of action values start as copies of that table. The f32 `floats` and the i32
+    `integers` start as 0.
     """
 
     tables: int = 0
@@ -31,26 +31,25 @@ class Memory:
 
 @dataclass(frozen=True)
 class Learner:
-    """A tabular learner; `td_learner` makes one from a TD error alone.
+    """A tabular learner; `td_learner` builds one from a TD error alone.
 
     Attributes:
-        name: The name by which configurations call it.
+        name: The name that configurations use.
         learn: A `ti.func` (memory, at, step, rates, random_state) -> (TD error f32, random_state
-            u64) that is called after each step; see `taichi_ants.learners.memory` for the
-            arguments, the first of which is a `ti.template()`. It changes the memory of one run,
-            which begins at `at`.
-        begin: A `ti.func` (memory, at) that is called at the start of each episode, or None.
-        td_error: The TD error, if all ants of a world can share a table, see `td_learner`.
-        draws_next_action: The next action is drawn before the update and then taken (on-policy
-            learners); only then has a step one.
-        plans: The learner keeps `taichi_ants.learners.model` and has the hyperparameter
-            `planning_steps`; ants that share a table share the model, and td_error may not look at
-            the next action.
-        hyperparameters: Its own, besides the settings of all learners, all with default values.
+            u64), called after each step; see `taichi_ants.learners.memory` for the arguments, of
+            which `memory` is a `ti.template()`. It changes the memory of one run, at `at`.
+        begin: A `ti.func` (memory, at), called at the start of each episode, or None.
+        td_error: The TD error if ants can share a table, else None; see `td_learner`.
+        draws_next_action: Whether the next action is drawn before the update and then taken
+            (on-policy learners). Otherwise a step has no next action.
+        plans: Whether the learner has a model, `taichi_ants.learners.model`, and the hyperparameter
+            `planning_steps`. Ants that share a table share the model, and td_error must not use the
+            next action.
+        hyperparameters: The class of its hyperparameters, all with default values.
         memory: A function (hyperparameters, n_states) -> Memory.
-        cost: A function (hyperparameters) -> float: the time of a step of one ant, in that of
-            Q-learning. Launches of kernels are cut by it.
-        summary: One line for listings.
+        cost: A function (hyperparameters) -> float: the time of one step, relative to Q-learning.
+            It determines the length of kernel launches.
+        summary: A line for listings.
     """
 
     name: str
@@ -65,30 +64,31 @@ class Learner:
     summary: str = ""
 
     def settings(self, config: TrainingConfig) -> Hyperparameters:
-        """The hyperparameters of a configuration."""
+        """Return the hyperparameters of a configuration."""
         return self.hyperparameters(**dict(config.hyperparameters))
 
     def memory_for(self, config: TrainingConfig, n_states: int) -> Memory:
-        """The memory that it needs with a configuration and tables of n_states rows."""
+        """Return the memory for a configuration and tables of n_states rows."""
         return self.memory(self.settings(config), n_states)
 
 
 def td_learner(
     name: str, td_error: Any, draws_next_action: bool = False, summary: str = ""
 ) -> Learner:
-    """A learner that adds learning_rate * TD error to the value of the pair; ants can share it.
+    """Return a learner that adds learning_rate * TD error to the value of each pair.
+
+    Ants can share its table.
 
     Args:
         name, draws_next_action, summary: See `Learner`.
-        td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float:
-            the value of the state-action pair that is updated, the reward, the discount (0 where
-            the step terminated), the vector of the five action values of the next state, the next
-            action and the current epsilon; all f32 but next_action (i32), which is 0 where the step
-            terminated, and may be looked at only if it is drawn. The result is checked when the
-            learner is first used.
+        td_error: A `ti.func` (value, reward, discount, next_values, next_action, epsilon) -> float.
+            `value` is that of the state-action pair to update; `discount` is 0 if the step
+            terminated; `next_values` is the vector of the five action values of the next state.
+            `next_action` is i32, all others are f32; it is 0 if the step terminated, and allowed
+            only with `draws_next_action`. The first use of the learner checks the result.
     """
     check_td_error(name, td_error, draws_next_action)
-    from taichi_ants.learners.memory import learn_by  # Taichi starts to be imported
+    from taichi_ants.learners.memory import learn_by  # here, because it imports Taichi
 
     return Learner(
         name,
@@ -100,10 +100,10 @@ def td_learner(
 
 
 def check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:
-    """The names of the arguments of a `ti.func`, which are as many as are wanted."""
-    # Taichi's own mark; a plain function would be taken apart without its branches and loops.
+    """Return the names of a `ti.func`'s arguments; AntsError if their number is not as wanted."""
+    # Taichi's own attribute; it would compile a plain function without its branches and loops.
     if not getattr(function, "_is_taichi_function", False):
-        raise AntsError(f"{what} is no Taichi function; mark it @ti.func.")
+        raise AntsError(f"{what} is not a Taichi function; decorate it with @ti.func.")
     arguments = list(inspect.signature(function.func.func).parameters)
     if len(arguments) != len(wanted):
         listed = f"{', '.join(wanted[:-1])} and {wanted[-1]}"
@@ -114,13 +114,13 @@ def check_arguments(what: str, function: Any, wanted: list[str]) -> list[str]:
 def check_td_error(name: str, td_error: Any, draws_next_action: bool) -> None:
     wanted = ["value", "reward", "discount", "next_values", "next_action", "epsilon"]
     next_action = check_arguments(f"the TD error of {shown(name)}", td_error, wanted)[4]
-    # Some instructions load two variables at once.
+    # Some bytecode instructions load two variables at once.
     instructions = dis.get_instructions(td_error.func.func)
     loaded = [one.argval for one in instructions if one.opname.startswith("LOAD")]
     looks = any(next_action in (one if isinstance(one, tuple) else (one,)) for one in loaded)
     if looks and not draws_next_action:
         raise AntsError(
-            f"the TD error of {shown(name)} looks at {next_action}, but no next action is drawn; "
-            "give draws_next_action=True (a learner that plans has none in its updates from the "
-            "model)."
+            f"the TD error of {shown(name)} uses {next_action}, but no next action is drawn; give "
+            "draws_next_action=True, unless the learner plans (updates from a model have no next "
+            "action)."
         )

@@ -1,4 +1,4 @@
-"""Learners in kernels: their memory, a step, their numbers, and updates by a TD error."""
+"""Learners in kernels: their memory, steps, rates, and updates by a TD error."""
 
 import functools
 from collections.abc import Callable
@@ -13,11 +13,11 @@ from taichi_ants.task.constants import N_ACTIONS, ROW
 
 
 class LearnerArrays(NamedTuple):
-    """The memory of many runs, or ants, one behind the other.
+    """The memory of many runs or ants, one after the other.
 
-    In `q`, f32, tables of n_states (a number of Python's) rows of `ROW` numbers, the first 5 of
-    them action values; that by which a run acts comes before its further ones. Then the f32
-    `floats` and the i32 `integers`.
+    `q`, f32, has tables of n_states rows of `ROW` numbers, of which the first 5 are action values.
+    The table that a run acts by precedes its additional tables. `floats` are f32, `integers` i32,
+    and n_states is a Python int.
     """
 
     q: Any
@@ -26,12 +26,12 @@ class LearnerArrays(NamedTuple):
     n_states: int
 
 
-# Where the memory of one run begins in each of these arrays. Its further table k, from 1, begins at
+# The offset of the memory of one run in each of these arrays. Its additional table k (from 1) is at
 # table + k * n_states * ROW.
 At = ti.types.struct(table=ti.i32, floats=ti.i32, integers=ti.i32)
 
-# One step of an ant, by state indices. The next action is -1 where none was drawn. A step is
-# `truncated` if the episode ends with it although it did not terminate.
+# One step of an ant, with state indices. The next action is -1 if none was drawn. A step is
+# `truncated` if the episode ends with it without terminating.
 Transition = ti.types.struct(
     state=ti.i32,
     action=ti.i32,
@@ -44,10 +44,10 @@ Transition = ti.types.struct(
 
 
 def read_rates(kind: type[Hyperparameters]) -> Callable[..., Any]:
-    """A `ti.func` (learning_rate, discount, epsilon, numbers, begin) -> the rates of a learner.
+    """Return a `ti.func` (learning_rate, discount, epsilon, numbers, begin) -> rates of a learner.
 
-    The rates are a struct of these, f32, and the hyperparameters by their names, i32 if whole, else
-    f32; they are read from the f64 array `numbers` from `begin` on.
+    The rates are a struct of the first three arguments, f32, and of the hyperparameters by name,
+    i32 or f32, which it reads from the f64 array `numbers`, starting at `begin`.
     """
     more = {one.name: ti.i32 if one.kind is int else ti.f32 for one in declared(kind)}
     rates_type = ti.types.struct(learning_rate=ti.f32, discount=ti.f32, epsilon=ti.f32, **more)
@@ -67,14 +67,14 @@ def read_rates(kind: type[Hyperparameters]) -> Callable[..., Any]:
 
 @ti.func
 def values_of(q: ti.template(), table, state):
-    """The five action values of a row in the table that begins at `table`."""
+    """Return the five action values of a state in the table at offset `table`."""
     row = table + state * ROW
     return ti.Vector([q[row + a] for a in ti.static(range(N_ACTIONS))])
 
 
 @ti.func
 def discount_of(rates, terminated):
-    """The discount of what comes next: 0 where the step terminated."""
+    """Return the discount of the next value: 0 if the step terminated."""
     discount = rates.discount
     if terminated == 1:
         discount = 0.0
@@ -83,14 +83,14 @@ def discount_of(rates, terminated):
 
 @functools.cache
 def guarded(td_error: Any) -> Callable[..., object]:
-    """A TD error, a `ti.func`, as one that returns an f32 or raises while it compiles.
+    """Return a TD error as a `ti.func` that returns an f32, or raises while it compiles.
 
-    What is no float would end the process in Taichi's compiler.
+    Taichi's compiler would end the process if a result were not a float.
     """
 
     @ti.func
     def checked(value, reward, discount, next_values, next_action, epsilon):
-        # No next action is drawn where the transition terminated; 0 is as good as any there.
+        # A step that terminated has no next action; any valid index does, because it is not used.
         action = ti.max(next_action, 0)
         return _as_f32(td_error(value, reward, discount, next_values, action, epsilon))
 
@@ -98,7 +98,7 @@ def guarded(td_error: Any) -> Callable[..., object]:
 
 
 def learn_by(td_error: Any) -> Callable[..., object]:
-    """The `learn` of a learner that keeps no memory and updates by this TD error."""
+    """Return the `learn` of a learner without memory that updates by this TD error."""
     error_of = guarded(td_error)
 
     @ti.func
@@ -115,7 +115,7 @@ def learn_by(td_error: Any) -> Callable[..., object]:
 
 
 def _as_f32(result: Any) -> object:
-    """Called while a kernel compiles, on what a TD error returns."""
+    """Return the result of a TD error as f32; called while a kernel compiles."""
     if isinstance(result, (int, float)) and not isinstance(result, bool):
         return ti.cast(float(result), ti.f32)
     if not isinstance(result, Expr):
@@ -129,5 +129,5 @@ def _as_f32(result: Any) -> object:
     raise ti.TaichiCompilationError(f"it returns {what} where one float is needed")
 
 
-# To have this mark at all is what Taichi asks of a Python function that is called in a kernel.
+# Taichi requires this attribute, with any value, of Python functions that kernels call.
 _as_f32._is_taichi_function = False

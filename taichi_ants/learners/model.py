@@ -1,8 +1,8 @@
-"""A model of the world: the transition that was seen last of each visited pair of state and action.
+"""A model of the world: the latest transition of each visited pair of state and action.
 
-It lies in the integers of a learner's memory: the number of visited pairs; from 2 on, in the order
-of first visits, each pair (its offset in the table) and its packed transition; behind the room for
-all pairs, for each pair its place in this order plus 1, or 0.
+The integers of a learner's memory store it. Index 0 is the number of visited pairs. From index 2,
+in the order of first visits, each slot has a pair (its offset in the table) and its packed
+transition. After the slots of all pairs follows, for each pair, its slot plus 1, or 0 if unvisited.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from taichi_ants.task.rules.policy import best_value
 
 # A transition packs the next state (20 bits), the reward (11 bits) and whether the step terminated.
 _REWARD_AT, _TERMINATED_AT = 20, 31
-# Pairs and slots lie below this. Masks tell the compiler that they are not negative: indices that
-# might be take it one more instruction each, and planning is made of little else.
+# Pairs and slots are below this. The mask shows the compiler that an index is not negative, which
+# saves one instruction each time; planning consists mostly of such look-ups.
 _PAIRS = (ROW << _REWARD_AT) - 1
 
 
@@ -34,44 +34,44 @@ class Planning(Hyperparameters):
 
 
 def model_memory(n_states: int, floats: int = 0) -> Memory:
-    """The memory that a model takes, and floats beside it."""
+    """Return the memory of a model, with additional floats."""
     return Memory(floats=floats, integers=2 + 3 * N_ACTIONS * n_states)
 
 
 @ti.func
 def pack_transition(next_state, reward, terminated):
-    """A transition as one i32; the reward is a whole number as f32."""
+    """Return a transition packed into one i32; the reward is a whole number as f32."""
     paid = ti.cast(reward, ti.i32) + MOST_REWARD
     return next_state | paid << _REWARD_AT | terminated << _TERMINATED_AT
 
 
 @ti.func
 def next_state_of(transition):
-    """The next state of a transition."""
+    """Return the next state of a transition."""
     return transition & (1 << _REWARD_AT) - 1
 
 
 @ti.func
 def reward_of(transition):
-    """The reward of a transition, f32."""
+    """Return the reward of a transition, f32."""
     return ti.cast((transition >> _REWARD_AT & 2047) - MOST_REWARD, ti.f32)
 
 
 @ti.func
 def terminated_of(transition):
-    """1 if the step of a transition terminated, else 0."""
+    """Return 1 if a transition terminated, else 0."""
     return ti.cast(transition < 0, ti.i32)
 
 
 @ti.func
 def visited(memory: ti.template(), at):
-    """The number of visited pairs."""
+    """Return the number of visited pairs."""
     return memory.integers[at.integers]
 
 
 @ti.func
 def remember(memory: ti.template(), at, pair, transition):
-    """Store what was seen last of a pair, new pairs behind all others; the pair's slot."""
+    """Store the latest transition of a pair, and return its slot."""
     state, action = (pair & _PAIRS) // ROW, (pair & _PAIRS) % ROW
     key = at.integers + 2 + (2 * memory.n_states + state) * N_ACTIONS + action
     place = memory.integers[key]
@@ -86,14 +86,14 @@ def remember(memory: ti.template(), at, pair, transition):
 
 @ti.func
 def recall(memory: ti.template(), at, slot):
-    """The pair in a slot, and its transition."""
+    """Return the pair in a slot, and its transition."""
     place = at.integers + 2 + 2 * (slot & _PAIRS)
     return memory.integers[place] & _PAIRS, memory.integers[place + 1]
 
 
 @ti.func
 def error_of(memory: ti.template(), at, rates, pair, transition):
-    """The TD error of Q-learning for a transition of a pair."""
+    """Return the TD error of Q-learning for a transition of a pair."""
     target = reward_of(transition)
     if terminated_of(transition) == 0:
         next_values = values_of(memory.q, at.table, next_state_of(transition))

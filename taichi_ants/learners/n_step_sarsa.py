@@ -1,4 +1,4 @@
-"""n-step SARSA (Sutton and Barto, chapter 7): targets of n rewards and the value after them."""
+"""N-step SARSA (Sutton and Barto, chapter 7): targets of n rewards and the value after them."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -16,22 +16,22 @@ from taichi_ants.task.constants import ROW
 class Steps(Hyperparameters):
     """The hyperparameter of n-step SARSA; targets end with the episode."""
 
-    n_steps: Annotated[int, Is("rewards in a target", least=1, most=64)] = 4
+    n_steps: Annotated[int, Is("number of rewards in a target", least=1, most=64)] = 4
 
 
 @ti.func
 def begin(memory: ti.template(), at):
-    """Forget the pairs that wait."""
+    """Remove the pairs that wait for an update."""
     memory.integers[at.integers] = 0
     memory.integers[at.integers + 1] = 0
 
 
 @ti.func
 def learn(memory: ti.template(), at, step, rates, random_state):
-    """Update the pair of n steps ago; at the end of an episode, all that wait.
+    """Update the pair of n steps ago; at the end of an episode, update all pairs that wait.
 
-    The integers are the number of pairs that wait, the place of the oldest, then the places; the
-    floats are their rewards. The places are used in a circle.
+    The integers are the number of pairs that wait and the index of the oldest, then a ring buffer
+    of pairs. The floats are their rewards.
     """
     pair = step.state * ROW + step.action
     discount = discount_of(rates, step.terminated)
@@ -65,5 +65,5 @@ N_STEP_SARSA = Learner(
         floats=settings.n_steps, integers=2 + settings.n_steps
     ),
     cost=lambda settings: 1 + 0.25 * settings.n_steps,
-    summary="SARSA towards several rewards and the value after them",
+    summary="SARSA with targets of several rewards and the value after them",
 )

@@ -1,7 +1,7 @@
-"""Policies: tables of action values, two that need no learning, and their files.
+"""Policies: tables of action values and their files; two policies that need no learning.
 
 A policy is a float32 array (n_states, 5), the value of each action in each state of an observation.
-An ant takes a best action, ties at random with equal probability.
+An ant takes an action with the largest value; ties are broken at random with equal probability.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ _KIND = Kind("policy", 2, "save_policy", most=1 << 26, foreign=True)
 
 
 class Policy(NamedTuple):
-    """The contents of a policy file.
+    """The contents of a policy file: action values, float32 (n_states, 5), and their origin.
 
-    Action values, float32 (n_states, 5), whose rows are the states of the registered observation of
-    that name; and what made the policy.
+    `observation` is the name of the registered observation whose states index the rows; `metadata`
+    has the origin of the policy (configuration, seed, world ...).
     """
 
     q_values: ActionValues
@@ -37,7 +37,7 @@ class Policy(NamedTuple):
 
     @property
     def task(self) -> Task:
-        """The rules in its metadata, or the paper's; AntsError if they are not allowed."""
+        """The rules in the metadata, by default the paper's; AntsError if they are not allowed."""
         try:
             task = Task.from_dict(self.metadata.get("task", {}))
         except AntsError as error:
@@ -48,11 +48,12 @@ class Policy(NamedTuple):
         return replace(task, observation=self.observation)
 
     def actions(self, states: npt.ArrayLike, rng: np.random.Generator) -> npt.NDArray[np.int64]:
-        """A best action in each state, ties by `rng`, for the environments of this package:
+        """Return an action with the largest value in each state; `rng` breaks ties.
 
-        observations, infos = envs.reset(seed=0) envs.step(policy.actions(infos["state"], rng))
+            observations, infos = envs.reset(seed=0)
+            envs.step(policy.actions(infos["state"], rng))
 
-        States are integers of any shape, also a single one; AntsError if there is no such state.
+        States are an integer or integers of any shape; AntsError if a state does not exist.
         """
         expect("rng", rng, np.random.Generator)
         states = np.asarray(states)
@@ -67,26 +68,26 @@ class Policy(NamedTuple):
 
 
 def random_policy(observation: str = "paper") -> ActionValues:
-    """The policy that takes each of the five actions with equal probability, in every state."""
+    """Return the policy that takes each of the five actions with equal probability."""
     return np.zeros((observations.get(observation).n_states, N_ACTIONS), np.float32)
 
 
 def action_probabilities(q_values: np.ndarray, epsilon: float = 0.0) -> np.ndarray:
-    """Probabilities of epsilon-greedy actions, float64 (..., 5), to the bit as in kernels."""
+    """Return probabilities of epsilon-greedy actions, float64 (..., 5), exactly as in kernels."""
     explores = np.floor(epsilon * 2.0**32) / 2.0**32
     best = q_values >= q_values.max(axis=-1, keepdims=True)
     return explores / N_ACTIONS + best * ((1.0 - explores) / best.sum(axis=-1, keepdims=True))
 
 
-# The rule of the trail follower: what it looks for among the cells ahead, in order of priority, and
-# its action where it sees that. The letters are those of the names of states.
+# The rules of the trail follower: pairs of letters and an action, in order of priority. A pair
+# applies if one of the three cells ahead shows one of its letters, those of the names of states.
 #   take      pick up food, or give it to the queen
-#   ahead     move forward, if it is the cell straight ahead that shows one of the letters
-#   straight  move onto such a cell; forward if it is one of them, else any
-#   open      the same, but forward only if all three cells show them
-#   any       move onto any such cell
-#   stay      stay, with the same heading: the action is one that fails without a turn
-# In a dead end it turns left, which opens a way out after two turns.
+#   ahead     move forward if the cell forward shows one of the letters, else try the next pair
+#   straight  move forward if the cell forward shows one, else onto any cell that does
+#   open      move forward if all three cells show one, else onto any cell that does
+#   any       move onto any cell that shows one
+#   stay      stay with the same heading, by an action that fails without a turn
+# In a dead end the ant turns left; after two turns it sees the way out.
 Rule = tuple[tuple[str, str], ...]
 _WITHOUT_FOOD: Rule = (("F", "take"), ("P", "stay"), ("T", "straight"), ("E", "open"))
 _WITHOUT_FOOD_IN_QUEUES: Rule = (
@@ -94,7 +95,7 @@ _WITHOUT_FOOD_IN_QUEUES: Rule = (
     *(("P", "straight"), ("E", "open")),
 )
 _WITH_FOOD: Rule = (("Q", "take"), ("SP", "straight"), ("p", "stay"), ("EA", "any"))
-# The rule without food and that with food, by the observation.
+# By observation, the rule without food and the rule with food.
 RULES: Mapping[str, tuple[Rule, Rule]] = {
     "paper": (_WITHOUT_FOOD, (("Q", "take"), ("S", "any"), ("E", "any"))),
     "ants": (_WITHOUT_FOOD, _WITH_FOOD),
@@ -106,13 +107,13 @@ FOLLOWED = tuple(RULES)
 def trail_follower(observation: str = "paper") -> ActionValues:
     """Return a hand-written policy, a table of the `RULES`, float32 (n_states, 5).
 
-    Without food, an ant picks up the food that it sees, follows a trail, and otherwise walks
-    straight over open ground and turns at random beside anything that blocks it. With food, it
-    gives it to the queen, moves nearer to her, pushes ants without food out of the way, and
-    otherwise walks at random until a nearer cell comes into view. An ant without food that sees an
-    ant with food on a stronger trail (P) waits to be pushed along that trail. In queues, it does so
-    only by moving against that ant, and it waits behind an ant that is further up the trail (p).
-    Only the observations in `FOLLOWED` have rules.
+    Without food, an ant picks up food in view, follows a trail, and otherwise walks straight over
+    open ground and turns at random next to obstacles. With food, it delivers to the queen, moves
+    nearer to her, pushes ants without food out of the way, and otherwise walks at random until it
+    sees a nearer cell. An ant without food that sees an ant with food on a stronger trail (P) waits
+    until that ant pushes it along the trail. With the observation `queues`, it moves against that
+    ant instead of waiting, and waits behind an ant that is further up the trail (p). Only the
+    observations in `FOLLOWED` have rules.
     """
     check_one_of("observation", observation, FOLLOWED)
     name_of, q_values = observations.get(observation).name_of, random_policy(observation)
@@ -124,7 +125,7 @@ def trail_follower(observation: str = "paper") -> ActionValues:
 
 
 def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
-    """The actions among which a rule chooses, by the letters seen left, forward and right."""
+    """Return the actions that a rule allows, by the letters seen left, forward and right."""
     takes, fails = (GIVE, PICK_UP) if carries else (PICK_UP, GIVE)
     for letters, action in rule:
         cells = [move for move in (LEFT, FORWARD, RIGHT) if view[move] in letters]
@@ -135,7 +136,7 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
             return [fails]
         if action == "ahead":
             cells = ahead
-        # Beside what blocks, straight on would lead along a wall round the world forever.
+        # Next to an obstacle, walking straight would follow a wall around the world forever.
         elif action == "straight" or (action == "open" and len(cells) == len(view)):
             cells = ahead or cells
         if cells:
@@ -146,12 +147,12 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
 def save_policy(
     path: PathLike, q_values: npt.ArrayLike, metadata: Mapping[str, Any], observation: str = "paper"
 ) -> None:
-    """Write a policy file: an .npz with the action values, their observation and what made them.
+    """Write a policy file: an .npz with the action values, their observation and their origin.
 
     Args:
-        path: The file; the whole name, no ending is added.
+        path: The file; no suffix is added.
         q_values: Action values of shape (n_states, 5), finite as float32.
-        metadata: What made the policy (configuration, seed, world ...), as JSON can hold it.
+        metadata: Origin of the policy (configuration, seed, world ...), in types of JSON.
         observation: Name of the registered observation whose states index the rows.
     """
     table = _checked(q_values, observation)
@@ -162,14 +163,14 @@ def save_policy(
     except (TypeError, ValueError, RecursionError) as error:
         reason = str(error) or type(error).__name__
         raise AntsError(
-            f"metadata is {shown(metadata)}, which JSON cannot hold ({reason}); use numbers, text, "
-            "lists and mappings."
+            f"metadata is {shown(metadata)}, which JSON cannot represent ({reason}); use numbers, "
+            "text, lists and mappings."
         ) from error
     _KIND.write(path, {"observation": observation, "metadata": metadata}, {"q_values": table})
 
 
 def load_policy(path: PathLike) -> Policy:
-    """Read a policy file that `save_policy` wrote; AntsError if it cannot be used."""
+    """Return the policy in a file that `save_policy` wrote; AntsError if it cannot be used."""
     with _KIND.reading(path) as (arrays, facts):
         observation, metadata = facts["observation"], facts["metadata"]
         expect("metadata", metadata, dict)
@@ -178,7 +179,6 @@ def load_policy(path: PathLike) -> Policy:
 
 
 def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
-    """The action values of one policy."""
     table = checked_values(q_values, Task(observations.get(observation).name))
     if table.ndim != 2:
         raise AntsError(f"q_values has shape {table.shape}; it must be {table.shape[-2:]}.")
@@ -186,7 +186,7 @@ def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
 
 
 def checked_values(q_values: Any, task: Task) -> np.ndarray:
-    """Action values as float32 (..., n_states, 5); AntsError unless they are finite numbers."""
+    """Return action values as float32 (..., n_states, 5); AntsError unless they are finite."""
     shape = (task.n_states, N_ACTIONS)
     try:
         values = np.asarray(q_values)
@@ -203,13 +203,13 @@ def checked_values(q_values: Any, task: Task) -> np.ndarray:
 
 
 def finite(what: str, values: np.ndarray) -> np.ndarray:
-    """Action values (..., 5) as float32; AntsError, which starts with `what`, unless finite."""
+    """Return action values (..., 5) as float32; AntsError that starts with `what` unless finite."""
     with np.errstate(over="ignore"):  # a float64 that float32 cannot hold becomes infinite
         tables = values.astype(np.float32, copy=False)
     if not np.isfinite(tables).all():
         *_, state, action = where = np.argwhere(~np.isfinite(tables))[0]
         raise AntsError(
-            f"{what} {tables[tuple(where)]} for state {state} and action {action}; numbers must be "
-            "finite, so give an action that shall never be taken a low one."
+            f"{what} {tables[tuple(where)]} for state {state} and action {action}; values must be "
+            "finite, so give actions to avoid a low value."
         )
     return tables

@@ -1,4 +1,4 @@
-"""Prioritized sweeping (Moore and Atkeson 1993): plans first where the error is largest."""
+"""Prioritized sweeping (Moore and Atkeson 1993): planning starts with the largest error."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -15,14 +15,14 @@ from taichi_ants.task.constants import N_ACTIONS, ROW
 class Sweeping(model.Planning):
     """The hyperparameters of prioritized sweeping."""
 
-    threshold: Annotated[float, Is("size of errors that wait for no update", least=0, most=1e9)] = (
-        0.0001
-    )
+    threshold: Annotated[
+        float, Is("absolute error up to which a pair is not updated", least=0, most=1e9)
+    ] = 0.0001
 
 
 @ti.func
 def most_urgent(memory: ti.template(), at):
-    """The slot of the model with the largest priority, the lowest of several; the priority."""
+    """Return the (lowest) slot of the model with the largest priority, and the priority."""
     first, largest = 0, memory.floats[at.floats]
     for slot in range(1, model.visited(memory, at)):
         priority = memory.floats[at.floats + slot]
@@ -33,9 +33,9 @@ def most_urgent(memory: ti.template(), at):
 
 @ti.func
 def learn(memory: ti.template(), at, step, rates, random_state):
-    """Note how wrong the value of the pair is; then update the pairs that are most wrong.
+    """Store the error of the pair as its priority, then update the pairs of highest priority.
 
-    The integers are the model, the floats the priority of each of its slots.
+    The integers are the model, and the floats are the priority of each of its slots.
     """
     pair = step.state * ROW + step.action
     transition = model.pack_transition(step.next_state, step.reward, step.terminated)
@@ -50,7 +50,7 @@ def learn(memory: ti.template(), at, step, rates, random_state):
         updated, seen = model.recall(memory, at, urgent)
         change = model.error_of(memory, at, rates, updated, seen)
         memory.q[at.table + updated] = memory.q[at.table + updated] + rates.learning_rate * change
-        # Pairs that lead to its state may have got an error by this.
+        # This update can increase the error of pairs that lead to its state.
         for before in range(model.visited(memory, at)):
             leading, led_to = model.recall(memory, at, before)
             if model.terminated_of(led_to) == 0 and model.next_state_of(led_to) == updated // ROW:
@@ -68,5 +68,5 @@ PRIORITIZED_SWEEPING = Learner(
     hyperparameters=Sweeping,
     memory=lambda settings, n_states: model.model_memory(n_states, floats=N_ACTIONS * n_states),
     cost=lambda settings: 1 + 12 * settings.planning_steps,
-    summary="updates from a model of the world, the largest errors first",
+    summary="updates from a model of the world, starting with the largest errors",
 )

@@ -8,8 +8,8 @@ from taichi_ants.task.rules.policy import best_value
 
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
-    """reward + discount * max Q(s', .) - Q(s, a)."""
+    """Return reward + discount * max Q(s', .) - Q(s, a)."""
     return reward + discount * best_value(next_values) - value
 
 
-Q_LEARNING = td_learner("q_learning", td_error, summary="off-policy, towards the best next action")
+Q_LEARNING = td_learner("q_learning", td_error, summary="off-policy, bootstraps from max Q(s', .)")

@@ -1,7 +1,7 @@
-"""The one place where learners are registered.
+"""The registry of learners.
 
-To add one, write a file beside this one and add its name to `BUILT_IN`; or call `register` from a
-file of your own.
+To add one to the package, write a file in this folder and add its name to `BUILT_IN`. To add your
+own learner, call `register` from a plugin file.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 from taichi_ants.learners.learner import Learner, Memory, check_arguments, check_td_error
 from taichi_ants.settings import declared, not_a_setting
 
-# The package's own, and what readers know them as: NAME in the file `name.py`, imported when it is
-# asked for, since that starts to import Taichi.
+# The built-in learners and their labels. Learner NAME is in the file `name.py`, which imports
+# Taichi and is therefore imported on first use.
 BUILT_IN = {
     "q_learning": "Q-learning",
     "sarsa": "SARSA",
@@ -31,13 +31,13 @@ _LEARNERS: dict[str, Learner] = {}
 
 
 def register(learner: Learner) -> Learner:
-    """Make a learner known by its name; it replaces your own learner of the same name.
+    """Return a learner after registering it, in place of your own learner of the same name.
 
-    Results, colonies and kernels that exist keep theirs. AntsError if the name is that of a learner
-    of the package or not an identifier, or a field is not as `Learner` says. The functions are
-    tried when the learner is first used.
+    Existing results, colonies and kernels do not change. The first use of a learner tries its
+    functions. Raises AntsError if the name is not an identifier or belongs to a built-in learner,
+    or a field does not have the form that `Learner` describes.
     """
-    expect("what is registered", learner, Learner)
+    expect("learner", learner, Learner)
     name = learner.name
     check_new_name("learner", name, BUILT_IN)
     parts = ["memory", "at", "step", "rates", "random_state"]
@@ -51,51 +51,51 @@ def register(learner: Learner) -> Learner:
     taken = {one.name for one in declared(TrainingConfig)}
     for clash in taken & {one.name for one in declared(learner.hyperparameters)}:
         raise AntsError(
-            f"{clash!r} is a setting of all learners; call this hyperparameter of {name!r} "
-            "something else."
+            f"{clash!r} is a setting of all learners; choose another name for this hyperparameter "
+            f"of {name!r}."
         )
     _LEARNERS[name] = learner
     return learner
 
 
 def _try_sizes(learner: Learner) -> None:
-    """Compute, with the usual hyperparameters, what engines need before the first step."""
+    """Compute hyperparameters, memory and cost with default values, to find errors early."""
     part = "hyperparameters"
     try:
         settings = learner.hyperparameters()
         expect(part, settings, Hyperparameters)
         part = "memory"
-        expect("what it gives", learner.memory(settings, 128), Memory)
+        expect("its result", learner.memory(settings, 128), Memory)
         part = "cost"
         if not 0 < learner.cost(settings) < math.inf:
-            raise ValueError(f"it gives {learner.cost(settings)}, but it must be above 0")
+            raise ValueError(f"it returns {learner.cost(settings)}, which must be above 0")
     except Exception as error:
         raise unusable(learner, f"{part} fails ({error})") from error
 
 
 def get(name: str) -> Learner:
-    """The learner of that name; AntsError, which lists those that exist, if there is none."""
+    """Return the learner of this name; AntsError, with a list of all names, if there is none."""
     expect("the learner", name, str)
     if name in BUILT_IN:
         return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
     if name not in _LEARNERS:
         raise AntsError(
-            f"there is no learner {shown(name)}; choose one of {', '.join(names())}, or add a "
-            "--plugin."
+            f"there is no learner {shown(name)}; choose one of {', '.join(names())}, or give the "
+            "file that registers it with --plugin."
         )
     return _LEARNERS[name]
 
 
 def label(name: str) -> str:
-    """The learner's name for readers, such as "Dyna-Q"; one of a plugin by its own name."""
+    """Return the label for readers, for example "Dyna-Q"; for learners of plugins, the name."""
     expect("name", name, str)
     return BUILT_IN.get(name, name)
 
 
 def settle(config: TrainingConfig) -> TrainingConfig:
-    """The configuration with all hyperparameters of its learner.
+    """Return the configuration with all hyperparameters of its learner.
 
-    AntsError if there is no such learner or hyperparameter, or a value is outside its range.
+    Raises AntsError if the learner or a hyperparameter does not exist, or a value is not allowed.
     """
     expect("the configuration", config, TrainingConfig)
     kind = get(config.learner).hyperparameters
@@ -109,5 +109,5 @@ def settle(config: TrainingConfig) -> TrainingConfig:
 
 
 def names() -> tuple[str, ...]:
-    """The names of all registered learners, in the order of registration."""
+    """Return the names of all registered learners, in the order of registration."""
     return (*BUILT_IN, *_LEARNERS)

@@ -1,4 +1,4 @@
-"""SARSA (Rummery and Niranjan 1994): on-policy, bootstraps from the action taken next."""
+"""SARSA (Rummery and Niranjan 1994): on-policy, bootstraps from the next action."""
 
 import taichi as ti
 
@@ -7,10 +7,10 @@ from taichi_ants.learners.learner import td_learner
 
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
-    """reward + discount * Q(s', a') - Q(s, a); the discount is 0 where no a' was drawn."""
+    """Return reward + discount * Q(s', a') - Q(s, a); the discount is 0 if no a' was drawn."""
     return reward + discount * next_values[next_action] - value
 
 
 SARSA = td_learner(
-    "sarsa", td_error, draws_next_action=True, summary="on-policy, towards the action taken next"
+    "sarsa", td_error, draws_next_action=True, summary="on-policy, bootstraps from the next action"
 )

@@ -1,4 +1,4 @@
-"""SARSA(lambda) with replacing traces (Singh and Sutton 1996), of which a short list is kept."""
+"""SARSA(lambda) with a short list of replacing traces (Singh and Sutton 1996)."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -14,23 +14,23 @@ from taichi_ants.task.constants import ROW
 
 @dataclass(frozen=True)
 class Traces(Hyperparameters):
-    """The hyperparameters of SARSA(lambda); the oldest trace gives way."""
+    """The hyperparameters of SARSA(lambda); a new trace replaces the oldest if there is no room."""
 
-    trace_decay: Annotated[float, Is("what a trace keeps per step", least=0, most=1)] = 0.9
-    trace_length: Annotated[int, Is("pairs that have a trace", least=1, most=256)] = 32
+    trace_decay: Annotated[float, Is("lambda, factor on traces per step", least=0, most=1)] = 0.9
+    trace_length: Annotated[int, Is("largest number of traces", least=1, most=256)] = 32
 
 
 @ti.func
 def begin(memory: ti.template(), at):
-    """Forget the traces."""
+    """Remove all traces."""
     memory.integers[at.integers] = 0
 
 
 @ti.func
 def learn(memory: ti.template(), at, step, rates, random_state):
-    """Update this pair and those before it, by as much as is left of their traces.
+    """Update this pair and those before it, in proportion to their traces.
 
-    The integers are the number of traces, then their pairs, the newest first.
+    The integers are the number of traces, then their pairs from the newest to the oldest.
     """
     pair = step.state * ROW + step.action
     discount = discount_of(rates, step.terminated)
@@ -39,7 +39,7 @@ def learn(memory: ti.template(), at, step, rates, random_state):
     scaled = rates.learning_rate * error
     fade = rates.discount * rates.trace_decay
     known = memory.integers[at.integers]
-    # This pair goes in front; the others move back by one, up to where it stood before.
+    # This pair becomes the first; those that were before it move back by one.
     moved, trace = pair, ti.f32(1.0)
     places = known
     for i in range(known):
@@ -73,5 +73,5 @@ SARSA_LAMBDA = Learner(
         floats=settings.trace_length, integers=1 + settings.trace_length
     ),
     cost=lambda settings: 1 + 0.05 * settings.trace_length,
-    summary="SARSA that updates the pairs before, too, by their traces",
+    summary="SARSA that also updates earlier pairs, in proportion to their traces",
 )

@@ -1,4 +1,4 @@
-"""The rules of the game: what an ant perceives, may do and is paid for."""
+"""The rules: observations, actions, pheromone and rewards of ants."""
 
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone

@@ -1,4 +1,4 @@
-"""The results of actions: what happened, and why nothing did."""
+"""The results of actions, and the reasons for failure."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from taichi_ants.task.constants import SEES_EMPTY, SEES_LURE
 
 
 class Event(IntEnum):
-    """The result of an ant's last action; of a move, the looks of the cell plus 1."""
+    """The result of an ant's last action; for a move, the code of the cell plus 1."""
 
     NONE = 0  # the ant has not acted in this episode
     ENTERED_EMPTY = SEES_EMPTY + 1
     BLOCKED = auto()  # a move that only turned the ant
-    ENTERED_LURE = SEES_LURE + 1  # a trail, or with food a cell nearer to the queen
+    ENTERED_LURE = SEES_LURE + 1  # a cell seen as T or S
     PICKED_UP = auto()
     DELIVERED = auto()
-    FAILED = auto()  # a pick-up or a delivery that could not be done
-    PUSHED = auto()  # another ant changed places with this one; in colonies only
+    FAILED = auto()  # a pick-up or a delivery that was not possible
+    PUSHED = auto()  # a carrier changed places with this ant; in colonies only
 
 
 class Reason(IntEnum):
-    """The reason why an ant that is alone was blocked or failed: `info["reason"]`."""
+    """The reason why the action of a lone ant failed: `info["reason"]`."""
 
     NONE = 0  # the action succeeded
     ROCK_OR_EDGE_AHEAD = auto()

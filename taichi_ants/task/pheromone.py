@@ -1,4 +1,4 @@
-"""How trails are laid, fall and spread: the numbers, which kernels in `engines` read."""
+"""The settings by which trails are laid, evaporate and spread."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EVAPORATIONS: tuple[str, ...] = get_args(Evaporation)
 DEPOSITS: tuple[str, ...] = get_args(Deposit)
 VIEWS: tuple[str, ...] = get_args(View)
 MAX_DEPOSIT = 1_000_000
-LINEAR = -1.0  # stands for linear evaporation where kernels read a decay factor
+LINEAR = -1.0  # marks linear evaporation in place of a decay factor
 
 Level = Annotated[int | None, Is(unit="ticks of linear evaporation", least=1, most=MAX_DEPOSIT)]
 
@@ -27,18 +27,19 @@ Level = Annotated[int | None, Is(unit="ticks of linear evaporation", least=1, mo
 class Pheromone(Settings, path="task.pheromone"):
     """The rules by which trails are laid, evaporate and spread.
 
-    Evaporation is "linear": a trail loses 1 per tick; "exponential": it halves every `half_life`
-    ticks, and what is below 1 becomes 0; or "none". Of the share `diffusion`, each neighbour gets a
-    sixth; what is aimed at an obstacle or out of the world stays. A deposit is "set": an ant with
-    food sets the trail of a cell to `level`; "add": it adds `level`, up to `cap`; "fading": it
-    raises the trail to `level` less `slope` for each tick that it has carried its food, so that
-    trails rise towards food if `slope` is above what evaporates; or "none". By `view`, an ant
-    without food sees as T, of the trails of at least 1 on the empty cells in view, "half": those of
-    at least half the strongest; "strongest": the strongest ones; "strongest_under_carriers": the
-    same, but a trail on the cell of an ant with food counts for the strongest too.
+    - Evaporation "linear" lowers a trail by 1 per tick. "exponential" halves it every `half_life`
+      ticks, and removes it below 1.
+    - Each neighbour gets a sixth of the share `diffusion`, except that the parts for obstacles and
+      for cells outside the world stay.
+    - By `deposit`, an ant with food changes the trail of its cell. "set" sets it to `level`. "add"
+      adds `level`, up to `cap`. "fading" raises it to `level` minus `slope` for each tick for which
+      the ant has carried food; such trails rise towards food if `slope` exceeds the evaporation.
+    - By `view`, an ant without food sees trails of at least 1 on empty cells as T. "half" requires
+      at least half the level of the strongest in view, "strongest" the same level.
+      "strongest_under_carriers" also compares with trails under ants with food.
     """
 
-    evaporation: Annotated[Evaporation, Is("how trails evaporate")] = "linear"
+    evaporation: Annotated[Evaporation, Is("evaporation of trails")] = "linear"
     half_life: Annotated[
         float | None,
         Is("time in which a trail halves", unit="ticks", above=0, usual=50.0),
@@ -47,45 +48,45 @@ class Pheromone(Settings, path="task.pheromone"):
     diffusion: Annotated[
         float, Is("share of a trail that spreads to the six neighbours per tick", least=0, most=1)
     ] = 0.0
-    deposit: Annotated[Deposit, Is("how ants with food lay trails")] = "set"
+    deposit: Annotated[Deposit, Is("rule for deposits of ants with food")] = "set"
     level: Annotated[
         int,
-        Is("trail that a deposit sets or adds, or from which it fades", least=1, most=MAX_DEPOSIT),
+        Is("trail level of a new deposit", least=1, most=MAX_DEPOSIT),
         Is(unit="ticks of linear evaporation", only=("deposit", "set", "add", "fading")),
     ] = DEPOSIT_LEVEL
     cap: Annotated[
-        Level, Is("largest trail that deposits add up to", usual=1000, only=("deposit", "add"))
+        Level, Is("largest level to which deposits add up", usual=1000, only=("deposit", "add"))
     ] = None
     slope: Annotated[
-        Level, Is("how much less is laid per tick with food", usual=10, only=("deposit", "fading"))
+        Level, Is("decrease of deposits per tick with food", usual=10, only=("deposit", "fading"))
     ] = None
-    view: Annotated[View, Is("which trails ants without food see as T")] = "half"
+    view: Annotated[View, Is("trails that ants without food see as T")] = "half"
 
     @property
     def dense(self) -> bool:
-        """Whether levels are float32 and change in every cell each tick; else they are integers."""
+        """Whether levels are float32 and change in every cell each tick, or are integers."""
         return self.evaporation == "exponential" or self.diffusion > 0
 
     @property
     def fades_after(self) -> int:
-        """Ticks with food after which an ant lays nothing, if deposits fade, else 0."""
+        """Ticks with food after which the deposits of an ant are 0, if they fade, else 0."""
         return -(-int(self.level) // self.slope) if self.slope else 0
 
     @property
     def lasting(self) -> Pheromone:
-        """The same without evaporation."""
+        """This pheromone without evaporation."""
         return self.but(evaporation="none")
 
     @property
     def decay(self) -> np.float32:
-        """The factor on every level per tick of exponential evaporation, else 1."""
+        """The factor on levels per tick of exponential evaporation, else 1."""
         import numpy as np
 
         return np.float32(0.5 ** (1.0 / float(self.half_life)) if self.half_life else 1.0)
 
     @property
     def numbers(self) -> dict[str, int | float]:
-        """The numbers by which kernels lay, evaporate and spread trails, by name."""
+        """The settings as numbers for kernels, by name."""
         level = float if self.dense else int
         return {
             "deposits": DEPOSITS.index(self.deposit),
@@ -93,7 +94,7 @@ class Pheromone(Settings, path="task.pheromone"):
             "cap": level(self.cap or 0),
             "slope": level(self.slope or 0),
             "fades_after": self.fades_after,
-            # By how much the clock of trails that are stored as expiry clocks advances per tick.
+            # The ticks by which the clock of trails that are stored as expiry clocks advances.
             "evaporates": int(self.evaporation == "linear"),
             "decay": LINEAR if self.evaporation == "linear" else float(self.decay),
             "share": float(self.share),
@@ -101,7 +102,7 @@ class Pheromone(Settings, path="task.pheromone"):
 
     @property
     def share(self) -> np.float32:
-        """The part of its level that a cell gives to one neighbour per tick of diffusion."""
+        """The share of its level that a cell gives to each neighbour per tick."""
         import numpy as np
 
         return np.float32(float(self.diffusion) / 6.0)

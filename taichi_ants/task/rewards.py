@@ -17,18 +17,18 @@ Reward = Annotated[int, Is(least=-MOST_REWARD, most=MOST_REWARD)]
 
 @dataclass(frozen=True)
 class Rewards(Settings, path="task.rewards"):
-    """The reward of each event, a whole number; the paper's table 1 by default."""
+    """The reward of each event, a whole number; by default, those of table 1 of the paper."""
 
-    empty: Annotated[Reward, Is("of a move onto a cell seen as empty (E)")] = 0
-    failed: Annotated[Reward, Is("of a blocked move, or a pick-up or give that fails")] = -1
+    empty: Annotated[Reward, Is("reward for a move onto a cell seen as empty (E)")] = 0
+    failed: Annotated[Reward, Is("reward for a blocked move, failed pick-up or failed give")] = -1
     shaping: Annotated[
-        Reward, Is("of a move onto a cell seen as T (trail) or S (nearer to the queen)")
+        Reward, Is("reward for a move onto a cell seen as T (trail) or S (nearer to the queen)")
     ] = 1
-    pick_up: Annotated[Reward, Is("of picking up food")] = 3
-    deliver: Annotated[Reward, Is("of giving food to the queen")] = 10
+    pick_up: Annotated[Reward, Is("reward for picking up food")] = 3
+    deliver: Annotated[Reward, Is("reward for giving food to the queen")] = 10
 
     def by_event(self) -> np.ndarray:
-        """The rewards by `Event`, int32 (8,)."""
+        """Return the rewards by `Event`, int32 (8,)."""
         import numpy as np
 
         rewards = np.zeros(len(Event), np.int32)
@@ -40,5 +40,5 @@ class Rewards(Settings, path="task.rewards"):
 
     @property
     def largest(self) -> int:
-        """The largest absolute value, on which the range of a return depends."""
+        """The largest absolute reward, which limits the range of returns."""
         return max(map(abs, astuple(self)))

@@ -1,9 +1,9 @@
-"""The states of an ant: what it carries and what it sees, their indices and their names.
+"""The states of the paper's ants: their codes, indices and names.
 
-An ant sees three cells, in the order left, forward, right. Each is one of four letters: E (empty),
-O (obstacle), then T (trail) or F (food) for an ant without food, S (nearer to the queen) or
-Q (queen) for an ant with food. A state is written as the ant's task and the three letters, for
-example "foraging E T O" or "carrying S E O".
+An ant sees three cells: left, forward and right. Each is one of four letters: E (empty) or O
+(obstacle); T (trail) or F (food) for an ant without food; S (nearer to the queen) or Q (queen) for
+an ant with food. The name of a state is the ant's load and the three letters, for example
+"foraging E T O" or "carrying S E O".
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from typing import NamedTuple
 from taichi_ants.errors import checked_whole
 from taichi_ants.task.constants import N_STATES, SEES_GOAL, SEES_LURE
 
-# Indexed by `carries`, then by code.
+# Indexed by `carries`; letters are then indexed by code.
 TASK_NAMES: tuple[str, str] = ("foraging", "carrying")
 CELL_LETTERS: tuple[str, str] = ("EOTF", "EOSQ")
 
 
 class State(NamedTuple):
-    """What an ant knows: whether it carries food, and the codes 0 to 3 of the cells in view."""
+    """The percept of an ant: whether it carries food, and the codes 0 to 3 of the cells in view."""
 
     carries: bool
     left: int
@@ -29,18 +29,18 @@ class State(NamedTuple):
 
     @property
     def view(self) -> tuple[int, int, int]:
-        """The three codes in the order of the moves: left, forward, right."""
+        """The three codes in the order of moves: left, forward, right."""
         return self.left, self.forward, self.right
 
 
 def state_from_index(index: int) -> State:
-    """The state of an index 64 * carries + 16 * left + 4 * forward + right, 0..127."""
+    """Return the state of index 64 * carries + 16 * left + 4 * forward + right, 0 to 127."""
     index = checked_whole("the state index", index, 0, N_STATES - 1)
     return State(bool(index >> 6), (index >> 4) & 3, (index >> 2) & 3, index & 3)
 
 
 def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int], str]:
-    """A function that names states of n cells in view by the letters of their codes."""
+    """Return a function that names states of n cells in view by the letters of their codes."""
 
     def name_of(row: int) -> str:
         row, codes = checked_whole("a state", row, 0, 2 * len(foraging) ** n_cells - 1), []
@@ -53,7 +53,7 @@ def name_of_codes(n_cells: int, foraging: str, carrying: str) -> Callable[[int],
     return name_of
 
 
-# The name of a state by its index.
+# Returns the name of a state by its index.
 state_name = name_of_codes(3, *CELL_LETTERS)
 
 
@@ -61,12 +61,12 @@ def _can_occur(state: State) -> bool:  # see section 1.5 of the paper
     queens, nearer = state.view.count(SEES_GOAL), state.view.count(SEES_LURE)
     if not state.carries:
         return True
-    if queens:  # there is one, and nothing is nearer to her than the cells beside hers
+    if queens:  # there is only one, and no cell is nearer to her than her neighbours
         return queens == 1 and nearer == 0
     return not state.left == state.right == SEES_LURE
 
 
-# The 100 indices that the rules can produce, ascending.
+# The 100 indices that can occur under the rules, ascending.
 REACHABLE_STATES: tuple[int, ...] = tuple(
     index for index in range(N_STATES) if _can_occur(state_from_index(index))
 )

@@ -1,4 +1,4 @@
-"""The rules of the game: who may enter a cell, what comes and goes, and all rules together."""
+"""The rules of traffic and of life, and the class of all rules."""
 
 from __future__ import annotations
 
@@ -21,25 +21,23 @@ Ticks = Annotated[int | None, Is(unit="ticks", least=1, most=MAX_STEPS)]
 
 @dataclass(frozen=True)
 class Traffic(Settings, path="task.traffic"):
-    """The ants that may enter a cell on which another ant stands; none by default, as in the paper.
+    """Rules for entering a cell with an ant on it; by default, as in the paper, no ant may.
 
-    Where some may, every ant that tries to move claims the cell ahead of it, unless a rock, food,
-    the queen or the end of the world is there. Of several claims to a cell the one with the
-    smallest hash wins, see `docs/colony.md`. With `swap`, an ant with food that wins a cell changes
-    places with the ant on it, if that ant has no food, does not move itself, and does not pick up a
-    food in view; the ant that is pushed is paid as for a move onto an empty cell. With `follow`, a
-    queue moves as one; a ring of ants that want each other's cells stays where it is.
+    Otherwise, every ant that tries to move claims the cell ahead of it, unless a rock, food, the
+    queen or the edge of the world is there. If several ants claim a cell, the one with the smallest
+    hash wins; see `docs/colony.md`. With `swap`, a carrier that wins a cell changes places with a
+    forager that neither moves nor picks up food in view. The pushed ant gets the reward of a move
+    onto an empty cell. With `follow`, all ants of a queue move at once; a ring of ants that claim
+    each other's cells does not move.
     """
 
-    swap: Annotated[bool, Is("let ants with food change places with ants without")] = False
-    follow: Annotated[bool, Is("let ants enter a cell that its ant leaves in the same tick")] = (
+    swap: Annotated[bool, Is("allow carriers to change places with foragers")] = False
+    follow: Annotated[bool, Is("allow ants to enter a cell whose ant leaves in the same tick")] = (
         False
     )
-    carriers_first: Annotated[bool, Is("let ants with food win a cell against ants without")] = (
-        False
-    )
+    carriers_first: Annotated[bool, Is("give carriers precedence over foragers for cells")] = False
     grant: Annotated[
-        bool, Is("pay a pushed ant for the move that it wanted, if it got it", only=("swap", True))
+        bool, Is("reward a pushed ant for its move if the push makes it", only=("swap", True))
     ] = False
 
     def __post_init__(self) -> None:
@@ -52,7 +50,7 @@ class Traffic(Settings, path="task.traffic"):
 
     @classmethod
     def named(cls) -> Mapping[str, Traffic]:
-        """Values that have names: "blocking", "right_of_way" and "following"."""
+        """Return the named values: "blocking", "right_of_way" and "following"."""
         return {
             "blocking": cls(),
             "right_of_way": cls(swap=True),
@@ -61,67 +59,69 @@ class Traffic(Settings, path="task.traffic"):
 
     @property
     def shared(self) -> bool:
-        """Whether any ant may enter a cell on which another one stands."""
+        """Whether any ant may enter a cell with an ant on it."""
         return self.swap or self.follow
 
 
 @dataclass(frozen=True)
 class Life(Settings, path="task.life"):
-    """The ants and food that come and go; by default none do. Colonies only.
+    """Births, deaths, and changes of food, for colonies only; by default, there are none.
 
-    None means that ants do not die, food does not grow back, or food stays. With `regrowth` 0, food
-    grows back in the same tick.
+    None means that ants do not die, food does not grow back, or food does not move. With `regrowth`
+    0, food grows back in the same tick.
     """
 
-    births: Annotated[bool, Is("turn each food item that the queen is given into an ant")] = False
+    births: Annotated[bool, Is("turn each food item that the queen receives into an ant")] = False
     lifespan: Annotated[Ticks, Is("age at which an ant dies")] = None
-    regrowth: Annotated[Ticks, Is("time until food grows back where it was taken", least=0)] = None
+    regrowth: Annotated[Ticks, Is("time until taken food grows back in its cell", least=0)] = None
     wander: Annotated[Ticks, Is("interval at which each pile of food moves by one cell")] = None
 
     @property
     def changes(self) -> bool:
-        """Whether anything comes or goes."""
+        """Whether any setting differs from its default."""
         return self != Life()
 
 
 @dataclass(frozen=True, repr=False)
 class Task(Settings, path="task"):
-    """The rules of perception, action and reward; the paper's by default.
+    """The rules of perception, action and reward; by default, those of the paper.
 
-    `observation` and the kind of pheromone are compiled into the kernels; all else is numbers that
-    kernels read. `traffic` may be one of the names of `Traffic.named`. A delivery that "terminates"
-    is a terminal state, so its target is the reward alone; the update of one that "truncates"
-    bootstraps from what the ant then sees. An episode of one ant ends in both.
+    `traffic` can be a name of `Traffic.named`. If `delivery` "terminates", the target of the update
+    is the reward alone; if it "truncates", the update bootstraps from the next observation. Both
+    end an episode of one ant. Kernels are compiled for an observation and a kind of pheromone; they
+    read all other settings as numbers.
     """
 
-    observation: Annotated[str, Is("what an ant sees", choices=observations.names)] = "paper"
+    observation: Annotated[str, Is("observation of ants", choices=observations.names)] = "paper"
     rewards: Annotated[Rewards, Is("reward of each event")] = field(default_factory=Rewards)
-    pheromone: Annotated[Pheromone, Is("how trails are laid, evaporate and spread")] = field(
-        default_factory=Pheromone
+    pheromone: Annotated[Pheromone, Is("rules by which trails are laid, evaporate and spread")] = (
+        field(default_factory=Pheromone)
     )
-    traffic: Annotated[Traffic, Is("who may enter a cell with an ant on it")] = field(
+    traffic: Annotated[Traffic, Is("rules for entering a cell with an ant on it")] = field(
         default_factory=Traffic
     )
-    turns_at_queen: Annotated[bool, Is("turn ants round when they have given their food")] = False
-    delivery: Annotated[Delivery, Is("whether the update at a delivery bootstraps")] = "terminates"
+    turns_at_queen: Annotated[bool, Is("turn ants around after a delivery")] = False
+    delivery: Annotated[
+        Delivery, Is("effect of a delivery; the update bootstraps only if it truncates")
+    ] = "terminates"
     evaporation_in_training: Annotated[bool, Is("evaporate trails while ants learn")] = False
-    evaporation_in_evaluation: Annotated[bool, Is("evaporate trails while nobody learns")] = True
-    life: Annotated[Life, Is("what comes and goes (colonies only)")] = field(default_factory=Life)
+    evaporation_in_evaluation: Annotated[bool, Is("evaporate trails while no ant learns")] = True
+    life: Annotated[Life, Is("changes of ants and food in colonies")] = field(default_factory=Life)
 
     @classmethod
     def named(cls) -> Mapping[str, Task]:
-        """Tasks that have names: "paper", "foraging" and "queueing"."""
+        """Return the named tasks: "paper", "foraging" and "queueing"."""
         return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
 
     def __repr__(self) -> str:
-        """What is not as in the paper."""
+        """Return the settings that differ from the paper's."""
         usual, own = vars(Task()), vars(self)
         given = [f"{name}={own[name]!r}" for name in own if own[name] != usual[name]]
         return f"Task({', '.join(given)})"
 
     @property
     def sees(self) -> Observation:
-        """The observation itself."""
+        """The registered observation."""
         return observations.get(self.observation)
 
     @property
@@ -143,17 +143,17 @@ class Task(Settings, path="task"):
         }
 
     def pheromone_while(self, learning: bool) -> Pheromone:
-        """The pheromone while ants learn, or while nobody does: with evaporation or without."""
+        """Return the pheromone while ants learn or do not, with or without evaporation."""
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
         return self.pheromone if falls else self.pheromone.lasting
 
     def as_dict(self) -> dict[str, Any]:
-        """The task as names and numbers, for files; `from_dict` reads it."""
+        """Return the task as names and numbers; `from_dict` reads it."""
         return asdict(self)
 
 
 def foraging() -> Task:
-    """A task: trails rise towards food, carriers have right of way, ants see each other."""
+    """Return a task: trails rise towards food, carriers have right of way, ants see each other."""
     return Task(
         observation="ants",
         pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
@@ -163,9 +163,9 @@ def foraging() -> Task:
 
 
 def queueing() -> Task:
-    """As `foraging`; besides, queues move as one, and ants see which ones are worth following.
+    """Return `foraging` with queues whose ants move at once, and ants that see which to follow.
 
-    Where the trail that leads to food lies under an ant with food, no weaker one looks like it.
+    If an ant with food is on the strongest trail in view, no weaker trail is seen as T.
     """
     view = {"view": "strongest_under_carriers"}
     return foraging().but(
@@ -174,5 +174,5 @@ def queueing() -> Task:
 
 
 def paper() -> Task:
-    """The paper's task, which is the default everywhere."""
+    """Return the paper's task, which is the default everywhere."""
     return Task()

@@ -1,4 +1,4 @@
-"""Worlds and where they come from: the paper, chance, a drawing, or a name for any of these."""
+"""Worlds: the paper's, random worlds, the double bridge, text maps, and a registry of names."""
 
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world

@@ -1,14 +1,14 @@
 """The double bridge: a nest and food at the ends of a bridge with two branches.
 
-The experiment of Goss, Aron, Deneubourg and Pasteels (Naturwissenschaften 76, 1989) on hexagons.
-The queen, the junction at the nest, the junction at the food and the middle of the food lie on one
-line, along heading 0. A branch leads away from this line, along it, and back to it: between
-junctions that are D steps apart, k steps to the side, D - k ahead and k to the other side are D + k
-steps. So the branches differ in k alone, and both turn off by one heading at a junction. The food
-and its junction can lie aside of that line, away from the short branch; lengths and turns stay.
+This is the experiment of Goss, Aron, Deneubourg and Pasteels (Naturwissenschaften 76, 1989) on
+hexagons. The queen, the junction at the nest, the junction at the food and the middle of the food
+are on a line along heading 0. A branch leads away from this line, along it, and back to it. Between
+junctions D steps apart, it takes k steps to the side, D - k ahead and k back, D + k in total. So
+the branches differ only in k, and both turn off by one heading at a junction. The food and its
+junction can be shifted away from the short branch, without a change of lengths and turns.
 
-Corridors are two cells wide, so that ants that meet can pass. The second lane lies around the
-first, so that no way over it is shorter.
+Corridors are two cells wide, so that ants can pass each other. The second lane goes around the
+first, so that it offers no shorter path.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from taichi_ants.grid.hexgrid import AxialGrid, normal_form
 from taichi_ants.settings import Is, checked
 from taichi_ants.worlds.world import World
 
-ROOM_RADIUS = 5  # of the rooms around queen and food: room for 90 ants beside the queen
-PILE_RADIUS = 3  # of the food: 37 cells
-MIN_STEPS, MAX_STEPS = 4, 1000  # of the short branch
-_NEST_JUNCTION = ROOM_RADIUS + 1  # its x coordinate; the queen is at the origin
-_BULGE = 3  # steps of the short branch to the side, if the long one leaves the choice
+ROOM_RADIUS = 5  # radius of the rooms around queen and food, with space for 90 ants and the queen
+PILE_RADIUS = 3  # radius of the pile of food, which has 37 cells
+MIN_STEPS, MAX_STEPS = 4, 1000  # bounds of the length of the short branch
+_NEST_JUNCTION = ROOM_RADIUS + 1  # x coordinate; the queen is at the origin
+_BULGE = 3  # preferred number of steps of the short branch to the side
 
 
 Short = Annotated[
@@ -47,13 +47,13 @@ Aside = Annotated[
 def double_bridge(
     short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> World:
-    """A short and a long branch between nest and food, walled by rocks.
+    """Return a world with a short and a long branch between nest and food, enclosed by rocks.
 
-    The queen is at the origin, in the middle of a room; the food is a pile in the middle of another
-    one. No trail, no listed ants. Lengths are steps from junction to junction; `long` is at most 2
-    * short - 3 - aside. With `aside` 0 the first cells of both branches are as far from the queen
-    as the food's junction; with more, that of the short branch is nearer to her, that of the long
-    one is not.
+    The queen is at the origin, in the middle of a room. The food is a pile in the middle of another
+    room. There are no trails and no listed ants. Lengths are steps from junction to junction;
+    `long` is at most 2 * short - 3 - aside. With `aside` 0, the first cells of both branches at the
+    food's junction are as far from the queen as the junction. With larger values, the first cell of
+    the short branch is nearer to her, and that of the long branch is not.
     """
     grid = AxialGrid(bridge_ranges(short, long, mirrored, aside))
     queen = (0, 0, 0)
@@ -73,9 +73,9 @@ def double_bridge(
 def bridge_ranges(
     short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> tuple[int, int, int]:
-    """Return the ranges of the world, before it is built; arguments and errors as the world's."""
+    """Return the ranges of `double_bridge` with these arguments, without building the world."""
     pile, corridors = _walked(short, long, mirrored, aside)
-    # A cell of rock around all that can be walked. A bridge and its mirror image have equal ranges.
+    # One cell of rock surrounds the paths. A bridge and its mirror image have equal ranges.
     x, *others = (np.maximum(corridors.max(axis=0), np.array(pile) + ROOM_RADIUS) + 2).tolist()
     return x, max(others), max(others)
 
@@ -83,7 +83,7 @@ def bridge_ranges(
 def _walked(
     short: int, long: int, mirrored: bool, aside: int
 ) -> tuple[tuple[int, int, int], np.ndarray]:
-    """The middle of the pile, and the cells (n, 3) of branches and junctions."""
+    """Return the middle of the pile, and the cells (n, 3) of branches and junctions."""
     junctions = junction_cells(short, long, mirrored, aside)
     corridors = np.concatenate([*branch_cells(short, long, mirrored, aside), junctions])
     x, y, z = (junctions[1] + junctions[0]).tolist()
@@ -94,7 +94,7 @@ def _walked(
 def junction_cells(
     short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> np.ndarray:
-    """The junction at the nest and the one at the food, int64 (2, 3); arguments as the world's."""
+    """Return the junction at the nest and the junction at the food, int64 (2, 3)."""
     ahead = _ahead(short, long, aside)
     cells = np.array([(_NEST_JUNCTION, 0, 0), (_NEST_JUNCTION + ahead, -aside, 0)])
     return _placed(cells, mirrored)
@@ -104,7 +104,7 @@ def junction_cells(
 def branch_cells(
     short: Short = 23, long: Long = 36, mirrored: Mirrored = False, aside: Aside = 0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The cells of the short and of the long branch, int64 (n, 3) each, junctions left out."""
+    """Return the cells of the short and the long branch without junctions, int64 (n, 3) each."""
     ahead = _ahead(short, long, aside)
     right = _corridor(short - ahead - aside, ahead, -aside)
     left = _corridor(long - ahead, ahead + aside, aside)
@@ -112,7 +112,7 @@ def branch_cells(
 
 
 def _ahead(short: int, long: int, aside: int) -> int:
-    """Steps ahead from junction to junction, on the way of the short branch."""
+    """Return the steps ahead, D - k, of the short branch from junction to junction."""
     if aside > short - MIN_STEPS:
         raise AntsError(
             f"`world.aside` is {aside}; with `short` {short} it must be at most "
@@ -124,12 +124,12 @@ def _ahead(short: int, long: int, aside: int) -> int:
             f"`world.long` is {long}; with `short` {short} and `aside` {aside} it must be between "
             f"{short} and {most} (2 * short - 3 - aside)."
         )
-    # A branch that went as far to the side as ahead would have a corner that can be cut.
+    # A branch with as many steps to the side as ahead would have a shortcut at its corner.
     return max(short - _BULGE - aside, (long - aside) // 2 + 1)
 
 
 def _corridor(side: int, ahead: int, shift: int) -> np.ndarray:
-    """The two lanes of a branch that leads `side` steps to the right and `ahead` ahead."""
+    """Return the two lanes of a branch with `side` steps to the right and `ahead` ahead."""
     cells = []
     for outer in (0, 1):
         start, end = _NEST_JUNCTION - outer, _NEST_JUNCTION + ahead + outer
@@ -141,6 +141,5 @@ def _corridor(side: int, ahead: int, shift: int) -> np.ndarray:
 
 
 def _placed(cells: np.ndarray, mirrored: bool) -> np.ndarray:
-    """Cells in their normal form; in the mirror, y and z change places."""
     cells = normal_form(cells)
     return cells[:, [0, 2, 1]] if mirrored else cells

@@ -1,4 +1,4 @@
-"""Open worlds: rocks, scattered food and three piles of it, drawn at random."""
+"""Random worlds with rocks, scattered food items and piles of food."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
 CLEARING_RADIUS = 3
-MAX_SHARE = 0.9  # of the cells, rocks and single foods together
+MAX_SHARE = 0.9  # the largest share of rocks and single food items together among the cells
 MAX_DRAWS = 100
 
 _QUEEN = (0, 0, 0)
-# Purposes of the streams that draw a world: text, so that they stay clear of the small numbers of
-# the purposes in `constants`. One stream each: another share of food leaves the rocks alone.
+# Purposes of the streams that draw a world. They are text, so that they differ from the small
+# numbers in `constants`. With separate streams, the share of food does not change the rocks.
 _STREAM_RANGES = int.from_bytes(b"ranges", "big")
 _STREAM_ROCKS = int.from_bytes(b"rocks", "big")
 _STREAM_FOOD = int.from_bytes(b"food", "big")
-_BATCH_CELLS = 1 << 22  # covered by the hexagons that are placed at once; bounds the memory
+_BATCH_CELLS = 1 << 22  # the most cells under hexagons that are placed at once, to bound memory
 
 Ranges = Annotated[Sequence[int] | None, Is("size of the world along x, y and z", unit="cells")]
 RockShare = Annotated[float, Is("share of the cells under rocks", least=0, most=MAX_SHARE)]
@@ -41,21 +41,22 @@ def open_world(
     ] = 0.03,
     piles: Annotated[Piles, Is(least=0)] = 3,
 ) -> World:
-    """A random world: the queen at the origin, rocks, single foods and up to three piles of food.
+    """Return a random world with rocks, single food items and up to three piles of food.
 
-    Rocks are hexagons of a radius from 0 to max(1, min(X, Y, Z) // 20), placed until their share of
-    the cells is reached. Piles are hexagons of radius max(1, n // 16), three quarters along each
-    range n, in the order of the ranges; they replace rocks. Everything within distance 3 of the
-    queen is free. Where too few cells are free for the share of single foods, all of these have
-    food. Ranges of None are drawn from 10 to 100. No trail, no listed ants; the same seed gives the
-    same world. AntsError if the shares are above 0.9 together, or no food could be reached from the
-    queen in 100 worlds drawn.
+    The queen is at the origin, and all other cells within distance 3 of her are empty. Rocks are
+    hexagons of a random radius from 0 to max(1, min(X, Y, Z) // 20), placed until they cover their
+    share of the cells. Piles are hexagons of radius max(1, n // 16), three quarters along each
+    range n, in the order of the ranges; they replace rocks. If fewer cells are free than the share
+    of single food items requires, all free cells have food. If `ranges` is None, each range is
+    drawn from 10 to 100. There are no trails and no listed ants. The same seed gives the same
+    world. Raises AntsError if the shares add up to more than 0.9, or if ants could not reach food
+    from the queen in any of 100 random worlds.
     """
     seed = whole("seed", seed)
     if rock_share + food_share > MAX_SHARE:
         raise AntsError(
             f"rock_share {rock_share} and food_share {food_share} add up to more than {MAX_SHARE}; "
-            "choose smaller shares, so that ants have room to walk."
+            "choose smaller shares, so that ants have space to walk."
         )
     given = None if ranges is None else parse_ranges(ranges)
     for attempt in range(MAX_DRAWS):
@@ -78,14 +79,13 @@ def far_piles(
     rock_share: RockShare = 0.15,
     piles: Annotated[Piles, Is(least=1)] = 3,
 ) -> World:
-    """An open world without single foods: all food lies in piles far from the queen."""
+    """Return an open world in which all food lies in piles far from the queen."""
     return open_world(seed, ranges, rock_share, 0.0, piles)
 
 
 def _draw(
     grid: AxialGrid, rock_share: float, food_share: float, piles: int, seed: int, attempt: int
 ) -> World:
-    """One world, whether or not its food can be reached."""
     rocks = scatter_rocks(grid, rock_share, Stream(seed, _STREAM_ROCKS, attempt))
     food = np.zeros(grid.size, dtype=bool)
     ranges = np.array(grid.ranges)
@@ -102,7 +102,7 @@ def _draw(
     free[clearing] = False
     places = np.flatnonzero(free)
     singles = min(round(food_share * grid.count), len(places))
-    # The places with the smallest of as many random words are a sample without replacement.
+    # The places of the smallest random words are a sample without replacement.
     if singles:
         words = Stream(seed, _STREAM_FOOD, attempt).bits(len(places))
         food[places[np.argpartition(words, singles - 1)[:singles]]] = True
@@ -115,10 +115,10 @@ def _draw(
 
 
 def scatter_rocks(grid: AxialGrid, share: float, stream: Stream) -> np.ndarray:
-    """bool (grid.size,): cells under random hexagons, placed one by one until `share` is covered.
+    """Return the cells under random hexagons that together cover `share`, bool (grid.size,).
 
-    Each takes one draw, the high word for its centre, the low word for its radius; so batches
-    change nothing.
+    Each hexagon takes one draw: the high word for its centre, the low word for its radius. The size
+    of batches therefore does not change the result.
     """
     max_radius = max(1, min(grid.ranges) // 20)
     largest = 1 + 3 * max_radius * (max_radius + 1)
@@ -131,7 +131,7 @@ def scatter_rocks(grid: AxialGrid, share: float, stream: Stream) -> np.ndarray:
         centres = existing[choose(words >> np.uint64(32), len(existing))]
         radii = choose(words & np.uint64(0xFFFF_FFFF), max_radius + 1)
         rock, cell = _hexagons(grid, grid.cells(centres), radii)
-        # A cell counts for the first rock that covers it; the rock that reaches the target is last.
+        # A cell counts for the first rock that covers it. The rock that reaches the target is last.
         distinct, first = np.unique(cell, return_index=True)
         gains = np.bincount(rock[first[~covered[distinct]]], minlength=len(words))
         totals = n_covered + np.cumsum(gains)
@@ -144,11 +144,11 @@ def scatter_rocks(grid: AxialGrid, share: float, stream: Stream) -> np.ndarray:
 def _hexagons(
     grid: AxialGrid, centres: np.ndarray, radii: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the places in `centres`, ascending, and the existing cells of these hexagons."""
+    """Return the existing cells of hexagons, each with its index in `centres` (ascending)."""
     disc = _disc(int(radii.max()))
     sizes = 1 + 3 * radii * (radii + 1)
     hexagon = np.repeat(np.arange(len(radii)), sizes)
-    # `disc` is sorted by distance: a smaller hexagon is the beginning of a larger one.
+    # `disc` is sorted by distance, so a smaller hexagon is the beginning of a larger one.
     place = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
     cells = cube(axial(centres)[hexagon] + disc[place])
     inside = (cells < np.array(grid.ranges)).all(axis=1)
@@ -156,7 +156,7 @@ def _hexagons(
 
 
 def _disc(radius: int) -> np.ndarray:
-    """Axial steps int64 (n, 2) to all cells within `radius`, by ascending distance."""
+    """Return axial steps, int64 (n, 2), to all cells within `radius`, by ascending distance."""
     q, r = np.meshgrid(*[np.arange(-radius, radius + 1)] * 2, indexing="ij")
     steps = np.stack([q.reshape(-1), r.reshape(-1)], axis=1)
     far = cube(steps).max(axis=1)

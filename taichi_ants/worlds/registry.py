@@ -1,4 +1,4 @@
-"""The worlds that have a name."""
+"""The registry of worlds."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Builder = Callable[..., World]
 
 
 def paper() -> World:
-    """The paper's world: 271 cells, one food, and a trail along the x axis from end to end."""
+    """Return the paper's world: 271 cells, one food item, and a trail along the whole x axis."""
     return World(
         ranges=(10, 10, 10),
         queen=(0, 9, 9),
@@ -38,12 +38,12 @@ _BUILDERS = dict(BUILT_IN)
 
 
 def register(name: str, builder: Builder) -> None:
-    """Give a world a name, by which `build` and the command lines find it.
+    """Register a world by a name for `build` and commands, in place of your own of the same name.
 
-    The builder is called with settings of the world by name and returns a `World`. Its arguments
-    need defaults, except `seed`: a builder with such an argument gets a whole number, and must
-    return the same world for the same number. It replaces your own world of the same name;
-    AntsError if that is of the package or not text, or the builder cannot be called so.
+    The builder is called with the settings of the world as keywords and returns a `World`. All its
+    arguments except `seed` need defaults. A builder with an argument `seed` gets a whole number and
+    must return the same world for the same number. Raises AntsError if the name is not text or
+    belongs to a built-in world, or if an argument has no default.
     """
     if not isinstance(name, str) or not name.strip():
         raise AntsError(f"the world name {shown(name)} is not allowed; it must be text.")
@@ -66,36 +66,36 @@ def register(name: str, builder: Builder) -> None:
 
 
 def names() -> tuple[str, ...]:
-    """The registered names, sorted."""
+    """Return the registered names, sorted."""
     return tuple(sorted(_BUILDERS))
 
 
 def is_drawn(name_or_path: str | os.PathLike[str]) -> bool:
-    """Whether a world depends on a seed; the paper's, a bridge and a map file do not."""
+    """Return whether a world depends on a seed; the paper's, bridges and map files do not."""
     builder = _BUILDERS.get(name_or_path) if isinstance(name_or_path, str) else None
     return builder is not None and "seed" in inspect.signature(builder).parameters
 
 
 def settings_of(name: str) -> tuple[Setting, ...]:
-    """The declared settings of a registered world; arguments that are not declared are left out."""
+    """Return the declared settings of a registered world."""
     return declared(_BUILDERS[name])
 
 
 def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
-    """Make sure that a seed can change the world; AntsError if nothing is drawn, as in a map."""
+    """Raise AntsError unless the world depends on a seed."""
     if not is_drawn(name_or_path):
         drawn = ", ".join(filter(is_drawn, names()))
         raise AntsError(
-            f"{option} is for a world drawn at random, not for {shown(name_or_path)}; leave it "
-            f"out, or choose a world of {drawn}."
+            f"{option} has no effect on {shown(name_or_path)}, which is not drawn at random; leave "
+            f"it out, or choose one of {drawn}."
         )
 
 
 def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> World:
-    """The world of a registered name, or, if there is none, of the text map in a file.
+    """Return the world with a registered name or, if there is none, of a map file.
 
     The seed is any whole number, which only some builders use; `given` are settings of the world.
-    AntsError if there is neither such a name nor such a file, or building fails.
+    Raises AntsError if neither the name nor the file exists, or the builder fails.
     """
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)
@@ -119,7 +119,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise AntsError(
-            f"the builder of {shown(name_or_path)} failed with {reason}; mend it."
+            f"the builder of {shown(name_or_path)} failed with {reason}; correct it."
         ) from error
-    expect(f"what the builder of {shown(name_or_path)} returns", world, World)
+    expect(f"the result of the builder of {shown(name_or_path)}", world, World)
     return world

@@ -1,14 +1,14 @@
 """Worlds as drawings in plain text.
 
-Hexagons are flat-topped. The cell straight up of a cell stands two lines above it in the same
-column; the one up and to the right one line above and two columns to the right. So the cells of one
-line are four columns apart, and neighbouring lines are offset by two.
+Hexagons are flat-topped. The neighbour straight up is two lines above in the same column; the
+neighbour up and to the right is one line above and two columns to the right. So the cells of a line
+are four columns apart, and neighbouring lines are offset by two columns. The characters are::
 
-    .  empty          Q  the queen      0 to 5  an ant with that heading
+    .  empty          Q  the queen      0 to 5  an ant with this heading
     #  obstacle       F  food           a to f  an ant with heading 0 to 5 on a trail
-    t  trail                            (blanks are no cells)
+    t  trail                            blanks are not cells
 
-Lines that start with `;` are comments. Above the drawing may stand `trail = 25`, the level of all
+Lines that start with `;` are comments. A line `trail = 25` above the drawing sets the level of all
 trails. Ants are numbered in reading order.
 """
 
@@ -39,19 +39,19 @@ _SETTING = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 
 
 def load_map(path: str | os.PathLike[str]) -> World:
-    """The world drawn in a text file (UTF-8), see `from_text`; AntsError if it cannot be read."""
+    """Return the world drawn in a UTF-8 file; AntsError if it cannot be read. See `from_text`."""
     return from_text(files.read_text(path), str(path))
 
 
 def from_text(text: str, source: str = "the map") -> World:
-    """The world drawn in `text`, in the form that the module's docstring describes.
+    """Return the world drawn in `text`, in the format that the module's docstring describes.
 
-    The ranges are those of the smallest world that holds the drawn cells; cells of it that are not
-    drawn become obstacles. AntsError, which calls the text `source`, if the map is damaged.
+    It is the smallest world that contains all drawn cells; its other cells become obstacles. Raises
+    AntsError, which calls the text `source`, if the map is damaged.
     """
     if not isinstance(text, str):
         raise AntsError(f"{source} is {type(text).__name__}; it must be text.")
-    text = text.removeprefix("\ufeff")  # the byte-order mark with which some editors begin a file
+    text = text.removeprefix("\ufeff")  # the byte-order mark, which some editors write
     level, drawn = _read(text, source)
     axials = _axials(drawn, source)
     ranges, origin = smallest_world(axials)
@@ -82,7 +82,7 @@ def ranges_of(text: str, source: str = "the map") -> tuple[int, int, int]:
 
 @dataclass(slots=True)
 class _Drawn:
-    """A character of the drawing: `line` counts all lines from 1, `row` those of the drawing."""
+    """A character of a drawing; `line` counts all lines from 1, `row` lines of the drawing."""
 
     mark: str
     line: int
@@ -94,7 +94,6 @@ class _Drawn:
 
 
 def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
-    """The level of the trails, and the cells in reading order."""
     level = None
     drawn: list[_Drawn] = []
     row = 0
@@ -104,8 +103,8 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
         if setting := _SETTING.fullmatch(line):
             if level is not None or drawn:
                 raise AntsError(
-                    f"line {number} of {source} is {shown(line.strip())}; one such line may stand "
-                    "above the drawing."
+                    f"line {number} of {source} is {shown(line.strip())}; only one such line is "
+                    "allowed, above the drawing."
                 )
             level = _read_level(f"line {number} of {source}", *setting.groups())
             continue
@@ -114,9 +113,9 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
             if mark != " ":
                 drawn.append(_Drawn(mark, number, row, column))
                 if mark not in _CELLS:
-                    raise AntsError(f"{drawn[-1].found(source)}; allowed are {_ALLOWED}.")
+                    raise AntsError(f"{drawn[-1].found(source)}; use only {_ALLOWED}.")
     if not drawn:
-        raise AntsError(f"{source} draws no cell; draw cells with {_ALLOWED}.")
+        raise AntsError(f"{source} has no cells; draw cells with {_ALLOWED}.")
     queens = [one for one in drawn if one.mark == QUEEN]
     if not queens:
         raise AntsError(f"{source} has no queen; draw one cell as {QUEEN}.")
@@ -138,9 +137,9 @@ def _read_level(where: str, name: str, value: str) -> int:
 
 
 def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
-    """int64 (n, 2): the axial coordinates (q, r) of the characters, up to a shift."""
-    # A column is 2 r, a row r - 2 q, both up to a shift. So the parity of the column, and that of
-    # row - r, are the same for all cells; the majority decides which they are.
+    """Return the axial coordinates (q, r) of the characters, up to a shift: int64 (n, 2)."""
+    # A column is 2 r and a row r - 2 q, both up to a shift. So all cells have the same parity of
+    # the column and of row - r; the majority of the characters determines it.
     rows = np.array([one.row for one in drawn])
     columns = np.array([one.column for one in drawn])
     odd = columns % 2
@@ -150,23 +149,28 @@ def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
     stray = np.flatnonzero(grids != grid)
     if len(stray):
         raise AntsError(
-            f"{drawn[stray[0]].found(source)} between the hexagons; the cells of a line are four "
-            "columns apart, and neighbouring lines are offset by two."
+            f"{drawn[stray[0]].found(source)} between hexagons; place the cells of a line four "
+            "columns apart, and offset neighbouring lines by two columns."
         )
     return np.stack([(r - rows + grid % 2) // 2, r], axis=1)
 
 
 def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int, int]]:
-    """The ranges with the fewest cells that hold the given cells, and their origin (q0, r0).
+    """Return the ranges of the smallest world that contains the given cells, and its origin.
 
-    A world of ranges (a + 1, b + 1, c + 1) with its origin at (q0, r0) holds the cells (q, r) with
-    -c <= q - q0 <= a, -c <= r - r0 <= b and -b <= (q - r) - (q0 - r0) <= a. So the extremes of q, r
-    and d = q - r decide. An origin exists if and only if a + c >= width of q, b + c >= width of r,
-    a + b >= width of d, a + b + c >= q_max - r_min - d_min and a + b + c >= d_max - q_min + r_max.
-    The number of cells grows with s = a + b + c, so the smallest possible s is best; for that s it
-    is a constant less (a^2 + b^2 + c^2) / 2, so one of a, b, c should be as large as possible, then
-    the next. Of equally small worlds it is the one of the largest X, then the largest Y; of its
-    origins the one of the smallest q, then the smallest r.
+    A world of ranges (a + 1, b + 1, c + 1) with its origin at (q0, r0) contains the cells (q, r)::
+
+        -c <= q - q0 <= a,  -c <= r - r0 <= b,  -b <= (q - r) - (q0 - r0) <= a
+
+    So only the extremes of q, r and d = q - r matter. An origin exists if and only if::
+
+        a + c >= width of q,  b + c >= width of r,  a + b >= width of d
+        a + b + c >= q_max - r_min - d_min,  a + b + c >= d_max - q_min + r_max
+
+    The number of cells grows with s = a + b + c, so the smallest possible s is best. For this s,
+    the number is a constant minus (a^2 + b^2 + c^2) / 2, so one of a, b and c should be as large as
+    possible, then the next. Ties are broken by the largest X, then the largest Y; ties of the
+    origin (q0, r0) by the smallest q0, then the smallest r0.
     """
     q, r = axials[:, 0], axials[:, 1]
     q_min, q_max = int(q.min()), int(q.max())
@@ -189,23 +193,23 @@ def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int,
 
 
 def to_text(world: World) -> str:
-    """The map of a world; `from_text` gives it back, its ants numbered in reading order.
+    """Return the map of a world; `from_text` reads it, with ants numbered in reading order.
 
-    AntsError if a map cannot show its trails: of several levels, or under food or the queen.
+    Raises AntsError for trails of several levels, and for trails under food or the queen.
     """
     expect("world", world, World)
     levels = np.unique(world.trails[:, 3])
     if len(levels) > 1:
         raise AntsError(
             f"the trails have {len(levels)} levels from {levels[0]} to {levels[-1]}, but a map can "
-            "show one only; give all trails the same level."
+            "show only one; give all trails the same level."
         )
     on_trail = {tuple(cell) for *cell, _ in world.trails.tolist()}
     hidden = on_trail & {world.queen, *map(tuple, world.foods.tolist())}
     if hidden:
         raise AntsError(
             f"a trail lies on {min(hidden)} under the queen or food, which a map cannot show; "
-            "take it out of the trails."
+            "remove this trail."
         )
     marks = [(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)]
     marks += [(world.obstacles, OBSTACLE), (world.foods, FOOD), (np.array([world.queen]), QUEEN)]
@@ -217,7 +221,7 @@ def to_text(world: World) -> str:
 
 
 def drawing(ranges: tuple[int, int, int], marks: Iterable[tuple[np.ndarray, str]]) -> str:
-    """Characters on cells (n, 3), in normal form, of a world; later ones lie above."""
+    """Return a drawing with characters on cells (n, 3) in normal form; later ones cover earlier."""
     size_x, size_y, size_z = ranges
     page = np.full((2 * size_x + size_y + size_z - 3, 2 * (size_y + size_z) - 3), " ")
     for cells, mark in marks:

@@ -1,4 +1,4 @@
-"""Turns what a caller passes to `World` into checked arrays, and names what is wrong."""
+"""Conversion of the arguments of `World` into checked arrays."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import FAR, MAX_ARRAY_CELLS, AxialGrid
 from taichi_ants.task.constants import MAX_TRAIL_LEVEL
 
-_STANDS = ("nothing", "the queen", "a food", "an obstacle")
+_STANDS = ("nothing", "the queen", "a food item", "an obstacle")
 
 
 def parse_ranges(ranges: object) -> tuple[int, int, int]:
-    """`ranges` as three integers of at least 1; AntsError if they are not."""
+    """Return `ranges` as three integers of at least 1; AntsError if they are not."""
     values = _whole_numbers(ranges)
     if len(values) != 3 or min(values) < 1 or max(values) > MAX_ARRAY_CELLS:
         raise AntsError(
@@ -26,7 +26,7 @@ def parse_ranges(ranges: object) -> tuple[int, int, int]:
 def parse_contents(
     grid: AxialGrid, queen: object, foods: object, obstacles: object, trails: object, ants: object
 ) -> dict[str, tuple[int, ...] | np.ndarray]:
-    """The contents of a world, checked and in normal form, by the names of its fields."""
+    """Return the contents of a world, checked and in normal form, by field."""
     cell = _inside("queen", np.array([_row("queen", queen, "one cell (x, y, z)", 3)]), grid)
     contents = {
         "foods": _parse("foods", foods, grid),
@@ -34,7 +34,7 @@ def parse_contents(
         "trails": _parse("trails", trails, grid, "level", MAX_TRAIL_LEVEL),
         "ants": _parse("ants", ants, grid, "heading", N_HEADINGS - 1),
     }
-    stands = np.zeros(grid.size, dtype=np.uint8)  # on each cell, a place in _STANDS
+    stands = np.zeros(grid.size, dtype=np.uint8)  # the content of each cell, an index of _STANDS
     stands[grid.index(cell)] = 1
     for name, rows in contents.items():
         if name != "ants":
@@ -44,14 +44,14 @@ def parse_contents(
         if len(first) < len(index):
             again = np.delete(np.arange(len(index)), first)[0]
             raise AntsError(
-                f"{name} hold {_cell(rows[again])} more than once; list each cell once."
+                f"{name} contain {_cell(rows[again])} more than once; list each cell once."
             )
         # Trails may lie under the queen and foods.
         (shared,) = np.nonzero(stands[index] > (2 if name == "trails" else 0))
         if len(shared):
             raise AntsError(
-                f"{name} hold {_cell(rows[shared[0]])}, where {_STANDS[stands[index[shared[0]]]]} "
-                "stands; only one of them can be there."
+                f"{name} contain {_cell(rows[shared[0]])}, the cell of "
+                f"{_STANDS[stands[index[shared[0]]]]}; remove one of them."
             )
         if name in ("foods", "obstacles"):
             stands[index] = 2 if name == "foods" else 3
@@ -65,7 +65,7 @@ def parse_contents(
 def _parse(
     name: str, values: object, grid: AxialGrid, number: str = "", most: int = 0
 ) -> np.ndarray:
-    """Entries as int32 (n, 3), or (n, 4) with a fourth column from 0 to `most`."""
+    """Return entries as int32 (n, 3), or (n, 4) with a fourth column from 0 to `most`."""
     form, columns = (f"((x, y, z), {number})", 4) if number else ("(x, y, z)", 3)
     given = _rows(name, values, form, columns)
     (bad,) = np.nonzero(((given[:, 3:] < 0) | (given[:, 3:] > most)).any(axis=1))
@@ -78,21 +78,20 @@ def _parse(
 
 
 def _inside(name: str, given: np.ndarray, grid: AxialGrid) -> np.ndarray:
-    """Rows in normal form, int32; int64 (n, 3 or more) are given."""
+    """Return rows of int64 (n, 3 or more) in normal form, int32; AntsError if outside the world."""
     rows = given.copy()
     rows[:, :3] -= given[:, :3].min(axis=1, keepdims=True, initial=FAR)
     (outside,) = np.nonzero((rows[:, :3] >= np.array(grid.ranges)).any(axis=1))
     if len(outside):
         place = f"{name}[{outside[0]}]" if name != "queen" else name
         raise AntsError(
-            f"{place} is {tuple(given[outside[0]].tolist())}, outside the world: with the smallest "
-            f"coordinate shifted to 0, the others must be below the ranges {grid.ranges}."
+            f"{place} is {tuple(given[outside[0]].tolist())}, outside the world; in the form whose "
+            f"smallest coordinate is 0, all must be below the ranges {grid.ranges}."
         )
     return rows.astype(np.int32)
 
 
 def _rows(name: str, values: object, form: str, columns: int) -> np.ndarray:
-    """Entries of `columns` whole numbers as int64 (n, columns)."""
     if not isinstance(values, np.ndarray):
         entries = entries_of(values)
         if entries is None:
@@ -104,7 +103,7 @@ def _rows(name: str, values: object, form: str, columns: int) -> np.ndarray:
     if values.dtype.kind not in "iu" or values.ndim != 2 or values.shape[1] != columns:
         raise AntsError(
             f"{name} is an array of shape {values.shape} and type {values.dtype}; "
-            f"it must hold whole numbers in the shape (n, {columns}), each row {form}."
+            f"it must have whole numbers and the shape (n, {columns}), with rows {form}."
         )
     (far,) = np.nonzero((np.abs(values.astype(np.float64)) > FAR).any(axis=1))
     if len(far):
@@ -113,20 +112,20 @@ def _rows(name: str, values: object, form: str, columns: int) -> np.ndarray:
 
 
 def _row(name: str, entry: object, form: str, columns: int) -> list[int]:
-    """One entry as `columns` integers; a pair (cell, number) is taken apart."""
+    """Return one entry as `columns` integers; a pair (cell, number) is flattened."""
     values = entries_of(entry) or []
     if columns == 4 and len(values) == 2:
         values = [*(entries_of(values[0]) or []), values[1]]
     numbers = _whole_numbers(values)
     if len(numbers) != columns or max(map(abs, numbers)) > FAR:
         raise AntsError(
-            f"{name} is {shown(entry)}; it must be {form} in whole numbers of up to 2**40."
+            f"{name} is {shown(entry)}; it must be {form} in whole numbers up to 2**40."
         )
     return numbers
 
 
 def _whole_numbers(values: object) -> list[int]:
-    """The entries of a sequence as integers; none if it is no sequence of whole numbers."""
+    """Return the entries of a sequence as integers; [] if they are not whole numbers."""
     try:
         return [whole("", value) for value in entries_of(values) or []]
     except AntsError:

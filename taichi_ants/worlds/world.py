@@ -1,4 +1,4 @@
-"""What a world is: its cells and what stands on them when an episode starts."""
+"""The class of worlds: cells and their contents at the start of an episode."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ from taichi_ants.worlds import validation
 
 Start = Literal["nest", "spread"]
 STARTS: tuple[str, ...] = get_args(Start)
-# Which cells of a 3 x 3 window (rows r, columns q) are neighbours on the hexagonal grid.
+# The neighbours on the hexagonal grid in a 3 x 3 window (rows r, columns q).
 _NEIGHBOURS = np.array([[1, 1, 0], [1, 1, 1], [0, 1, 1]])
 _PARTS = ("foods", "obstacles", "trails", "ants")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class World:
-    """A world of hexagonal cells, as it is when an episode starts.
+    """A world of hexagonal cells at the start of an episode.
 
-    Cells may be given in any form of cube coordinates; they are stored in normal form, in read-only
-    copies. Foods, obstacles and trails are sets, stored in lexicographic order: two worlds with the
-    same contents are equal. Ants keep their order, an ant's place is its number.
+    You can give cells in any form of cube coordinates; read-only copies store them in normal form.
+    Foods, obstacles and trails are sets in lexicographic order, so worlds with the same contents
+    are equal. Ants are a list in which the index of an ant is its number.
 
     Attributes:
-        ranges: (X, Y, Z), the numbers of values of each coordinate, in cells, each at least 1.
+        ranges: (X, Y, Z), the number of values of each coordinate, in cells, each at least 1.
         queen: (x, y, z), the queen's cell.
-        foods, obstacles: Cells with food, and that cannot be entered, int32 (n, 3); given as a
-            sequence of (x, y, z) or such an array.
-        trails: int32 (T, 4) = x, y, z, trail level (ticks until it has evaporated); given as a
-            sequence of ((x, y, z), level) or such an array. Entries of level 0 are left out. Where
-            trails are float32 (see `Pheromone.dense`), levels above 2**24 are rounded to that.
-        ants: int32 (A, 4) = x, y, z, heading; given likewise. More ants than these are placed by
-            `start`.
+        foods, obstacles: Cells with food or obstacles, int32 (n, 3). Give a sequence of (x, y, z),
+            or such an array.
+        trails: Cells with trails, int32 (T, 4) = x, y, z, level (ticks until the trail has
+            evaporated). Give a sequence of ((x, y, z), level), or such an array. Level 0 means no
+            trail. If `Pheromone.dense`, levels are float32, so those above 2**24 are rounded.
+        ants: Listed ants, int32 (A, 4) = x, y, z, heading. Give a sequence of ((x, y, z), heading),
+            or such an array. `start` places additional ants.
 
     Raises:
-        AntsError: A value has the wrong form, lies outside the world, is listed twice, or stands
-            where something else stands. Trails may lie under the queen, foods and ants.
+        AntsError: A value has the wrong form, is outside the world or listed twice, or shares a
+            cell. Only trails can share a cell, with the queen, food or ants.
     """
 
     ranges: tuple[int, int, int]
@@ -55,7 +55,7 @@ class World:
     trails: np.ndarray = ()  # type: ignore[assignment]
     ants: np.ndarray = ()  # type: ignore[assignment]
 
-    if TYPE_CHECKING:  # what is given may be any sequence, what is stored is an array
+    if TYPE_CHECKING:  # arguments may be any sequences, but attributes are arrays
 
         def __init__(
             self,
@@ -73,18 +73,18 @@ class World:
         contents = validation.parse_contents(
             grid, self.queen, self.foods, self.obstacles, self.trails, self.ants
         )
-        # The dataclass is frozen; this is the one place that writes its fields.
+        # The dataclass is frozen; only this code sets its fields.
         object.__setattr__(self, "ranges", ranges)
         for name, value in contents.items():
             object.__setattr__(self, name, value)
 
     @cached_property
     def grid(self) -> AxialGrid:
-        """How the cells lie in flat arrays; `grid.size` is the length of all arrays below."""
+        """The layout of flat arrays; `grid.size` is the length of all arrays below."""
         return AxialGrid(self.ranges)
 
     def ground(self) -> np.ndarray:
-        """uint8 (grid.size,): EMPTY, OBSTACLE, FOOD or QUEEN; outside the world OBSTACLE."""
+        """Return EMPTY, OBSTACLE (also outside), FOOD or QUEEN by cell, uint8 (grid.size,)."""
         ground = np.where(self.grid.exists, np.uint8(EMPTY), np.uint8(OBSTACLE))
         ground[self.grid.index(self.obstacles)] = OBSTACLE
         ground[self.grid.index(self.foods)] = FOOD
@@ -92,17 +92,17 @@ class World:
         return ground
 
     def trail_levels(self) -> np.ndarray:
-        """int32 (grid.size,): the trail level of each cell."""
+        """Return the trail level of each cell, int32 (grid.size,)."""
         levels = np.zeros(self.grid.size, dtype=np.int32)
         levels[self.grid.index(self.trails[:, :3])] = self.trails[:, 3]
         return levels
 
     def distances(self) -> np.ndarray:
-        """int32 (grid.size,): steps from each cell to the queen, obstacles ignored; 0 outside."""
+        """Return the steps to the queen without obstacles, int32 (grid.size,); 0 outside."""
         return self.grid.distances(self.queen) * self.grid.exists
 
     def closer(self) -> np.ndarray:
-        """uint8 (grid.size,): bit h is set if the neighbour at heading h is nearer to the queen."""
+        """Return bit h by cell, 1 if the neighbour at heading h is nearer to the queen (uint8)."""
         here = self.grid.distances(self.queen)
         bits = np.zeros(self.grid.size, dtype=np.uint8)
         for heading, offset in enumerate(self.grid.offsets.tolist()):
@@ -111,8 +111,8 @@ class World:
         return bits * self.grid.exists
 
     def walkable(self, starts: np.ndarray) -> np.ndarray:
-        """bool (grid.size,): empty cells that can be reached from an empty one of `starts`."""
-        # Importing scipy.ndimage takes longer than all else here, and most worlds never need it.
+        """Return the empty cells within reach of empty cells in `starts`, bool (grid.size,)."""
+        # Importing scipy.ndimage is slow, and most worlds do not need it.
         from scipy.ndimage import label
 
         ground = self.ground().reshape(self.grid.height, self.grid.width)
@@ -121,17 +121,17 @@ class World:
         return np.isin(regions, home[home > 0])
 
     def reachable_foods(self) -> np.ndarray:
-        """bool (F,): whether an ant can walk from beside the queen to beside a food."""
+        """Return for each food item whether an ant can walk to it from the queen, bool (F,)."""
         found = self.walkable(self.grid.index(self.queen) + self.grid.offsets)
         return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
 
     def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
-        """Flat indices and headings, int32 (n,), of n ants at the start, the listed ants first.
+        """Return flat indices and headings, int32 (n,), of n ants at the start, listed ants first.
 
         Args:
-            seed: Any whole number; decides cells (ties of distance), and headings of placed ants.
-            n: Number of ants, at least 1. If fewer than the listed ants, the first of these.
-            where: "nest": on the free cells nearest to the queen. "spread": on any free cells.
+            seed: Any whole number; determines cells (ties of distance) and headings of placed ants.
+            n: Number of ants, at least 1; the first n listed ants if there are more.
+            where: "nest" for the free cells nearest to the queen, "spread" for any free cells.
         """
         seed, n = whole("seed", seed), whole("n", n)
         if n < 1:
@@ -146,14 +146,14 @@ class World:
         return cells.astype(np.int32), headings.astype(np.int32)
 
     def first_starts(self, seeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """`start` of one ant in the nest by each seed, uint64 (n,)."""
+        """Return `start` of one ant in the nest for each seed, uint64 (n,)."""
         if len(self.ants) or not len(seeds):
             listed = self.grid.index(self.ants[:1, :3]), self.ants[:1, 3]
             cells, headings = (np.broadcast_to(one, len(seeds)) for one in listed)
             return cells.astype(np.int32), headings.astype(np.int32)
         free = np.flatnonzero(self.ground() == EMPTY)
         if not len(free):
-            self.start(0)  # says that there is no room
+            self.start(0)  # raises AntsError because there is no room
         distance = self.distances()[free]
         nearest = free[distance == distance.min()]
         numbers = self.grid.number(self.grid.cells(nearest))
@@ -162,18 +162,18 @@ class World:
         return nearest[words.argmin(axis=1)].astype(np.int32), headings.astype(np.int32)
 
     def _free_cells(self, seed: int, n: int, taken: np.ndarray, where: str) -> np.ndarray:
-        """The first n free cells by their distance to the queen ("nest" only), then by a hash."""
+        """Return the first n free cells by distance to the queen ("nest" only), then by a hash."""
         free = self.ground() == EMPTY
         free[taken] = False
         index = np.flatnonzero(free)
         if n > len(index):
             raise AntsError(
-                f"{shown(n + len(taken))} ants are asked for; this world has room for "
-                f"{len(index) + len(taken)}, so ask for fewer ants or choose a larger world."
+                f"the number of ants is {shown(n + len(taken))}; this world has room for "
+                f"{len(index) + len(taken)}, so start fewer ants or choose a larger world."
             )
         if where == "nest":
             distance = self.distances()[index]
-            # Only the cells up to the distance at which n are complete need a hash and an order.
+            # Only cells up to the distance of the n-th cell need a hash and an order.
             last = np.searchsorted(np.cumsum(np.bincount(distance)), n)
             index, distance = index[distance <= last], distance[distance <= last]
         words = stream_state(seed, STREAM_START_CELL, self.grid.number(self.grid.cells(index)))
@@ -184,7 +184,7 @@ class World:
         return index[first[np.argsort(words[first])]]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the world as names and lists of numbers, for files; `from_dict` reads it."""
+        """Return the world as names and lists of numbers; `from_dict` reads it."""
         parts = {name: getattr(self, name).tolist() for name in _PARTS}
         return {"ranges": [*self.ranges], "queen": [*self.queen], **parts}
 
@@ -206,7 +206,7 @@ class World:
         return (self.ranges, self.queen, *(getattr(self, name).tobytes() for name in _PARTS))
 
     def __reduce__(self) -> tuple:
-        # Copies and pickles are built anew, so that their arrays are read-only as well.
+        # Copies and unpickled worlds are built from their contents, so that arrays are read-only.
         return World, (self.ranges, self.queen, *(getattr(self, name) for name in _PARTS))
 
     def __repr__(self) -> str:

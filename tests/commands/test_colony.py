@@ -288,11 +288,11 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
             ["study", "--training.learner", "sarsa_lambda"],
             "learn together; choose one of q_learning, sarsa,",
         ),
-        (["study", "--sizes", "300", "8", "--world-kinds", "paper"], "300 ants are asked for"),
+        (["study", "--sizes", "300", "8", "--world-kinds", "paper"], "the number of ants is 300"),
         (["study", "--training.learner", "none"], "there is no learner 'none'"),
         (["study", "--training.epsilon", 2], "`training.epsilon` is 2; it must be between 0 and 1"),
         (["live", "--ants", 0], "0 is not allowed"),
-        (["live", "--ants", 500, "--world.ranges", 10, 10, 10], "500 ants are asked for"),
+        (["live", "--ants", 500, "--world.ranges", 10, 10, 10], "the number of ants is 500"),
         (
             ["live", "--world", "paper", "--world.ranges", 9, 9, 9],
             "`world.ranges` is not a setting of the world 'paper'",
@@ -365,7 +365,7 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
         status, out, err = call("colony", [*arguments, *more], capsys)
         assert (status, out) == (2, "")
         assert_one_sentence(err)
-        assert "learner 'lost' made action values that are not finite" in err
+        assert "learner 'lost' computed action values that are not finite" in err
         monkeypatch.setattr(
             registry,
             "_LEARNERS",

@@ -429,7 +429,7 @@ def test_altered_results_are_not_shown_as_if_whole(name, copy, compare):
     assert (status, out) == (2, "")
     assert_one_sentence(err)
     assert f"{copy / name}" in err
-    assert "was altered" in err
+    assert "has changed" in err
     assert "--force" in err
 
 

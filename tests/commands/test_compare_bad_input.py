@@ -106,7 +106,7 @@ def test_sizes_and_switches(arguments, named, place, capsys):
         (["--world", ""], ["--world is empty"]),
         (["--world", "damaged.txt"], ["damaged.txt", "line 2", "'x'"]),
         (["--world", "two_queens.txt"], ["two_queens.txt"]),
-        (["--world", "bytes.txt"], ["bytes.txt", "not text"]),
+        (["--world", "bytes.txt"], ["bytes.txt", "not UTF-8 text"]),
         (["--world", "no_way.txt"], ["no_way.txt", "reached"]),
         (["--world", "no_room.txt"], []),
         (["--world.seed", "0"], ["--world.seed", "'paper'", "open"]),

@@ -148,7 +148,7 @@ def test_a_disk_without_room_is_told_before_the_work(tmp_path, capsys, monkeypat
         assert (status, out) == (2, "")
         assert_one_sentence(err)
         assert f"needs {needed / 1e9:.3f} GB on the disk of 'out" in err
-        assert "0.001 GB are free; make room there" in err
+        assert "0.001 GB are free; free some space" in err
         assert not Path("out").exists()
 
 

@@ -159,7 +159,7 @@ WRONG = {
     "episodes of learning": (["learning", "--episodes", "500"], "--episodes"),
     "world seed of the paper": (
         ["episode", "--world.seed", "3"],
-        "--world.seed is for a world drawn at random",
+        "--world.seed has no effect on",
     ),
     "ants of an episode": (["episode", "--ants", "80"], "--ants"),
     "plain learning": (["learning", "--no-overlay"], "--no-overlay"),

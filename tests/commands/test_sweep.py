@@ -192,7 +192,7 @@ WRONG = {
     ),
     "empty": ("[1, 0]", "[]", ["task.rewards.shaping is an empty list"]),
     "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
-    "seed twice": ("[7, 2, 5]", "[7, 7]", ["seeds holds 7 more than once"]),
+    "seed twice": ("[7, 2, 5]", "[7, 7]", ["seeds contains 7 more than once"]),
     "world": ("[task]", '[world]\npreset = "mars"\n[task]', ["'mars'", "open, paper"]),
     "world's": ("[task]", "[world]\nranges = [9, 9, 9]\n[task]", ["is not a setting of the"]),
     "per seed": ("[task]", "[world]\nper_seed = true\n[task]", ["per_seed", "colonies only"]),
@@ -219,7 +219,7 @@ WRONG = {
     "seed of one world": (
         "[task]",
         "[world]\nseed = 1\n[task]",
-        ["world.seed is for a world drawn"],
+        ["world.seed has no effect on"],
     ),
     "part of a text": (
         "[vary]",

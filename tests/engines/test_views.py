@@ -97,7 +97,7 @@ def test_a_row_may_leave_any_part_of_a_look_unread(encode, n_states):
 
 
 def test_a_lambda_is_refused_at_once():
-    with pytest.raises(AntsError, match="written with def"):
+    with pytest.raises(AntsError, match="defined with def"):
         observations.register(Observation("short", 4, lambda view: 0))
 
 
@@ -149,16 +149,16 @@ def with_a_return_in_each_branch(view):
 @pytest.mark.parametrize(
     ("encode", "says"),
     [
-        (beyond_the_table, "encode fails (it gives 128, but it must lie between 0 and 127"),
-        (below_the_table, "encode fails (it gives -1, but it must lie between 0 and 127"),
+        (beyond_the_table, "encode fails (it returns 128, which must lie between 0 and 127"),
+        (below_the_table, "encode fails (it returns -1, which must lie between 0 and 127"),
         (of_what_there_is_not, "has no attribute 'smell'"),
         (of_a_cell_too_far, "index out of range"),
         (of_the_end, "there is no entry -1"),
         (of_a_division_by_zero, "divide by zero"),
         (of_a_vector, "encode fails"),
         (of_what_overflows, "overflow"),
-        (with_an_early_return, "encode fails (it needs one return, as its last line)"),
-        (with_a_return_in_each_branch, "encode fails (it needs one return, as its last line)"),
+        (with_an_early_return, "encode fails (its only return must be its last line)"),
+        (with_a_return_in_each_branch, "encode fails (its only return must be its last line)"),
     ],
 )
 def test_what_gives_wrong_rows_is_refused_at_once(encode, says):

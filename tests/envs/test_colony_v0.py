@@ -190,7 +190,7 @@ def test_steps_in_the_wrong_order_and_wrong_actions(capsys):
     *_, truncated, _ = env.step(right)
     assert truncated == dict.fromkeys(right, True)
     assert env.step({}) == ({}, {}, {}, {}, {})  # with PettingZoo's warning
-    with pytest.raises(AntsError, match=r"^world lists 2 worlds; there is room for 1\.$"):
+    with pytest.raises(AntsError, match=r"^world lists 2 worlds; it must list at most 1\.$"):
         colony(world=[MEADOW, MEADOW])
 
 

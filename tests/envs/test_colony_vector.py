@@ -300,7 +300,10 @@ def test_steps_in_the_wrong_order_and_wrong_actions():
         ({"task": Task(life=Life(births=True))}, "life of the task is Life.*leave out births"),
         ({"task": Task(life=Life(lifespan=9))}, "life of the task is Life.*lifespan"),
         ({"autoreset_mode": "never"}, "autoreset_mode is 'never'; it must be one of NextStep"),
-        ({"task": Task(), "autoreset_mode": NEXT}, "autoreset_mode is 'NextStep', but an ant that"),
+        (
+            {"task": Task(), "autoreset_mode": NEXT},
+            "autoreset_mode is 'NextStep', but the next episode of an ant",
+        ),
         ({"task": "paper"}, "task is 'paper'; it must be a Task"),
         ({"world": "nowhere"}, "there is no world named 'nowhere'"),
         ({"world": []}, "world is .*; give the name of a world"),

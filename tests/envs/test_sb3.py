@@ -116,7 +116,7 @@ def test_environments_that_begin_anew_at_another_time_are_refused() -> None:
     made(1)
     from taichi_ants.envs.sb3 import SB3VecEnv
 
-    with pytest.raises(AntsError, match="is 'NextStep'; Stable-Baselines3 needs \"SameStep\""):
+    with pytest.raises(AntsError, match="is 'NextStep'; Stable-Baselines3 requires \"SameStep\""):
         SB3VecEnv(HexForageVectorEnv(2))
     with pytest.raises(AntsError, match="NextStep"):
         SB3VecEnv(SyncVectorEnv([HexForageEnv]))

@@ -55,13 +55,13 @@ def ragged(seen: np.ndarray) -> tuple:
     ("returned", "said"),
     [
         (lambda seen: np.zeros((5, 128)), r"shape \(5, 128\) and type float64; .*\(128, 5\)"),
-        (lambda seen: np.zeros(128), r"type float64; .* integers of \(128,\)"),
+        (lambda seen: np.zeros(128), r"type float64; .* integer actions \(128,\)"),
         (lambda seen: np.zeros((128, 5), complex), "type complex128"),
         (lambda seen: np.full(128, 5), "returned the action 5; it must be 0, 1"),
         (lambda seen: np.full(128, -1), "returned the action -1"),
         (lambda seen: np.where(np.eye(128, 5), np.nan, 0), "nan for state 0 and action 0"),
         (lambda seen: np.full((128, 5), -1e300), "-inf for state 0 and action 0"),
-        (ragged, "which is no array .*; return one array, without what else a library gives"),
+        (ragged, "which is not an array .*; return only one array, detached"),
     ],
 )
 def test_what_a_function_may_not_return(returned, said) -> None:

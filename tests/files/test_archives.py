@@ -181,9 +181,11 @@ def test_what_would_take_too_much_memory_is_not_unpacked(tmp_path: Path) -> None
     path = tmp_path / "a.npz"
     archives.write(path, {"x": np.zeros(10**6)})
     assert path.stat().st_size < 100_000
-    with pytest.raises(AntsError, match=r"a\.npz' unpacks to 8000512 bytes, and 7999999 are"):
+    with pytest.raises(
+        AntsError, match=r"a\.npz' unpacks to 8000512 bytes, and at most 7999999 are"
+    ):
         archives.read(path, most=7_999_999)
-    with pytest.raises(AntsError, match=r"it has .* bytes, and 1000 are allowed"):
+    with pytest.raises(AntsError, match=r"it has .* bytes, and at most 1000 are allowed"):
         archives.read(path, most=1000)
 
 
@@ -217,7 +219,7 @@ def test_memory_that_there_is_not_is_no_damage(
 
     archives.write(tmp_path / "a.npz", {"x": np.zeros(3)})
     monkeypatch.setattr("numpy.lib.format.read_array", refuse)
-    with pytest.raises(AntsError, match=r"a\.npz' takes more memory than there is; "):
+    with pytest.raises(AntsError, match=r"a\.npz' needs more memory than is available; "):
         archives.read(tmp_path / "a.npz")
 
 
@@ -234,14 +236,14 @@ def test_a_kind_of_file_holds_arrays_and_facts(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "said"),
     [
-        ({"x": 1}, "holds no thing of this version; name a file that Thing.save wrote."),
-        ({"facts": "{}"}, "holds no thing of this version"),
-        ({"facts": 3}, "holds no thing of this version"),
-        ({"facts": "[" * 1000}, "holds no thing of this version"),
-        ({"facts": '{"kind": "other", "version": 3}'}, "holds no thing of this version"),
+        ({"x": 1}, "does not contain a thing of this version; name a file that Thing.save wrote."),
+        ({"facts": "{}"}, "does not contain a thing of this version"),
+        ({"facts": 3}, "does not contain a thing of this version"),
+        ({"facts": "[" * 1000}, "does not contain a thing of this version"),
+        ({"facts": '{"kind": "other", "version": 3}'}, "does not contain a thing of this version"),
         (
             {"facts": '{"kind": "thing", "version": 2}'},
-            "holds a thing in version 2 of its format; only version 3 can be read, so make",
+            "contains a thing in version 2 of its format; only version 3 can be read, so create",
         ),
         ({"x": np.zeros(10_000)}, "unpacks to 80"),
     ],

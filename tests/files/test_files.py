@@ -341,8 +341,8 @@ def test_text_is_read_with_any_line_ends(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"\xff", "is not text in UTF-8; name another file."),
-        (b"12345678 ", "it has 9 bytes, and 8 are allowed; name another file."),
+        (b"\xff", "is not UTF-8 text; name another file."),
+        (b"12345678 ", "it has 9 bytes, and at most 8 are allowed; name another file."),
     ],
 )
 def test_text_that_is_none_or_too_long_is_refused(
@@ -387,7 +387,7 @@ def test_a_disk_with_too_little_room_is_named_before_the_work(tmp_path: Path) ->
     with pytest.raises(AntsError) as caught:
         files.check_room(tmp_path, free + 10**12)
     assert str(tmp_path) in str(caught.value)
-    assert "GB are free; make room there, ask for less" in str(caught.value)
+    assert "GB are free; free some space, write less" in str(caught.value)
 
 
 # check_writable_folder.

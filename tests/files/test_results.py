@@ -287,7 +287,7 @@ ALTERED = {
 def test_what_was_altered_is_noticed(change, tmp_path):
     folder = finish(tmp_path, names=("policy.npz", "figures/one.png"))
     ALTERED[change](tmp_path / "policy.npz")
-    said = r"policy\.npz', a part of the results, is missing or was altered .* give --force"
+    said = r"policy\.npz', a part of the results, is missing or has changed .* give --force"
     with pytest.raises(AntsError, match=said):
         folder.check()
 

@@ -143,7 +143,7 @@ def test_built_in_learners_are_not_replaced():
 @pytest.mark.parametrize(
     ("learner", "says"),
     [
-        (None, "what is registered is None; it must be a Learner"),
+        (None, "learner is None; it must be a Learner"),
         (clipped_td_error, "it must be a Learner"),
         (replace(CLIPPED, name="two words"), "the name of the learner is 'two words'; it must"),
         (replace(CLIPPED, name=""), "the name of the learner is ''; it must"),

@@ -128,7 +128,7 @@ def test_a_number_of_pythons_is_a_td_error(engine):
     values = engine("ones")
     assert np.isclose(values[values != 0].min(), 0.1)  # one update at the learning rate of 0.1
     register(td_learner("infinite", of_infinity))
-    with pytest.raises(AntsError, match="'infinite' made action values that are not finite"):
+    with pytest.raises(AntsError, match="'infinite' computed action values that are not finite"):
         engine("infinite")
 
 
@@ -304,10 +304,10 @@ def plain_function(value, reward, discount, next_values, next_action, epsilon):
         ),
         (
             natural_sarsa,
-            "looks at next_action, but no next action is drawn; give draws_next_action",
+            "uses next_action, but no next action is drawn; give draws_next_action",
         ),
-        (plain_function, "is no Taichi function"),
-        (None, "is no Taichi function"),
+        (plain_function, "is not a Taichi function"),
+        (None, "is not a Taichi function"),
     ],
 )
 def test_td_errors_that_are_refused_at_once(td_error, says):
@@ -435,8 +435,8 @@ FAILS = "learner 'mine' cannot be used: "
     [
         ({"learn": of_three}, "the function learn of 'mine' has 3 arguments; it needs 5: memory"),
         ({"begin": learn}, "the function begin of 'mine' has 5 arguments; it needs 2: memory and"),
-        ({"learn": plain_function}, "the function learn of 'mine' is no Taichi function"),
-        ({"plans": True, "td_error": natural_sarsa}, "the TD error of 'mine' looks at next_action"),
+        ({"learn": plain_function}, "the function learn of 'mine' is not a Taichi function"),
+        ({"plans": True, "td_error": natural_sarsa}, "the TD error of 'mine' uses next_action"),
         ({"hyperparameters": Clashing}, "'discount' is a setting of all learners"),
         (
             {"hyperparameters": OfText},
@@ -447,13 +447,13 @@ FAILS = "learner 'mine' cannot be used: "
             f"{FAILS}hyperparameters fails (`training.depth` is 3; it must be",
         ),
         ({"hyperparameters": 5}, f"{FAILS}hyperparameters fails"),
-        ({"memory": lambda settings, n: None}, f"{FAILS}memory fails (what it gives is None; it"),
+        ({"memory": lambda settings, n: None}, f"{FAILS}memory fails (its result is None; it"),
         ({"memory": lambda settings, n: Memory(floats=-3)}, f"{FAILS}memory fails (floats of a "),
         ({"memory": lambda settings, n: n / 0}, f"{FAILS}memory fails (division by zero)"),
         ({"memory": Memory(floats=9)}, f"{FAILS}memory fails ('Memory' object"),
         ({"cost": 5}, f"{FAILS}cost fails ('int' object"),
         ({"cost": lambda settings: "x"}, f"{FAILS}cost fails ("),
-        ({"cost": lambda settings: -1}, f"{FAILS}cost fails (it gives -1, but it must be above 0)"),
+        ({"cost": lambda settings: -1}, f"{FAILS}cost fails (it returns -1, which must be above"),
     ],
 )
 def test_learners_that_are_refused_when_they_are_registered(changes, says):
@@ -503,7 +503,9 @@ def that_explodes(value, reward, discount, next_values, next_action, epsilon):
 )
 def test_values_that_are_not_finite_are_named(td_error):
     register(td_learner("mine", td_error))
-    named = r"^learner 'mine' made action values that are not finite, with .*rate=0\.1.* seed 0; "
+    named = (
+        r"^learner 'mine' computed action values that are not finite, with .*rate=0\.1.* seed 0; "
+    )
     with pytest.raises(AntsError, match=named):
         in_runs()
     for sharing in ("shared", "independent"):
@@ -520,7 +522,7 @@ def test_values_that_are_not_finite_are_named_while_a_colony_is_stepped(tmp_path
         colony.begin_episode()
         colony.tick(100)
         path = tmp_path / "colony.npz"
-        named = "^learner 'mine' made action values that are not finite"
+        named = "^learner 'mine' computed action values that are not finite"
         with pytest.raises(AntsError, match=named):
             colony.outcome()
         with pytest.raises(AntsError, match=named):

@@ -463,7 +463,7 @@ def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
 
 def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
     monkeypatch.setattr(session_module, "KIND", replace(session_module.KIND, most=1000))
-    with pytest.raises(AntsError, match=r"unpacks to .* bytes, and 1000 are allowed"):
+    with pytest.raises(AntsError, match=r"unpacks to .* bytes, and at most 1000 are allowed"):
         replayed(edited["foraging"].to_bytes())
 
 

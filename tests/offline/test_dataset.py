@@ -33,7 +33,7 @@ def test_other_files_are_refused_in_one_sentence(data, tmp_path):
     with pytest.raises(AntsError, match="action of a data set runs from 9"):
         Dataset.load(path)
     archives.write(path, {"facts": "{}"})
-    with pytest.raises(AntsError, match="holds no data set"):
+    with pytest.raises(AntsError, match="does not contain a data set"):
         Dataset.load(path)
 
 

@@ -290,12 +290,12 @@ def test_bad_points_of_colonies_are_named(change, says):
     [
         ((), (0,), "no points"),
         (POINTS, (), "seeds is empty"),
-        (POINTS, (1, 1), "seeds holds 1 more than once"),
+        (POINTS, (1, 1), "seeds contains 1 more than once"),
         ((replace(POINTS[0], world=None),), (0,), "world is None"),
         ((replace(POINTS[0], world=World((2, 1, 1), (0, 0, 0), [(1, 0, 0)])),), (0,), "room for 0"),
         ((replace(POINTS[0], world=World((3, 3, 3), (0, 0, 0))),), (0,), "the world has no food"),
         ((ALONE,), (1, 2, 3), "2 worlds for 3 seeds"),
-        ((replace(ALONE, ants=4000),), (3, 5), "4000 ants are asked for"),
+        ((replace(ALONE, ants=4000),), (3, 5), "the number of ants is 4000"),
     ],
 )
 def test_bad_studies_are_refused_before_any_work(points, seeds, says):

@@ -34,8 +34,8 @@ ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
     "400 000 edits": (lambda facts: _edits(facts, 400_000), "5000000 are allowed"),
     "edits of many cells": (_cells, "of 400000 cells are allowed"),
     "4 000 000 lists": (lambda _: "[" + "[]," * 4_000_000 + "[]]", "5000000 are allowed"),
-    "1 300 000 lists": (lambda _: "[" + "[]," * 1_300_000 + "[]]", "holds no session"),
-    "deep lists": (lambda _: "[" * 60_000 + "]" * 60_000, "holds no session"),
+    "1 300 000 lists": (lambda _: "[" + "[]," * 1_300_000 + "[]]", "does not contain a session"),
+    "deep lists": (lambda _: "[" * 60_000 + "]" * 60_000, "does not contain a session"),
     "a large map": (
         lambda facts: _setup(facts, world="\n".join(["." * 1000] * 1000)),
         "at most 50000 are allowed",

@@ -701,7 +701,10 @@ def test_what_lies_between_moments_is_not_made_up(browser, folder):
     opened.read("viewer.follow(0)")
     meaning = opened.text("#ant .sees small")
     assert re.match(r"[A-Z] \w+(, [A-Z] [\w ]+)*", meaning)
-    letters = "P other load, p same load: ant on a better cell, A ant on no better one"
+    letters = (
+        "P ant with the other load on a better cell, A on a cell that is not better, "
+        "p ant with the same load on a better cell"
+    )
     view = {"task": "", "rest": "EPA", "letters": ["E", "P", "A"]}
     opened.read("view => { viewer.history.stateName = () => view; viewer.dirty = true; }", view)
     assert opened.text("#ant .sees small") == f"E empty; {letters}"

@@ -56,10 +56,10 @@ def test_a_builder_builds_worlds() -> None:
     with pytest.raises(AntsError, match="must be a function of a seed"):
         worlds.register("tiny", worlds.paper())
     worlds.register("empty", lambda seed: None)
-    with pytest.raises(AntsError, match="'empty' returns is None; it must be a World"):
+    with pytest.raises(AntsError, match="builder of 'empty' is None; it must be a World"):
         worlds.build("empty")
     worlds.register("broken", lambda seed: seed // 0)
-    with pytest.raises(AntsError, match=r"'broken' failed with ZeroDivisionError: .*; mend it"):
+    with pytest.raises(AntsError, match=r"'broken' failed with ZeroDivisionError: .*; correct it"):
         worlds.build("broken")
 
 

@@ -109,31 +109,31 @@ def test_cells_are_inside(name: str) -> None:
     ],
 )
 def test_nothing_is_listed_twice(name: str, entries: object) -> None:
-    with pytest.raises(AntsError, match=rf"{name} hold \(1, 0, 0\) more than once"):
+    with pytest.raises(AntsError, match=rf"{name} contain \(1, 0, 0\) more than once"):
         world(**{name: entries})
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"foods": [(3, 3, 3)]}, r"foods hold \(0, 0, 0\), where the queen stands"),
-        ({"obstacles": [(0, 0, 0)]}, r"obstacles hold \(0, 0, 0\), where the queen stands"),
+        ({"foods": [(3, 3, 3)]}, r"foods contain \(0, 0, 0\), the cell of the queen"),
+        ({"obstacles": [(0, 0, 0)]}, r"obstacles contain \(0, 0, 0\), the cell of the queen"),
         (
             {"foods": [(1, 0, 0)], "obstacles": [(2, 1, 1)]},
-            r"obstacles hold \(1, 0, 0\), where a food stands",
+            r"obstacles contain \(1, 0, 0\), the cell of a food item",
         ),
         (
             {"obstacles": [(1, 0, 0)], "trails": [((1, 0, 0), 3)]},
-            r"trails hold \(1, 0, 0\), where an obstacle stands",
+            r"trails contain \(1, 0, 0\), the cell of an obstacle",
         ),
-        ({"ants": [((0, 0, 0), 3)]}, r"ants hold \(0, 0, 0\), where the queen stands"),
+        ({"ants": [((0, 0, 0), 3)]}, r"ants contain \(0, 0, 0\), the cell of the queen"),
         (
             {"foods": [(1, 0, 0)], "ants": [((1, 0, 0), 3)]},
-            r"ants hold \(1, 0, 0\), where a food stands",
+            r"ants contain \(1, 0, 0\), the cell of a food item",
         ),
         (
             {"obstacles": [(1, 0, 0)], "ants": [((1, 0, 0), 3)]},
-            r"ants hold \(1, 0, 0\), where an obstacle stands",
+            r"ants contain \(1, 0, 0\), the cell of an obstacle",
         ),
     ],
 )

@@ -69,7 +69,7 @@ def test_nothing_but_a_queen() -> None:
     assert world.queen == (0, 0, 0)
     assert [getattr(world, name).shape for name in ARRAYS] == [(0, 3), (0, 3), (0, 4), (0, 4)]
     assert world.ground().tolist().count(OBSTACLE) == world.grid.size - 1
-    with pytest.raises(AntsError, match="1 ants are asked for"):
+    with pytest.raises(AntsError, match="the number of ants is 1;"):
         world.start(0)
 
 

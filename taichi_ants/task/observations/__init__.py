@@ -1,4 +1,4 @@
-"""What an ant tells apart: one file for each observation, registered here."""
+"""Observations of ants, one file each; this module registers them."""
 
 from taichi_ants.task.observations.ants import ANTS
 from taichi_ants.task.observations.ants_seen import ANTS_SEEN

@@ -1,13 +1,14 @@
-"""The three cells ahead; an ant with the other load is told from a rock."""
+"""The three cells ahead; ants with the other load differ from rocks."""
 
 from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import name_of_codes
 
 
 def encode(view):
-    """The load, then a code of each cell as a digit of base 6: the paper's, 4 or 5 for other loads.
+    """Return the load, then a code for each cell, as base-6 digits.
 
-    4 is an ant on a better cell: nearer to the queen, or without food with a stronger trail.
+    A code is the paper's, or for an ant with the other load 4 on a better cell and 5 otherwise. A
+    better cell is nearer to the queen or, for an ant without food, has a stronger trail.
     """
     index = view.carries
     for k in range(3):
@@ -28,7 +29,7 @@ ANTS = Observation(
     2 * 6**3,
     encode,
     name_of=name_of_codes(3, "EOTFPA", "EOSQPA"),
-    summary="the three cells ahead, ants with the other load told from rocks",
-    letters="P ant on a better cell, A ant on no better one",
+    summary="the three cells ahead, distinguishing ants with the other load from rocks",
+    letters="P ant on a better cell, A ant on a cell that is not better",
     shape=(2, 6, 6, 6),
 )

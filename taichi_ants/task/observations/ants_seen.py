@@ -1,11 +1,11 @@
-"""The three cells ahead; another ant is told from a rock."""
+"""The three cells ahead; ants differ from rocks."""
 
 from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import name_of_codes
 
 
 def encode(view):
-    """The load, then a code of each cell as a digit of base 5: the paper's, and 4 for an ant."""
+    """Return the load, then the paper's code of each cell or 4 for an ant, as base-5 digits."""
     index = view.carries
     for k in range(3):
         code = view.codes[k]
@@ -20,7 +20,7 @@ ANTS_SEEN = Observation(
     2 * 5**3,
     encode,
     name_of=name_of_codes(3, "EOTFA", "EOSQA"),
-    summary="the three cells ahead, other ants told from rocks",
+    summary="the three cells ahead, distinguishing ants from rocks",
     letters="A another ant",
     shape=(2, 5, 5, 5),
 )

@@ -1,4 +1,4 @@
-"""The paper's codes, in two more cells: the ones behind left and behind right."""
+"""The paper's codes of five cells: those ahead, behind left and behind right."""
 
 from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import name_of_codes
@@ -7,7 +7,7 @@ CELLS = (-2, -1, 0, 1, 2)
 
 
 def encode(view):
-    """The load, then the codes from behind left to behind right, as digits of base 4."""
+    """Return the load, then the codes from behind left to behind right, as base-4 digits."""
     index = view.carries
     for k in range(5):
         index = 4 * index + view.codes[k]
@@ -20,6 +20,6 @@ FIVE_CELLS = Observation(
     encode,
     CELLS,
     name_of_codes(len(CELLS), "EOTF", "EOSQ"),
-    "all cells around but the one behind",
+    "all neighbouring cells except the one behind",
     shape=(2, *[4] * 5),
 )

@@ -1,11 +1,11 @@
-"""What the paper's ants see: the three cells ahead, four codes each."""
+"""The observation of the paper's ants: the three cells ahead, four codes each."""
 
 from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import state_name
 
 
 def encode(view):
-    """The paper's state itself."""
+    """Return the paper's state index."""
     return view.percept
 
 

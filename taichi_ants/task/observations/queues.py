@@ -1,13 +1,13 @@
-"""The three cells ahead; ants are told from rocks, and those worth following from others."""
+"""The three cells ahead; ants differ from rocks, and ants worth following from other ants."""
 
 from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import name_of_codes
 
 
 def encode(view):
-    """The load, then a code of each cell as a digit of base 7.
+    """Return the load, then a code of each cell, as base-7 digits.
 
-    As `ants`, and 6 for an ant with the same load on a better cell.
+    Codes are those of `ants`, and 6 for an ant with the same load on a better cell.
     """
     index = view.carries
     for k in range(3):
@@ -31,7 +31,10 @@ QUEUES = Observation(
     2 * 7**3,
     encode,
     name_of=name_of_codes(3, "EOTFPAp", "EOSQPAp"),
-    summary="as ants; also ants with the same load on a better cell",
-    letters="P other load, p same load: ant on a better cell, A ant on no better one",
+    summary="like ants, also distinguishing ants with the same load on a better cell",
+    letters=(
+        "P ant with the other load on a better cell, A on a cell that is not better, "
+        "p ant with the same load on a better cell"
+    ),
     shape=(2, 7, 7, 7),
 )

@@ -1,8 +1,8 @@
-"""The one place where observations are registered.
+"""The registry of observations.
 
-An observation gives the index of the state that an ant sees. Actions and rewards never depend on
-it: these go by the percept, the paper's state. To add one, write a file beside this one and a line
-in `__init__.py`; or call `register` from a file of your own.
+An observation determines the state index of an ant. Actions and rewards do not depend on it, but
+on the percept, the paper's state. To add an observation to the package, write a file in this folder
+and add it to `__init__.py`. To add your own observation, call `register` from a plugin file.
 """
 
 from __future__ import annotations
@@ -20,37 +20,38 @@ from typing import Any
 from taichi_ants.errors import AntsError, check_new_name, checked_whole, expect, shown, unusable
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
-# Tables of this many rows hold 5 * 2**20 values; kernels index many of them by 32 bits.
+# Tables of this many rows have 5 * 2**20 values; kernels index several tables with 32 bits.
 MAX_STATES = 1 << 20
 AHEAD = (-1, 0, 1)
-_VIEWS = 3000  # and as many names of states, in a check
+_VIEWS = 3000  # the number of views, and of names of states, that a check tries
 
 
 @dataclass(frozen=True)
 class Observation:
-    """A way to number what an ant sees.
+    """A mapping from the view of an ant to a state index.
+
+    The view of an ant has these whole numbers, except that levels are floats if trails evaporate
+    exponentially or spread. Those marked (k) have an entry for each cell in `cells`.
+
+    - `carries`: 1 with food, else 0; `percept`: the paper's state, 0 to 127.
+    - `codes` (k): 0 E, 1 O, 2 T or S, 3 F or Q, relative to the strongest trail ahead.
+    - `levels` (k): The trail level if the cell is empty or has an ant on it, else 0.
+    - `ants` (k): 0 for no ant, 1 for an ant without food, 2 for an ant with food.
+    - `nearer` (k): 1 if the cell is nearer to the queen than the ant's own.
+    - `strongest`: The level of the strongest trail ahead; `own_level`: the ant's own cell.
 
     Attributes:
-        name: The name by which tasks call it.
+        name: The name that tasks use.
         n_states: The number of states, at least 1.
-        encode: A function of one argument, the ant's view, that returns the state index, from 0 to
-            n_states - 1. It is compiled for the kernels, so it computes with whole numbers alone:
-            arithmetic, comparisons, `if`, and `for` over a `range`; no imports and no calls; and it
-            ends with its only `return`. The view has, each a whole number (levels are floats where
-            trails halve or spread): `carries`, 1 with food, else 0; `percept`, the paper's state, 0
-            to 127; `codes`, what each cell in `cells` looks like (0 E, 1 O, 2 T or S, 3 F or Q; T
-            is measured against the strongest trail of the three cells ahead); `levels`, the trail
-            of each if it is empty or an ant stands there, else 0; `strongest`, the largest level of
-            the three cells ahead that counts; `ants`, 0 for no ant there, 1 for one without food, 2
-            for one with food; `nearer`, 1 if the cell is nearer to the queen than the ant's own;
-            and `own_level`.
-        cells: The cells in view: their headings relative to the ant's, each from -2 to 3; -1, 0 and
-            1, the cells ahead, are among them.
-        name_of: The name of a state for people.
-        summary: One line for listings.
-        letters: What letters in names mean that are not the paper's E, O, T, S, F and Q.
-        shape: The sizes of the parts of a state index, if it has several, as digits; environments
-            show them to neural networks.
+        encode: A function of the view that returns the state index, from 0 to n_states - 1. It is
+            compiled for the kernels. It computes with whole numbers: arithmetic, comparisons, `if`,
+            and `for` over a `range`, without imports and calls. Its only `return` is its last line.
+        cells: The cells in view, as headings relative to the ant's, each from -2 to 3. They must
+            include -1, 0 and 1, the cells ahead.
+        name_of: A function that returns the name of a state for people.
+        summary: A line for listings.
+        letters: The meaning of letters in names other than the paper's E, O, T, S, F and Q.
+        shape: The sizes of the digits of a state index if it has several, for neural networks.
     """
 
     name: str
@@ -63,18 +64,18 @@ class Observation:
     shape: tuple[int, ...] = ()
 
     def __reduce__(self) -> Any:
-        # Pickles hold the name: where they are read, the same observation is registered.
+        # A pickle holds only the name, because reading it requires the registered observation.
         registered = _OBSERVATIONS.get(self.name) is self
         return (get, (self.name,)) if registered else object.__reduce_ex__(self, 2)
 
     @property
     def parts(self) -> tuple[int, ...]:
-        """The sizes of the parts of a state index: its `shape`, or the index itself."""
+        """The sizes of the digits of a state index: `shape`, or (n_states,) if it has only one."""
         return self.shape or (self.n_states,)
 
     @property
     def ahead(self) -> tuple[int, ...]:
-        """Where the cells left, forward and right stand among the cells in view."""
+        """The indices in `cells` of the cells left, forward and right."""
         return tuple(self.cells.index(cell) for cell in AHEAD)
 
 
@@ -82,30 +83,29 @@ _OBSERVATIONS: dict[str, Observation] = {}
 
 
 def register(observation: Observation) -> Observation:
-    """Make an observation known by its name; it replaces your own observation of the same name.
+    """Return an observation after registering it, in place of your own one of the same name.
 
-    AntsError if the name is that of an observation of the package or not an identifier, a field
-    does not have the form that it must have, or a state index is outside of the range.
+    Raises AntsError if the name is not an identifier or belongs to a built-in observation, a field
+    does not have the right form, or a state index is outside its range.
     """
-    expect("what is registered", observation, Observation)
+    expect("observation", observation, Observation)
     name = observation.name
     check_new_name("observation", name, (one for one in _OBSERVATIONS if _is_built_in(one)))
     expect(f"letters of {name!r}", observation.letters, str)
     checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
     encode, cells = observation.encode, observation.cells
-    named = (
-        inspect.isfunction(encode) and encode.__name__ != "<lambda>"
-    )  # kernels cannot take lambdas
+    # Kernels cannot compile lambdas.
+    named = inspect.isfunction(encode) and encode.__name__ != "<lambda>"
     if not named or len(inspect.signature(encode).parameters) != 1:
         raise AntsError(
-            f"encode of {name!r} is {shown(encode)}; it must be a function of one argument that is "
-            "written with def, see taichi_ants.task.Observation."
+            f"encode of {name!r} is {shown(encode)}; it must be a function of one argument, "
+            "defined with def; see taichi_ants.task.Observation."
         )
     known = isinstance(cells, tuple) and all(cell in range(-2, 4) for cell in cells)
     if not known or len(set(cells)) < len(cells) or not set(AHEAD) <= set(cells):
         raise AntsError(
-            f"cells of {name!r} is {shown(cells)}; it must be a tuple of -1, 0 and 1, and may "
-            "hold -2, 2 and 3, each once."
+            f"cells of {name!r} is {shown(cells)}; it must be a tuple of -1, 0, 1, and optionally "
+            "-2, 2 and 3, each once."
         )
     expect(f"summary of {name!r}", observation.summary, str)
     shape = observation.shape
@@ -115,7 +115,7 @@ def register(observation: Observation) -> Observation:
     ):
         raise AntsError(
             f"shape of {name!r} is {shape}, whose product is not its n_states, "
-            f"{observation.n_states}; mend one of them."
+            f"{observation.n_states}; correct one of them."
         )
     if not encode.__module__.startswith("taichi_ants."):
         _try_functions(observation)
@@ -128,35 +128,35 @@ def _is_built_in(name: str) -> bool:
 
 
 def get(name: str) -> Observation:
-    """The observation of that name; AntsError, which lists those that exist, if there is none."""
+    """Return the observation of this name; AntsError, with a list of all names, if none exists."""
     if not isinstance(name, str) or name not in _OBSERVATIONS:
         raise AntsError(
-            f"there is no observation {shown(name)}; choose one of {', '.join(names())}, or name "
+            f"there is no observation {shown(name)}; choose one of {', '.join(names())}, or give "
             "the file that registers it with --plugin."
         )
     return _OBSERVATIONS[name]
 
 
 def names() -> tuple[str, ...]:
-    """The names of all registered observations, in the order of registration."""
+    """Return the names of all registered observations, in the order of registration."""
     return tuple(_OBSERVATIONS)
 
 
 def _try_functions(observation: Observation) -> None:
-    """Compute and name many states, in Python: a kernel would not notice what is wrong."""
-    import numpy as np  # not above: command lines show their help without it
+    """Compute and name many states in Python, because kernels do not check their indices."""
+    import numpy as np  # here, so that commands show their help without NumPy
 
     function, last = "encode", observation.n_states - 1
     try:
         (source,) = ast.parse(dedent(inspect.getsource(observation.encode))).body
         returns = [one for one in ast.walk(source) if isinstance(one, ast.Return)]
         if not isinstance(source, ast.FunctionDef) or returns != source.body[-1:]:
-            raise ValueError("it needs one return, as its last line")
+            raise ValueError("its only return must be its last line")
         with np.errstate(all="raise"):
             for view in _drawn_views(observation):
                 state = observation.encode(view)
                 if not 0 <= index(state) <= last:
-                    raise ValueError(f"it gives {state}, but it must lie between 0 and {last}")
+                    raise ValueError(f"it returns {state}, which must lie between 0 and {last}")
         function = "name_of"
         for state in np.linspace(0, last, min(last + 1, _VIEWS), dtype=int).tolist():
             expect(f"the name of state {state}", observation.name_of(state), str)
@@ -165,7 +165,6 @@ def _try_functions(observation: Observation) -> None:
 
 
 def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
-    """Views of ants, in numbers of the types that kernels have."""
     import numpy as np
 
     rng, shape = np.random.default_rng(0), (_VIEWS, len(observation.cells))
@@ -200,7 +199,7 @@ def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
 
 
 class _Vector(tuple):
-    """A vector that does not count from its end, as in kernels."""
+    """A vector without negative indices, as in kernels."""
 
     def __getitem__(self, k: Any) -> Any:
         if k < 0:

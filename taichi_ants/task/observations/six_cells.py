@@ -1,4 +1,4 @@
-"""The paper's codes, in all six cells around."""
+"""The paper's codes of all six neighbouring cells."""
 
 from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import name_of_codes
@@ -7,7 +7,7 @@ CELLS = (-2, -1, 0, 1, 2, 3)
 
 
 def encode(view):
-    """The load, then the codes from behind left to behind right and behind, as digits of base 4."""
+    """Return the load, then the codes from behind left clockwise to behind, as base-4 digits."""
     index = view.carries
     for k in range(6):
         index = 4 * index + view.codes[k]
@@ -20,6 +20,6 @@ SIX_CELLS = Observation(
     encode,
     CELLS,
     name_of_codes(len(CELLS), "EOTF", "EOSQ"),
-    "all cells around",
+    "all neighbouring cells",
     shape=(2, *[4] * 6),
 )

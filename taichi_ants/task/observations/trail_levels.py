@@ -1,14 +1,15 @@
-"""The three cells ahead; a trail is weak, middling or strong, relative to the strongest ahead."""
+"""The three cells ahead; a trail is weak, medium or strong, relative to the strongest ahead."""
 
 from taichi_ants.task.observations.registry import Observation
 from taichi_ants.task.states import name_of_codes
 
 
 def encode(view):
-    """The load, then a code of each cell as a digit of base 6.
+    """Return the load, then a code of each cell, as base-6 digits.
 
-    0 empty, 1 obstacle, 2 to 4 a trail of less than a third, of less than two thirds, or of more of
-    the strongest ahead; 5 food or queen. For an ant with food 4 is nearer to the queen.
+    0 is empty, 1 an obstacle, 5 food or the queen. For an ant without food, 2, 3 and 4 are a trail
+    of less than a third, less than two thirds, or more of the strongest ahead. For an ant with
+    food, 4 is a cell nearer to the queen.
     """
     index = view.carries
     for k in range(3):
@@ -36,7 +37,7 @@ TRAIL_LEVELS = Observation(
     2 * 6**3,
     encode,
     name_of=name_of_codes(3, "EO123F", "EO--SQ"),
-    summary="the three cells ahead, a trail in three strengths",
-    letters="1 2 3 a trail, weak to strong",
+    summary="the three cells ahead, with three strengths of trails",
+    letters="1 2 3 trail, from weak to strong",
     shape=(2, 6, 6, 6),
 )

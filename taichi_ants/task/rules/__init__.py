@@ -1,5 +1,5 @@
-"""The rules of the world as Taichi functions.
+"""The rules of the world as Taichi functions, which both engines call.
 
-Every rule stands here once, as a `ti.func` that takes what it needs as arguments: no allocation,
-no input or output, no knowledge of how an engine stores its data. Both engines call them.
+Each rule is one `ti.func`. It gets everything that it needs as arguments, because engines store
+their data differently. It does not allocate memory, read or write.
 """

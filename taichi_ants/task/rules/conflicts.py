@@ -1,13 +1,13 @@
-"""Who gets a cell, or the food in it, that several ants want in one tick.
+"""Conflicts of ants that want the same cell, or the food in it, in one tick.
 
-A cell to enter must be empty at the start of the tick, unless the task's `Traffic` lets ants in. Of
-several ants that want one cell (to enter it, or to take the food in it) the one with the smallest
-key wins, a hash of the cell it stands on and the tick. So neither ant numbers nor threads matter,
-and nothing is atomic: each ant writes a mark, what it wants, into `wants` at its own cell, and
-reads the marks of the six cells around what it wants.
+An ant can enter a cell that is empty at the start of the tick, or occupied if the task's `Traffic`
+allows it. If several ants want to enter a cell, or to take the food in it, the ant with the
+smallest key wins. Its key is a hash of its own cell and the tick, so results do not depend on ant
+numbers or threads. No operation is atomic: each ant writes its intention as a mark into `wants` at
+its own cell, and reads the marks of the six cells around the cell that it wants.
 
-`c` has the arrays `wants` and `compass`, see `rules.actions`; `base` is where the cells of a world
-begin in `wants`; other cells are numbers within the world.
+`c` has the arrays `wants` and `compass` (see `rules.actions`). `base` is the offset of a world in
+`wants`; all other cells are indices within the world.
 """
 
 import taichi as ti
@@ -17,33 +17,32 @@ from taichi_ants.task.events import Event
 from taichi_ants.task.rules.actions import turn_round
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
-# The mark of an ant (u8): nothing (0), to enter the cell at a heading, or to take the food there.
-# Where cells with ants can be entered, an ant that wants nothing has STANDS for its mark, so that
-# every ant has one.
-ENTER, TAKE, STANDS = 1, 9, 7  # the first two plus the heading
+# The mark of an ant (u8): 0 for nothing, ENTER or TAKE plus a heading. If ants can enter cells with
+# ants, an ant that wants nothing has the mark STANDS, so that every ant has one.
+ENTER, TAKE, STANDS = 1, 9, 7
 MARK = 15
-# Above the mark is what else the others need to know of the ant.
+# The bits above the mark are further facts about the ant.
 HAS_FOOD, TAKES_FOOD, WINS = 16, 32, 64
 
 
 @ti.func
 def conflict_key(cell, tick):
-    """The smallest key wins."""
+    """Return the key of the ant on a cell; the smallest key wins."""
     inner = bits_of(advance(ti.cast(cell, ti.u64)))
     return bits_of(advance(inner ^ ti.cast(tick, ti.u64)))
 
 
 @ti.func
 def wanting(kind, heading):
-    """The mark of an ant at `heading` from a cell that wants that cell: it looks back."""
+    """Return the mark of an ant that wants a cell from which it is at `heading`."""
     return kind | 1 + turn_round(heading)
 
 
 @ti.func
 def prevails(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick):
-    """Whether the ant on a cell gets what it wants; one that wants nothing wants its own cell."""
+    """Return whether the ant on `cell` wins the cell `wanted`; False if that is its own cell."""
     kind = ti.cast(c.wants[base + cell], ti.i32) & 8  # 8 to take, else 0
-    rivals = -1  # the ant itself is found too
+    rivals = -1  # the loop also counts the ant itself
     for heading in ti.static(range(N_HEADINGS)):
         other = ti.cast(c.wants[base + wanted + c.compass[heading + 1]], ti.i32) & MARK
         rivals += ti.cast(other == wanting(kind, heading), ti.i32)
@@ -55,7 +54,7 @@ def prevails(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick)
 
 @ti.func
 def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, kind, tick):
-    """Whether no other ant that wants the same comes before the one on `cell`."""
+    """Return whether the ant on `cell` precedes all others that want the same."""
     own, won = conflict_key(cell, tick), True
     for heading in range(N_HEADINGS):
         other = wanted + c.compass[heading + 1]
@@ -72,22 +71,22 @@ def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, kind, tic
 
 @ti.func
 def had_ant(c: ti.template(), place):
-    """Whether an ant stood on a cell at the start of the tick; there all have a mark."""
+    """Return whether an ant was on a cell at the start of the tick, if all ants have a mark."""
     return c.wants[place] != 0
 
 
 @ti.func
 def heading_wanted(c: ti.template(), place):
-    """The heading at which the ant on a cell wants to enter the next one."""
+    """Return the heading at which the ant on a cell wants to enter the next cell."""
     return (ti.cast(c.wants[place], ti.i32) & MARK) - ENTER
 
 
 @ti.func
 def way_is_free(c: ti.template(), traffic: ti.template(), base, cell, wanted):
-    """Whether the winner on `cell` enters a cell that is empty, or whose ant moves on as it does.
+    """Return whether the winner on `cell` can enter its cell, which is empty or becomes empty.
 
-    Winners of cells with ants form queues; one moves if its head enters an empty cell; a ring
-    stays.
+    Winners of cells with ants form queues. A queue moves if its first ant enters an empty cell; a
+    ring does not move.
     """
     ahead = wanted
     if ti.static(traffic.follow):
@@ -102,7 +101,7 @@ def way_is_free(c: ti.template(), traffic: ti.template(), base, cell, wanted):
 
 @ti.func
 def entering(c: ti.template(), base, cell):
-    """The cell of the ant that wins the cell of another one, -1 if nobody does."""
+    """Return the cell of the ant that wins `cell`, or -1."""
     found = -1
     for heading in ti.static(range(N_HEADINGS)):
         other = cell + c.compass[heading + 1]
@@ -113,9 +112,9 @@ def entering(c: ti.template(), base, cell):
 
 @ti.func
 def gives_way(c: ti.template(), traffic: ti.template(), base, cell):
-    """Whether the ant on a cell gives way to one with food that wins its cell.
+    """Return whether the ant on a cell gives way to an ant with food that wins the cell.
 
-    Where ants follow, one that moves is never asked: then the other one moves as well.
+    With `follow`, this is not called for ants that move, because the other ant then moves as well.
     """
     mark = c.wants[base + cell]
     stays = mark & (HAS_FOOD | TAKES_FOOD) == 0
@@ -130,18 +129,17 @@ def gives_way(c: ti.template(), traffic: ti.template(), base, cell):
 def settle(
     c: ti.template(), traffic: ti.template(), base, cell, wanted, ahead, carries, moves, entered
 ):
-    """Return the cell of an ant after the tick, whether it is filled again, and the event.
+    """Return the result of a tick for an ant.
 
-    It moves on an empty way; or, with food, it changes places with the ant in its way; or it gives
-    way to an ant with food that wins its cell; or it stays. `wanted` is the cell that it wins, else
-    its own; `ahead` the one that it faces. If its action `moves` and succeeds, the event is
-    `entered`.
+    It moves to a free cell; or, with food, changes places with the ant there; or gives way to an
+    ant with food that wins its cell; or stays. `wanted` is the cell that it wins, else its own;
+    `ahead` is the cell that it faces. The event of a successful move is `entered`.
 
     Returns:
-        Its cell; whether another ant enters the cell that it leaves; its event; whether it enters
-        the cell that it wanted.
+        Its new cell; whether another ant enters the cell that it leaves; its event; whether it
+        enters the cell that it wanted.
     """
-    # Conditions one inside the other: Taichi works out both sides of an `and`.
+    # Conditions are nested because Taichi evaluates both sides of an `and`.
     enters, goes, filled = False, cell, False
     event = ti.select(moves, Event.BLOCKED, Event.FAILED)
     if moves & (wanted != cell):

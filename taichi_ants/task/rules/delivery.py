@@ -1,7 +1,7 @@
-"""Giving food to the queen: when it can be done, and what it ends.
+"""Deliveries of food to the queen, and the ends of episodes.
 
-It is paid as any event, by `Rewards.by_event`. Whether it ends an episode, and how, is the task's
-`delivery`.
+The reward is that of the event, in `Rewards.by_event`. The task's `delivery` determines how a
+delivery ends an episode.
 """
 
 import taichi as ti
@@ -14,27 +14,27 @@ from taichi_ants.task.rules.vision import goals_in_view
 
 @ti.func
 def can_give(action, percept):
-    """Whether an ant with food gives it: it wants to, and sees the queen."""
+    """Return whether an ant with food delivers it: its action is GIVE, and it sees the queen."""
     return (action == GIVE) & (goals_in_view(percept) != 0)
 
 
 @ti.func
 def heading_after_delivery(heading, turns_at_queen):
-    """The heading of an ant that has given its food."""
+    """Return the heading of an ant after a delivery."""
     return ti.select(turns_at_queen == 1, turn_round(heading), heading)
 
 
 @ti.func
 def terminates(event, delivery_terminates):
-    """1 if the episode terminates, so that an update does not bootstrap, else 0."""
+    """Return 1 if the episode terminates, so that the update does not bootstrap, else 0."""
     return ti.cast(event == Event.DELIVERED, ti.i32) & delivery_terminates
 
 
 @ti.func
 def step_end(event, delivery_terminates, delivery_truncates, is_last):
-    """Whether a step terminates the episode, and whether it truncates it: 1 or 0 each.
+    """Return whether a step terminates the episode, and whether it truncates it: 1 or 0 each.
 
-    `is_last` is 1 in the last step of an episode of limited length.
+    `is_last` is 1 in the last step before the step limit.
     """
     delivered = ti.cast(event == Event.DELIVERED, ti.i32)
     terminated = delivered & delivery_terminates

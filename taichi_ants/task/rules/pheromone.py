@@ -1,8 +1,8 @@
-"""How trails are laid, evaporate and spread.
+"""The deposit, evaporation and diffusion of trails.
 
-Trails that fall by 1 per tick, or stay, are stored as expiry clocks: the clock (i32, it advances by
-1 per tick, or stands still without evaporation) at which the level becomes 0. Their evaporation
-costs nothing. All others are stored as levels (f32), and change in every cell each tick.
+Trails with linear evaporation, or with none, are stored as expiry clocks: the value of the clock at
+which the level becomes 0. The clock (i32) advances by 1 per tick, or by 0 without evaporation, so
+evaporation costs no time. All other trails are levels (f32), which change in every cell each tick.
 """
 
 import taichi as ti
@@ -15,15 +15,16 @@ SET, ADD, FADING, NONE = range(len(DEPOSITS))
 
 @ti.func
 def level_left(expiry, clock):
-    """The level of a trail that is stored as an expiry clock."""
+    """Return the level of a trail that is stored as an expiry clock."""
     return ti.max(expiry - clock, 0)
 
 
 @ti.func
 def level_after_deposit(p: ti.template(), kind: ti.template(), level, carried):
-    """The level of a cell on which an ant that has `carried` food for so many ticks lays its trail.
+    """Return the level of a cell after the deposit of an ant.
 
-    `p` has `Pheromone.numbers`; `kind` is SET, ADD, FADING or NONE; `level` is that before.
+    `p` has `Pheromone.numbers`; `kind` is SET, ADD, FADING or NONE; `level` is the level before;
+    `carried` is the number of ticks for which the ant has carried food.
     """
     after = level
     if kind == SET:
@@ -37,7 +38,7 @@ def level_after_deposit(p: ti.template(), kind: ti.template(), level, carried):
 
 @ti.func
 def evaporated(level, decay):
-    """A level (f32) after a tick; `decay` is the factor of exponential evaporation, or LINEAR."""
+    """Return a level (f32) after a tick; `decay` is the exponential factor, or LINEAR."""
     after = level
     if decay == LINEAR:
         after = ti.max(level - 1.0, 0.0)
@@ -50,9 +51,9 @@ def evaporated(level, decay):
 
 @ti.func
 def diffused(levels: ti.template(), walls: ti.template(), compass: ti.template(), place, share):
-    """The level (f32) of a cell after each cell has given `share` to each of its neighbours.
+    """Return the level (f32) of a cell after each cell has given `share` to each neighbour.
 
-    The share that is aimed at a wall stays.
+    A cell keeps the shares for walls.
     """
     level = levels[place]
     if walls[place] == 0:
@@ -62,6 +63,6 @@ def diffused(levels: ti.template(), walls: ti.template(), compass: ti.template()
             if walls[neighbour] == 0:
                 n_open += 1.0
                 received += levels[neighbour] * share
-        # At rate 1 all is given away, and rounding could leave less than nothing.
+        # At rate 1 a cell gives everything, and rounding could make the rest negative.
         level = ti.max(level - level * share * n_open + received, 0.0)
     return level

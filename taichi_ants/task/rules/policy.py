@@ -1,4 +1,4 @@
-"""How an ant chooses among its five actions."""
+"""The choice among the five actions."""
 
 import taichi as ti
 from taichi.math import popcnt
@@ -10,31 +10,31 @@ from taichi_ants.task.rules.random_bits import below, high_word, low_word
 
 @ti.func
 def larger(a, b):
-    """The larger of two floats, in one instruction (`ti.max` takes several to respect NaN)."""
+    """Return the larger of two floats in one instruction (`ti.max` needs several, for NaN)."""
     return ti.select(a > b, a, b)
 
 
 @ti.func
 def smaller(a, b):
-    """The smaller of two floats."""
+    """Return the smaller of two floats in one instruction."""
     return ti.select(a < b, a, b)
 
 
 @ti.func
 def best_value(values):
-    """The largest of five action values (f32)."""
+    """Return the largest of five action values (f32)."""
     return larger(larger(larger(values[0], values[1]), larger(values[2], values[3])), values[4])
 
 
 @ti.func
 def lowest_bit_number(mask):
-    """The number of the lowest set bit of a non-zero i32."""
+    """Return the number of the lowest set bit of a non-zero i32."""
     return popcnt((mask & -mask) - 1)
 
 
 @ti.func
 def bit_number(mask, k):
-    """The number of the k-th set bit (from 0, ascending) of an i32."""
+    """Return the number of the k-th set bit (from 0, ascending) of an i32."""
     rest = mask
     for _ in range(k):
         rest &= rest - 1
@@ -43,10 +43,10 @@ def bit_number(mask, k):
 
 @ti.func
 def choose(values, bits, explore_below):
-    """Epsilon-greedy choice, ties uniformly at random, from one draw of 64 bits.
+    """Return an epsilon-greedy action from one draw of 64 bits, with ties broken at random.
 
-    The upper word decides whether to explore (if it lies below `explore_below`, epsilon * 2**32 as
-    u64), the lower word which action, so that every decision costs one draw.
+    If the upper word is below `explore_below` (epsilon * 2**32 as u64), the action is random. The
+    lower word selects a random action, or breaks ties, so that every decision takes one draw.
     """
     action = 0
     if high_word(bits) < explore_below:
@@ -55,9 +55,9 @@ def choose(values, bits, explore_below):
         best = best_value(values)
         mask = (1 << N_ACTIONS) - 1
         for a in ti.static(range(N_ACTIONS)):
-            # Not `values[a] == best`: with values that are no numbers none would be left.
+            # Not `values[a] == best`, which would leave no action if values are NaN.
             mask ^= ti.cast(values[a] < best, ti.i32) << a
-        if mask & (mask - 1) == 0:  # one best action: nearly always, and well predicted
+        if mask & (mask - 1) == 0:  # one best action: usual, so the branch is well predicted
             action = lowest_bit_number(mask)
         else:
             action = bit_number(mask, below(low_word(bits), popcnt(mask)))
@@ -66,7 +66,7 @@ def choose(values, bits, explore_below):
 
 @ti.func
 def choose_in_crowd(compass: ti.template(), values, bits, explore_below):
-    """The same without a branch: for crowds, of which nobody can predict who explores."""
+    """Return the action of `choose`, without a branch: exploration in crowds is unpredictable."""
     best = best_value(values)
     mask = (1 << N_ACTIONS) - 1
     for a in ti.static(range(N_ACTIONS)):
@@ -77,7 +77,7 @@ def choose_in_crowd(compass: ti.template(), values, bits, explore_below):
 
 @ti.func
 def chance_of(values, action, explore_below):
-    """The probability (f64) with which `choose` takes this action; `explore_below` as there."""
+    """Return the probability (f64) with which `choose` returns this action."""
     best = best_value(values)
     ties, explores = 0, ti.cast(explore_below, ti.f64) / 4294967296.0
     for a in ti.static(range(N_ACTIONS)):

@@ -1,7 +1,7 @@
-"""Random numbers of the ants: SplitMix64 (Steele, Lea and Flood 2014), one 64-bit state an ant.
+"""Random numbers of ants: SplitMix64 (Steele, Lea and Flood 2014), with a 64-bit state per ant.
 
-The state is data of the ant, so that checkpoints resume exactly, results do not depend on the
-number of threads, and the reference draws the same numbers.
+Because each ant has its own state, checkpoints resume exactly, results do not depend on the number
+of threads, and the reference draws the same numbers.
 """
 
 import taichi as ti
@@ -13,13 +13,13 @@ _MIX_2 = 0x94D049BB133111EB
 
 @ti.func
 def advance(state):
-    """The next state of a stream: u64 -> u64."""
+    """Return the next state of a stream: u64 -> u64."""
     return state + ti.u64(_GAMMA)
 
 
 @ti.func
 def bits_of(state):
-    """The 64 random bits that belong to a state: u64 -> u64."""
+    """Return the 64 random bits of a state: u64 -> u64."""
     z = state
     z = (z ^ (z >> ti.u64(30))) * ti.u64(_MIX_1)
     z = (z ^ (z >> ti.u64(27))) * ti.u64(_MIX_2)
@@ -28,24 +28,24 @@ def bits_of(state):
 
 @ti.func
 def high_word(bits):
-    """The upper 32 of 64 bits, as u64."""
+    """Return the upper 32 of 64 bits, as u64."""
     return bits >> ti.u64(32)
 
 
 @ti.func
 def low_word(bits):
-    """The lower 32 of 64 bits, as u64."""
+    """Return the lower 32 of 64 bits, as u64."""
     return bits & ti.u64(0xFFFFFFFF)
 
 
 @ti.func
 def below(word, n):
-    """A whole number in [0, n) from a 32-bit word, as i32 (Lemire 2019, without rejection)."""
+    """Return a whole number in [0, n) from a 32-bit word, as i32 (Lemire 2019, no rejection)."""
     return ti.cast((word * ti.cast(n, ti.u64)) >> ti.u64(32), ti.i32)
 
 
 @ti.func
 def draw_below(state, n):
-    """A whole number in [0, n) from the upper word of the next draw, and the stream after it."""
+    """Return a whole number in [0, n) from the upper word of the next draw, and the next state."""
     after = advance(state)
     return below(high_word(bits_of(after)), n), after

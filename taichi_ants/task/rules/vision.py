@@ -1,4 +1,4 @@
-"""What an ant sees in the three cells in front of it: the percept, as an index from 0 to 127."""
+"""The percept of an ant: its load and the codes of the three cells ahead, as an index 0 to 127."""
 
 import taichi as ti
 
@@ -8,22 +8,22 @@ from taichi_ants.task.constants import EMPTY, SEES_LURE
 
 @ti.func
 def see_foraging(half: ti.template(), ground, level, strongest):
-    """The code of a cell for an ant without food; `ground` is what the cell holds.
+    """Return the code of a cell for an ant without food; `ground` is the content of the cell.
 
-    An empty cell is a trail if its `level` (else 0 or less) is at least 1 and, if `half`, at least
-    half of the `strongest` in view that counts, else as much.
+    An empty cell is a trail if its `level` is at least 1 and at least the `strongest` in view, or
+    half of it if `half`. The level of cells that are not empty is 0 or less.
     """
     lure = 0
     if ti.static(half):
         lure = ti.cast(2 * level >= ti.max(strongest, 2), ti.i32)
     else:
         lure = ti.cast(level >= ti.max(strongest, 1), ti.i32)
-    return ground & 3 | lure * SEES_LURE  # what is empty looks 0
+    return ground & 3 | lure * SEES_LURE  # the code of an empty cell is 0
 
 
 @ti.func
 def see_carrying(ground, nearer):
-    """The code of a cell for an ant with food; `nearer` is 1 if the cell is nearer to the queen."""
+    """Return the code of a cell for an ant with food; `nearer` is 1 if nearer to the queen."""
     return ground >> 2 | (ti.cast(ground == EMPTY, ti.i32) & nearer) * SEES_LURE
 
 
@@ -31,7 +31,7 @@ def see_carrying(ground, nearer):
 def percept_foraging(
     half: ti.template(), left, forward, right, trail_left, trail_forward, trail_right, strongest
 ):
-    """The percept of an ant without food, from what the three cells hold and their levels."""
+    """Return the percept of an ant without food, by the contents and levels of three cells."""
     return state_index(
         0,
         see_foraging(half, left, trail_left, strongest),
@@ -42,7 +42,7 @@ def percept_foraging(
 
 @ti.func
 def percept_carrying(left, forward, right, nearer):
-    """The percept of an ant with food, from what the three cells hold; `nearer` is as below."""
+    """Return the percept of an ant with food; `nearer` is the result of `nearer_from`."""
     return state_index(
         1,
         see_carrying(left, nearer >> (N_HEADINGS - 1) & 1),
@@ -53,29 +53,29 @@ def percept_carrying(left, forward, right, nearer):
 
 @ti.func
 def nearer_from(closer, heading):
-    """A bit for each cell around, the first the one forward, clockwise: is it nearer the queen?
+    """Return a bit for each neighbour, clockwise from the one forward: 1 if nearer to the queen.
 
-    `closer` has a bit for each heading, the first that of heading 0.
+    `closer` has a bit for each heading, starting with heading 0.
     """
-    # Six bits, written twice so that the turns need no wrap.
+    # Repeating the six bits avoids a wrap-around.
     nearer = ti.cast(closer, ti.i32)
     return (nearer | nearer << N_HEADINGS) >> heading
 
 
 @ti.func
 def state_index(carries, left, forward, right):
-    """The index of a state, 0 to 127."""
+    """Return the index of a state, 0 to 127."""
     return ((carries << 2 | left) << 2 | forward) << 2 | right
 
 
 @ti.func
 def code_in_view(state, position):
-    """What is seen at position 0 (left), 1 (forward) or 2 (right) in a state."""
+    """Return the code at position 0 (left), 1 (forward) or 2 (right) of a state."""
     return (state >> (4 - 2 * position)) & 3
 
 
 @ti.func
 def goals_in_view(state):
-    """A bit for each cell in view that is food or queen: 0 left, 1 forward, 2 right."""
+    """Return a bit for each cell in view that is food or queen: 0 left, 1 forward, 2 right."""
     both = state & (state >> 1)  # bits 4, 2 and 0 are set where a code is 3
     return (both >> 4) & 1 | (both >> 1) & 2 | (both & 1) << 2

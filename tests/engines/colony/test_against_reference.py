@@ -141,7 +141,7 @@ def test_learners_whose_tables_cannot_be_shared_are_refused():
         training = TrainingConfig(name, 0.1, 0.9, 0.1, 1.0)
         if learner.td_error is None:
             with pytest.raises(
-                AntsError, match=rf"^learner '{name}' .* make sharing \"independent\"\.$"
+                AntsError, match=rf"^learner '{name}' .* set sharing to \"independent\"\.$"
             ):
                 Colony(worlds.paper(), Task(), training)
 

@@ -121,7 +121,7 @@ def test_births_fill_the_slots_and_no_more():
         ({"capacity": 1.5}, "capacity is 1.5"),
         ({"start": "queen"}, "start is 'queen'; it must be one of nest, spread"),
         ({"ends_at_delivery": None}, "ends_at_delivery is None"),
-        ({"ends_at_delivery": True, "ants": 2}, "ends_at_delivery is set with 2 ants"),
+        ({"ends_at_delivery": True, "ants": 2}, "ends_at_delivery is True with 2 ants"),
         ({"ends_at_delivery": True, "task": Task(life=Life(births=True))}, "births True"),
         ({"task": 3}, "task is 3"),
         (

@@ -73,7 +73,7 @@ def test_a_world_with_another_seed_is_as_in_a_new_colony():
     assert_same(colony, new)
     assert_same(pass_ticks(colony), pass_ticks(new))
     colony.begin_some(np.array([True, False, True]), [9, 9])  # seeds may repeat
-    with pytest.raises(AntsError, match=r"^seeds holds 9 more than once; "):
+    with pytest.raises(AntsError, match=r"^seeds contains 9 more than once; "):
         colony.save("never.npz")
 
 

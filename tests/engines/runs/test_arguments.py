@@ -78,10 +78,10 @@ BAD_SEEDS = [
     (None, "a seed is None"),
     ("12", "a seed is '12'"),
     ([[0, 1]], "a seed is [0, 1]"),
-    (2**64, f"seeds holds {2**64}; a seed must fit into 64 bits"),
-    ([-(2**63) - 1], f"seeds holds {-(2**63) - 1}"),
-    ([4, 5, 4], "seeds holds 4 more than once"),
-    ([-1, 2**64 - 1], f"seeds holds {2**64 - 1} more than once; in 64 bits"),
+    (2**64, f"seeds contains {2**64}; a seed must fit into 64 bits"),
+    ([-(2**63) - 1], f"seeds contains {-(2**63) - 1}"),
+    ([4, 5, 4], "seeds contains 4 more than once"),
+    ([-1, 2**64 - 1], f"seeds contains {2**64 - 1} more than once; they must differ"),
 ]
 
 
@@ -294,7 +294,7 @@ def test_progress_rises_to_one():
 
 def test_a_world_to_learn_in_has_food():
     bare = World((4, 4, 4), (0, 0, 0))
-    text = "the world has no food, so there is nothing to learn"
+    text = "the world has no food, so ants cannot learn in it"
     says(text, train, bare, CONFIG, 0, 1, 1)
     says(text, trace_training, bare, CONFIG)
     assert evaluate(bare, TABLE, 2, max_steps=3).deliveries.sum() == 0

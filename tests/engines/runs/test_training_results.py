@@ -120,7 +120,9 @@ def test_foreign_files(tmp_path):
     deep = {"facts": np.array("[" * 100_000 + "]" * 100_000)}
     archives.write(tmp_path / "deep.npz", deep)
     for name in ("colony.npz", "deep.npz"):
-        with pytest.raises(AntsError, match=f"{name}' holds no training result of this version"):
+        with pytest.raises(
+            AntsError, match=f"{name}' does not contain a training result of this version"
+        ):
             TrainingResult.load(tmp_path / name)
     (tmp_path / "text.npz").write_text("text")
     with pytest.raises(AntsError, match=r"text\.npz' is damaged, or not an \.npz file"):
