@@ -51,7 +51,7 @@ _MOST_UPLOAD = 2**22  # bytes of a session file
 _MOST_UNSEEN = 12  # frames sent to a page before it has drawn the first of them
 _MOST_WAITING = 2**27  # bytes buffered for a page that does not read
 _FEW = 4  # with fewer frames per episode, each frame shows another episode
-_PHASES = 24  # frames after which the phases of such episodes repeat
+_PHASES = 24  # number of such frames that together show the course of an episode
 _STATE_EVERY = 0.5  # seconds
 _PROGRESS_EVERY = 0.2  # seconds
 _BREATH = 0.004  # seconds of waiting after each frame, so that the socket thread can run
@@ -386,8 +386,8 @@ class Room:
     def _begin(self, session: Session, undoes: bool = False, comes_back: bool = False) -> None:
         """Replace the session; pages can return to the previous one with the request "back".
 
-        After several undos in a row, "back" returns to the session before the first. A session that
-        equals the present one does not become the previous one.
+        After several undos in a row, "back" returns to the session before the first. If the new
+        session equals the present one, "back" does not change.
         """
         before = self.session
         in_a_row = undoes and self._undone == (before.steps, len(before.edits))

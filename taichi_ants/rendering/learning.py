@@ -75,7 +75,7 @@ def learning_checkpoints(
     epsilon: float = 0.0,
     progress: Callable[[float], None] | None = None,
 ) -> list[Checkpoint]:
-    """Return a rollout of an ant's policy after each of several numbers of training episodes.
+    """Return rollouts of an ant's policy, one after each given number of training episodes.
 
     Args:
         world, config, task: The training setup; a task of None is the paper's.

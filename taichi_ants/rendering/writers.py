@@ -1,4 +1,4 @@
-"""Writers of pictures and animations: frame by frame; files appear only once complete."""
+"""Writers of pictures and animations; files appear only once they are complete."""
 
 from __future__ import annotations
 

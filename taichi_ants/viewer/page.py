@@ -28,7 +28,7 @@ _MOST_CELLS, _MOST_ANTS, _MOST_STEPS = 200_000, 20_000, 10_000
 
 @cache
 def part(name: str) -> str:
-    """Return the text of a file in this folder that is part of the page."""
+    """Return the text of a part of the page, which is a file in this folder."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 

@@ -147,9 +147,9 @@ class Recorder:
         x, y, z = self.grid.ranges
         lines = {
             "world": f"{self.grid.count} cells, ranges {x}, {y}, {z}",
-            "ants at first": str(colony.ants),
+            "ants at the start": str(colony.ants),
             "seed": str(colony.seeds[self.world]),
-            "they see": f"{colony.task.sees.name}, {self._n_states} states",
+            "observation": f"{colony.task.sees.name}, {self._n_states} states",
         }
         if self._learns:
             lines["learner"] = learners.label(config.learner)
