@@ -1,1 +1,1 @@
-"""What is no learner: the double bridge's published model, colony optimisation, utilities."""
+"""Published models as baselines: a double bridge, ant colony optimisation, utility pheromones."""

@@ -1,16 +1,16 @@
-"""Ant colony optimisation: the shortest way from the queen to food.
+"""Ant colony optimisation, applied to the shortest path from the queen to food.
 
 - Ant System: M. Dorigo, V. Maniezzo, A. Colorni. Ant system: optimization by a colony of
   cooperating agents. IEEE Transactions on Systems, Man, and Cybernetics, Part B 26 (1996), 29-41.
 - MAX-MIN Ant System: T. Stuetzle, H. H. Hoos. MAX-MIN Ant System. Future Generation Computer
   Systems 16 (2000), 889-914.
 
-In each iteration, every ant walks at random from the queen until it comes to food; then the loops
-are taken out of its walk, and what remains is its *tour*. The pheromone tau lies on *arcs*, steps
-from a cell to a neighbour. Of the arcs that leave its cell an ant takes one with a probability
-proportional to tau^alpha; it goes straight back only out of a dead end (as in Dorigo and Stuetzle,
-Ant Colony Optimization, 2004, section 1.3). Then all tau lose the share rho, and tours of length L
-add 1 / L to each of their arcs. There is no heuristic eta: no ant knows the food's place.
+In each iteration, every ant walks at random from the queen until it reaches food. Its walk without
+loops is its *tour*. Pheromone tau is on *arcs*, the steps from a cell to a neighbour. An ant takes
+an arc out of its cell with a probability proportional to tau^alpha. It goes straight back only out
+of a dead end (as in Dorigo and Stuetzle, Ant Colony Optimization, 2004, section 1.3). After each
+iteration all tau decrease by the share rho, and tours of length L add 1 / L to each of their arcs.
+There is no heuristic eta, because ants cannot sense where food is.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from taichi_ants.worlds.world import World
 
 Method = Literal["ant_system", "max_min"]
 METHODS: tuple[str, ...] = get_args(Method)
-# The share that evaporates, where none is given: as the authors chose it.
+# Default shares of evaporation, from the papers.
 EVAPORATION = {"ant_system": 0.5, "max_min": 0.02}
-# MAX-MIN: the probability to build the best tour once all pheromone lies on it, as the authors'.
+# MAX-MIN: probability of the best tour after convergence, from the paper.
 P_BEST = 0.05
-_MAX_ENTRIES = 1 << 28  # of the arrays of tours: a gibibyte each
+_MAX_ENTRIES = 1 << 28  # elements of each array of tours: a gibibyte
 
 
 @dataclass(frozen=True)
 class Search:
-    """Results of colonies.
+    """Results of colonies, as arrays (colonies, iterations).
 
-    Steps from the queen to the nearest food (`shortest`); by (colonies, iterations), int32, the
-    shortest tour of each iteration (`best`), 0 if no ant found food; the `mean` length, float64,
-    NaN if there was none; and the ants that gave up (`lost`).
+    `shortest` is the number of steps from the queen to the nearest food. `best`, int32, is the
+    length of the shortest tour in each iteration, 0 if there was none. `mean`, float64, is the mean
+    length, NaN if there was none. `lost`, int32, is the number of ants that gave up.
     """
 
     shortest: int
@@ -53,7 +53,7 @@ class Search:
 
     @property
     def found(self) -> np.ndarray:
-        """int64 (colonies,): the first iteration, from 1, with a shortest tour; 0 if none had."""
+        """int64 (colonies,): the first iteration, from 1, with a shortest tour; 0 if none has."""
         hits = self.best == self.shortest
         return np.where(hits.any(axis=1), hits.argmax(axis=1) + 1, 0)
 
@@ -72,20 +72,20 @@ def search(
     seed: Seed = 0,
     threads: int | None = None,
 ) -> Search:
-    """Let colonies look for the shortest way, each for itself.
+    """Return results of independent colonies that search for the shortest path.
 
     Args:
-        world: Where; rocks block, trails and listed ants do not matter.
-        method: "ant_system": all ants deposit. "max_min": the best of the iteration does, and tau
-            stays between bounds that follow from the best length so far.
-        iterations, ants: Rounds of tours, and ants of each colony.
-        colonies: How many; the first ones stay the same if there are more.
-        alpha: How strongly pheromone attracts.
-        evaporation: rho; None takes 0.5, with "max_min" 0.02.
-        max_steps: After so many an ant gives up and deposits nothing.
+        world: The world; its trails and listed ants have no effect.
+        method: "ant_system": all ants deposit. "max_min": the best ant of the iteration deposits,
+            and tau stays between bounds that depend on the shortest tour so far.
+        iterations, ants: The number of iterations, and of ants in each colony.
+        colonies: The number of colonies; more colonies do not change the first ones.
+        alpha: The exponent of pheromone in the choice of arcs.
+        evaporation: rho; None means 0.5, or 0.02 with "max_min".
+        max_steps: The number of steps after which an ant gives up and deposits nothing.
 
     Raises:
-        AntsError: An argument is not allowed, or no food can be reached.
+        AntsError: An argument is not allowed, or no food is reachable.
     """
     rho = EVAPORATION[method] if evaporation is None else evaporation
     _, neighbours, is_food, start, shortest = open_cells(world)
@@ -93,7 +93,7 @@ def search(
     if n * n_ants > _MAX_ENTRIES:
         raise AntsError(
             f"{colonies} colonies of {ants} ants in a world of {n} open cells need arrays of "
-            f"{n * n_ants} entries; at most {_MAX_ENTRIES} are allowed, so choose fewer."
+            f"{n * n_ants} entries; at most {_MAX_ENTRIES} are allowed, so choose fewer ants."
         )
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
     states = stream_state(seed, STREAM_TOUR, numbers).reshape(-1)
@@ -104,7 +104,7 @@ def search(
     tau = np.ones((colonies, N_HEADINGS * n))
     place, tours = np.zeros((2, n_ants, n), np.int32)
     lengths = np.zeros(n_ants, np.int32)
-    ways = max(2.0, float((neighbours >= 0).sum(axis=1).mean()) - 1)  # on from a cell, in the mean
+    ways = max(2.0, float((neighbours >= 0).sum(axis=1).mean()) - 1)  # mean choices per cell
     so_far = np.zeros(colonies)  # the shortest tours, 0 for none
     best, lost = np.zeros((2, colonies, iterations), np.int32)
     mean = np.full((colonies, iterations), np.nan)
@@ -127,7 +127,7 @@ def search(
             deposits = np.where(by_colony > 0, 1 / np.maximum(by_colony, 1), 0)
             if method == "max_min":
                 winner = by_colony == now[:, None]
-                deposits[~(winner & (winner.cumsum(axis=1) == 1))] = 0  # of equals the first
+                deposits[~(winner & (winner.cumsum(axis=1) == 1))] = 0  # the first one on a tie
             lay(tau, rho, tours, lengths, deposits.reshape(-1), lowest, highest)
     return Search(shortest, best, mean, lost)
 
@@ -135,15 +135,15 @@ def search(
 def _limits(
     method: str, rho: float, ants: int, ways: float, shortest: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The first tau of colonies whose `shortest` tours so far are these, and the bounds of tau.
+    """Return initial tau and its lower and upper bounds, from the `shortest` tours so far.
 
-    The first is what ants would keep up if all went that way. Until food is found, tau is 1.
+    The initial tau is the equilibrium if all ants take that tour. tau is 1 until food is found.
     """
     found = shortest > 0
     length = np.where(found, shortest, 1.0)
     if method == "ant_system":
         return ants / length, np.zeros(len(length)), np.full(len(length), np.inf)
     highest = 1 / (rho * length)
-    right = P_BEST ** (1 / length)  # the probability to go right at one cell
+    right = P_BEST ** (1 / length)  # probability of the right choice at one cell
     lowest = np.minimum(highest * (1 - right) / ((ways - 1) * right), highest)
     return highest, np.where(found, lowest, 1), np.where(found, highest, 1)

@@ -1,19 +1,18 @@
-"""The model with which Goss and others explained how ants find the shorter branch of a bridge.
+"""The model of Goss and others, which explains how ants choose the shorter branch of a bridge.
 
 Goss, Aron, Deneubourg and Pasteels: Self-organized shortcuts in the Argentine ant.
 Naturwissenschaften 76 (1989), 579-581.
 
-At either end of a bridge, one ant leaves every 2 seconds, which is a *step* of the model. If it
-finds S marks of the short branch and L of the long one there, it takes the short one with
-probability
+At each end of the bridge, one ant leaves every 2 seconds, which is a *step* of the model. If that
+end has S marks of the short branch and L of the long one, it takes the short one with probability
 
     (k + S)^n / ((k + S)^n + (k + L)^n),  k = 20, n = 2.
 
 It leaves one mark of its branch at the end where it chooses, and one at the other end when it
-arrives there. Marks stay. The short branch takes 20 seconds, the long one 20 r: 10 and 10 r cells,
-each of 2 seconds; an ant that chooses stands in the first cell, one that arrives in the last. The
-published figures are the shares of colonies by how many of the 501st to 1000th ant took the short
-branch; `docs/baselines.md` lists the readings of the paper that were tried.
+arrives. Marks do not evaporate. The short branch takes 20 seconds, the long one 20 r: 10 and 10 r
+cells of 2 seconds each. An ant is in the first cell when it chooses and in the last when it
+arrives. The paper classifies colonies by the share of the 501st to 1000th ant that took the short
+branch. `docs/research_notes.md` compares readings of the paper.
 """
 
 from __future__ import annotations
@@ -30,23 +29,23 @@ from taichi_ants.grid.constants import STREAM_BRIDGE
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.settings import Count, Is, Seed, checked_arguments
 
-# Percent of colonies by ratio r of the branches, in five classes of the share of ants on the short
-# branch: 0-20 %, 20-40 %, 40-60 %, 60-80 %, 80-100 %.
+# Percent of colonies for each ratio r of the branches, by the share of ants on the short branch:
+# 0-20 %, 20-40 %, 40-60 %, 60-80 %, 80-100 %.
 PUBLISHED: Mapping[float, tuple[int, ...]] = MappingProxyType(
     {1.0: (37, 9, 8, 7, 39), 1.4: (23, 10, 8, 10, 49), 2.0: (15, 6, 6, 7, 66)}
 )
-# The same for r = 2 where the short branch opens after the 1000th ant, of the 1501st to 2000th one.
+# The same for r = 2 and a short branch that opens after the 1000th ant; ants 1501 to 2000 count.
 PUBLISHED_LATE = (100, 0, 0, 0, 0)
 LATE_RATIO = 2.0
 N_CLASSES = 5
-SHORT_CELLS = 10  # of 2 seconds each
+SHORT_CELLS = 10  # 2 seconds each
 MAX_EXPONENT = 8
-_LAUNCH = 1 << 14  # colonies at once: less than half a second
+_LAUNCH = 1 << 14  # colonies per launch, which takes less than half a second
 
 
 @checked_arguments
 def crossing_steps(ratio: Annotated[float, Is(least=1, most=100)]) -> tuple[int, int]:
-    """Steps to cross the short branch, and one that is `ratio` times as long, at least 1."""
+    """Return the steps to cross the short branch and one `ratio` times as long, 1 or more."""
     return SHORT_CELLS - 1, round(SHORT_CELLS * ratio) - 1
 
 
@@ -65,22 +64,22 @@ def choices(
 ) -> np.ndarray:
     """Return the branch that each ant takes: uint8 (colonies, ants), 1 for the short one.
 
-    Ants with even numbers choose at the nest, the others at the food.
+    Ants choose in turn at the nest and at the food; ant 0 chooses at the nest.
 
     Args:
         short, long: Steps to cross the branches, see `crossing_steps`; a step is 2 seconds.
-        colonies: How many; the first ones stay the same if there are more.
-        ants: How many choose, in turn one at the nest and one at the food; an even number.
-        k, n: Marks that a branch seems to have more than there are, and how strongly marks attract.
-        opens: Number of ants, from 0 to `ants`, that choose before the short branch opens; until
-            then all take the long one.
+        colonies: The number of colonies; more colonies do not change the first ones.
+        ants: The number of choices, which must be even.
+        k, n: The constant and the exponent of the choice function.
+        opens: The number of ants, from 0 to `ants`, that choose before the short branch opens and
+            have to take the long one.
 
     Raises:
         AntsError: An argument is not allowed.
     """
     checked_whole("`long`", long, short)
     if ants % 2:
-        raise AntsError(f"`ants` is {ants}; it must be even, as many leave the nest as the food.")
+        raise AntsError(f"`ants` is {ants}; it must be even: half choose at each end.")
     checked_whole("`opens`", opens, 0, ants)
     states = stream_state(seed, STREAM_BRIDGE, np.arange(colonies))
     runtime.start(threads)
@@ -95,10 +94,11 @@ def choices(
 
 
 def class_shares(took: np.ndarray, first: int = 501, last: int = 1000) -> np.ndarray:
-    """Percent of colonies, float64 (5,), by their share of ants on the short branch.
+    """Return the percentage of colonies in classes of ants on the short branch, float64 (5,).
 
-    Of the ants `first` to `last`, counted from 1, in the array `took` from `choices`: 0-20 %, ...
-    80-100 %; a share on a border belongs to the class above. AntsError if there are no such ants.
+    The classes are 0-20 %, ... 80-100 % of the ants `first` to `last`, counted from 1; a share on a
+    border belongs to the class above. `took` is a result of `choices`. AntsError if there are no
+    such ants.
     """
     checked_whole("last", last, 1, took.shape[1])
     checked_whole("first", first, 1, last)

@@ -1,8 +1,8 @@
-"""The kernels of the published models; cells are the n open ones of a world (`open_cells`).
+"""The kernels of the published models; cells are indices of the n `open_cells` of a world.
 
-Of the double bridge: a task a colony. Of colony optimisation: the tours of all ants, and the
-pheromone on arcs; that from a cell at a heading has the number 6 * cell + heading. Of utilities: a
-task a colony, whose ants move one after the other. Sets of headings are bits of a number.
+The double bridge and utilities use one parallel task per colony, and ants act one after the other;
+colony optimisation uses one task per ant for tours and one per colony for pheromone. The arc from
+a cell in the direction of a heading has the index 6 * cell + heading. Sets of headings are bitsets.
 """
 
 import taichi as ti
@@ -21,12 +21,12 @@ u64_1d = ti.types.ndarray(dtype=ti.u64, ndim=1)
 u64_2d = ti.types.ndarray(dtype=ti.u64, ndim=2)
 
 NEST, FOOD = 0, 1  # goals; an ant comes from one and looks for the other
-CELL, HEADING, ORIGIN = 0, 1, 2  # of an ant
+CELL, HEADING, ORIGIN = 0, 1, 2  # columns of `ants`
 
 
 @ti.func
 def power(base, n):
-    """A whole power as products from the left, so that every machine rounds alike."""
+    """Return base ** n, multiplied from the left so that all machines round equally."""
     product = ti.f64(1.0)
     for _ in range(n):
         product *= base
@@ -43,10 +43,11 @@ def cross(
     n: ti.i32,
     opens: ti.i32,
 ):
-    """Let the ants of all colonies choose, see `goss.choices`; writes `took`.
+    """Write the choices of all colonies to `took`, see `goss.choices`.
 
-    Ants under way are known by it alone: an ant that arrives has chosen so many steps ago. The
-    streams `states` give one draw a step, the high word for the nest. Ants before `opens` draw too.
+    Arrivals follow from `took`: an ant arrives `short` or `long` steps after its choice. Each step
+    takes one draw from the streams `states`: the high word for the nest, the low word for the food.
+    Ants that have no choice because of `opens` draw too.
     """
     for colony in range(took.shape[0]):
         state = states[colony]
@@ -76,7 +77,7 @@ def cross(
 
 @ti.func
 def next_heading(neighbours: ti.template(), tau: ti.template(), colony, cell, back, alpha, word):
-    """Where an ant goes on, by the roulette wheel; straight back only out of a dead end."""
+    """Draw the heading of the next arc by its weight; straight back only out of a dead end."""
     weights = ti.Vector.zero(ti.f64, N_HEADINGS)
     total = ti.f64(0.0)
     n_ways = 0
@@ -85,7 +86,7 @@ def next_heading(neighbours: ti.template(), tau: ti.template(), colony, cell, ba
             weights[h] = power(tau[colony, N_HEADINGS * cell + h], alpha)
             total += weights[h]
             n_ways += 1
-    if total == 0.0:  # in a dead end, or where all has evaporated
+    if total == 0.0:  # in a dead end, or if all pheromone has evaporated
         for h in ti.static(range(N_HEADINGS)):
             if neighbours[cell, h] >= 0 and (h != back or n_ways == 0):
                 weights[h] = 1.0
@@ -93,7 +94,7 @@ def next_heading(neighbours: ti.template(), tau: ti.template(), colony, cell, ba
     left = ti.cast(word, ti.f64) / 4294967296.0 * total
     chosen = -1
     for h in ti.static(range(N_HEADINGS)):
-        # Rounding may leave a little at the end; then the last possible heading stays.
+        # If rounding leaves a remainder, the last possible heading is chosen.
         if weights[h] > 0.0 and (chosen < 0 or left >= 0.0):
             chosen = h
             left -= weights[h]
@@ -113,11 +114,11 @@ def walk(
     tours: i32_2d,
     lengths: i32_1d,
 ):
-    """Let all ants walk from the start until they come to food, and take the loops out.
+    """Walk with all ants from the start to food, and write their tours, without loops.
 
-    Moves the streams `states` on; writes the arcs of the `tours` (ants, n) and their `lengths`, 0
-    for an ant that gave up. `neighbours` are -1 where there is none. Before and after, `place`
-    (ants, n) is 0; else 1 + the place in the tour of each cell on it.
+    Advances the streams `states`; writes the arcs of the `tours` (ants, n) and their `lengths`, 0
+    for an ant that gave up. Missing `neighbours` are -1. `place` (ants, n) is workspace, 0 before
+    and after: 1 + the position in the tour of each cell on it.
     """
     ti.loop_config(block_dim=1)
     for ant in range(states.shape[0]):
@@ -133,7 +134,7 @@ def walk(
             tours[ant, length] = N_HEADINGS * cell + heading
             cell = neighbours[cell, heading]
             back = (heading + 3) % N_HEADINGS
-            if place[ant, cell] > 0:  # a loop, which is taken out
+            if place[ant, cell] > 0:  # remove this loop
                 first = place[ant, cell]
                 while length >= first:
                     place[ant, tours[ant, length] // N_HEADINGS] = 0
@@ -161,7 +162,7 @@ def lay(
     lowest: f64_1d,
     highest: f64_1d,
 ):
-    """Evaporate, add what each ant deposits on each arc of its tour, and keep within bounds."""
+    """Evaporate, add the deposit of each ant to the arcs of its tour, and clip to the bounds."""
     for colony in range(tau.shape[0]):
         n_ants = lengths.shape[0] // tau.shape[0]
         for arc in range(tau.shape[1]):
@@ -176,7 +177,7 @@ def lay(
 
 @ti.func
 def best_headings(neighbours: ti.template(), utilities: ti.template(), colony, goal, cell, among):
-    """The headings with the highest utility among some, and this utility; 0 and -1 for none."""
+    """Return the headings with the highest utility in the set `among`, and it; 0 and -1 if none."""
     headings, best = 0, ti.f64(-1.0)
     for h in ti.static(range(N_HEADINGS)):
         if neighbours[cell, h] >= 0 and (among >> h) & 1:
@@ -190,7 +191,7 @@ def best_headings(neighbours: ti.template(), utilities: ti.template(), colony, g
 
 @ti.func
 def one_of(headings, word):
-    """One of these headings at random; -1 if there is none."""
+    """Return a random heading of a set; -1 if the set is empty."""
     left = 0
     for h in ti.static(range(N_HEADINGS)):
         left += (headings >> h) & 1
@@ -221,12 +222,12 @@ def live(
     utilities: f64_3d,
     deliveries: i32_2d,
 ):
-    """Let the ticks from `first` to before `last` pass in all colonies, see `utility.forage`.
+    """Advance all colonies from tick `first` to before `last`, see `utility.forage`.
 
-    `goals` (2, n) are 1 where a goal is; a tick leaves the share `kept` of all utilities. Moves the
-    streams `states` on, one draw an ant and tick; changes the `ants` (colonies, ants, 3): cell,
-    heading, the goal that the ant comes from; how many are `standing` in each cell; and the
-    `utilities` (colonies, 2, n). Writes `deliveries` (colonies, ticks).
+    `goals` (2, n) are 1 in cells of a goal; each tick multiplies all utilities by `kept`. Takes one
+    draw per ant and tick from the streams `states`. Updates `ants` (colonies, ants, 3), which hold
+    cell, heading and the goal that the ant comes from; the number of ants `standing` in each cell;
+    and `utilities` (colonies, 2, n). Writes `deliveries` (colonies, ticks).
     """
     ti.loop_config(block_dim=1)
     for colony in range(states.shape[0]):
@@ -286,9 +287,9 @@ def measure(
     span: ti.i32,
     lengths: i32_2d,
 ):
-    """Walk from the nest to food and back, always to the highest utility, in all colonies.
+    """Measure the path to food and back that always takes the highest utility, in all colonies.
 
-    Writes the steps of the way out and back, 0 if there is none, into column `span` of `lengths`.
+    Writes its steps, 0 if there is none, into column `span` of `lengths`.
     """
     ti.loop_config(block_dim=1)
     for colony in range(lengths.shape[0]):

@@ -1,4 +1,4 @@
-"""The cells of a world that models of others walk over, numbered, and the shortest way on them."""
+"""The open cells of a world as a graph, and the shortest path to food, for published models."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from taichi_ants.worlds.world import World
 
 
 def open_cells(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, int]:
-    """All cells that are no rock, those of the queen and of food among them.
+    """Return the graph of cells without rock, which include the queen and food.
 
     Returns:
-        Flat indices int64 (n,); the numbers of their neighbours int32 (n, 6), -1 where there is
-        none; which hold food, int32 (n,); the queen's number; steps to the nearest food.
+        Flat indices of the cells, int64 (n,); the numbers of their neighbours, int32 (n, 6), -1 if
+        missing; 1 for cells with food, int32 (n,); the queen's number; steps to the nearest food.
 
     Raises:
-        AntsError: It is not a world, or no food can be reached.
+        AntsError: `world` is not a World, or no food is reachable.
     """
     ground = checked_world(world, learns=True).ground()
     cells = np.flatnonzero(np.isin(ground, (EMPTY, FOOD, QUEEN)))
@@ -28,7 +28,7 @@ def open_cells(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, i
     is_food = (ground[cells] == FOOD).astype(np.int32)
     start = int(number[world.grid.index(world.queen)])
 
-    seen = np.zeros(len(cells) + 1, bool)  # the last is no cell, but the neighbour -1
+    seen = np.zeros(len(cells) + 1, bool)  # the last element is for the missing neighbour, -1
     seen[-1] = True
     layer, steps = np.array([start]), 0
     while not is_food[layer].any():
@@ -36,5 +36,5 @@ def open_cells(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, i
         around = np.unique(neighbours[layer])
         layer, steps = around[~seen[around]], steps + 1
         if not len(layer):
-            raise AntsError("no food can be reached from the queen; give the world a way.")
+            raise AntsError("no food can be reached from the queen; use a world with a free path.")
     return cells, neighbours, is_food, start, steps

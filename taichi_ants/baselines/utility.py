@@ -1,18 +1,18 @@
-"""Ants for which pheromone is a utility that every visit backs up.
+"""Ants that learn pheromone values by value iteration.
 
 L. Panait, S. Luke. A pheromone-based utility model for collaborative foraging. Third International
 Joint Conference on Autonomous Agents and Multiagent Systems (AAMAS 2004), 36-43.
 
-There are two pheromones, one of the nest and one of food. U_p(s) says how near the cell s is to
-goal p. An ant with food comes from food and looks for the nest, an ant without comes from the nest
-and looks for food. In each tick an ant in cell s backs up the utility of p, where it comes from:
+There are two pheromones, one for the nest and one for food. The *utility* U_p(s) is larger the
+nearer cell s is to goal p. A carrier comes from food and looks for the nest; a forager comes from
+the nest and looks for food. In each tick an ant in cell s backs up the utility of its origin p:
 
     U_p(s) <- max(U_p(s), R_p(s) + discount * max over the neighbours s' of U_p(s'))
 
-where the reward R_p is 1 in a cell of goal p, else 0. Then it goes to the neighbour with the
-highest utility of its other goal. So the trail of the one leads the other, and both rise towards
-their goals as state values do in value iteration. `docs/baselines.md` says what of this was read
-where, and what was chosen.
+where the reward R_p is 1 in a cell of goal p, else 0. Then it moves to the neighbour with the
+highest utility of the goal that it looks for. So carriers lead foragers and foragers lead carriers,
+and both utilities increase towards their goals as state values do in value iteration.
+`docs/baselines.md` lists sources and deviations.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from taichi_ants.grid.randomness import stream_state
 from taichi_ants.settings import Count, Is, Seed, Share, checked_arguments
 from taichi_ants.worlds.world import World
 
-EVERY = 10  # ticks between two looks at the path
-_MAX_ENTRIES = 1 << 27  # of the utilities: a gibibyte
+EVERY = 10  # ticks between measurements of the path
+_MAX_ENTRIES = 1 << 27  # elements of the utilities: a gibibyte
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class Foraging:
 
     Attributes:
         shortest: Steps from the queen to the nearest food and back.
-        deliveries: int32 (colonies, ticks): foods that come to the nest in each tick.
-        lengths: int32 (colonies, ticks // 10): after every 10 ticks, steps of a walk to food and
-            back that always takes the highest utility; 0 if it does not get there.
-        utilities: float64 (colonies, 2, grid.size): of the nest and of food, at the end.
+        deliveries: int32 (colonies, ticks), the food items delivered in each tick.
+        lengths: int32 (colonies, ticks // 10), the length, every 10 ticks, of the path to food and
+            back that always takes the highest utility; 0 if there is none.
+        utilities: float64 (colonies, 2, grid.size), of the nest and of food, at the end.
     """
 
     shortest: int
@@ -59,7 +59,7 @@ class Foraging:
 
     @property
     def found(self) -> np.ndarray:
-        """int64 (colonies,): the tick at which a walk is first a shortest one; 0 if none is."""
+        """int64 (colonies,): the first measured tick with a shortest path; 0 if there is none."""
         return EVERY * _first(self.lengths == self.shortest)
 
 
@@ -78,26 +78,27 @@ def forage(
     seed: Seed = 0,
     threads: int | None = None,
 ) -> Foraging:
-    """Let colonies collect food, each for itself; food grows back at once.
+    """Return results of independent colonies that collect food, which grows back at once.
 
     Args:
-        world: Where; rocks block, trails and listed ants do not matter.
-        ants: Of each colony; all start in the nest.
-        colonies: How many; the first ones stay the same if there are more.
-        capacity: How many ants fit into a cell; the nest has room for all.
-        discount: What a step costs, above 0 and below 1.
-        evaporation: The share of all utilities that is lost per tick.
-        exploration: The probability of a random step, where an ant has something to follow.
-        momentum: The probability to go straight on, if it can, where it has not.
+        world: The world; its trails and listed ants have no effect.
+        ticks: The number of ticks.
+        ants: The number of ants in each colony, which all start in the nest.
+        colonies: The number of colonies; more colonies do not change the first ones.
+        capacity: The largest number of ants in a cell; the nest has no limit.
+        discount: The factor by which utility decreases per step, above 0 and below 1.
+        evaporation: The share of all utilities that evaporates per tick.
+        exploration: The probability of a random step if a neighbour has a utility above 0.
+        momentum: The probability, otherwise, of a step straight ahead if that is possible.
 
     Raises:
-        AntsError: An argument is not allowed, or no food can be reached.
+        AntsError: An argument is not allowed, or no food is reachable.
     """
     cells, neighbours, is_food, nest, steps = open_cells(world)
     if colonies * max(2 * world.grid.size, ticks, ants) > _MAX_ENTRIES:
         raise AntsError(
             f"{colonies} colonies of {ants} ants for {ticks} ticks in a world of {len(cells)} open "
-            "cells need too much memory; choose fewer."
+            "cells need too much memory; choose fewer colonies, ants or ticks."
         )
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
     states = stream_state(seed, STREAM_FORAGER, numbers)
@@ -128,5 +129,5 @@ def forage(
 
 
 def _first(hits: np.ndarray) -> np.ndarray:
-    """The first column that is true, from 1; 0 if none is, or there are no columns."""
+    """Return the first true column of each row, from 1; 0 if there is none."""
     return np.pad(hits, ((0, 0), (1, 0))).argmax(axis=1)

@@ -1,8 +1,8 @@
-"""Ants that one watches and changes while they run, in a browser.
+"""Watch a colony in a browser and change it while it runs.
 
-Prints the address of a page that this machine alone can open. The page chooses world, rules and
-policy, lets time pass, draws rock, food, trails and ants, and saves the session, which replays to
-the same bits. Ends with Ctrl-C, and when the page says so. See docs/watching.md.
+The command prints the address of a page, which opens only on this machine. On the page you choose
+world, rules and policy, run the colony, draw rock, food, trails and ants, and save the session,
+which replays bit for bit. To end, press Ctrl-C or quit on the page. See docs/watching.md.
 """
 
 from __future__ import annotations
@@ -49,22 +49,22 @@ START: dict[str, Any] = {
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
     files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
-    add("--policy", **files, help="policies that the page offers besides those of a clone")
-    add("--session", metavar="FILE", help="a saved session to go on with")
-    add("--port", type=whole_number(0, 65535), default=0, metavar="N", help="0: one that is free")
-    add("--no-browser", action="store_true", help="open none; none is opened without a terminal")
+    add("--policy", **files, help="policy files to offer, in addition to experiments/policies/")
+    add("--session", metavar="FILE", help="resume a saved session")
+    add("--port", type=whole_number(0, 65535), default=0, metavar="N", help="port; 0: any free one")
+    add("--no-browser", action="store_true", help="do not open a browser (implied if no terminal)")
     add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
-    add("--plugin", metavar="FILE", help="a Python file with learners, worlds, observations")
+    add("--plugin", metavar="FILE", help="Python file with learners, worlds or observations")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
 
 
 def watch(settings: argparse.Namespace) -> None:
-    """Serve the page until it is time to end."""
+    """Serve the page until the session ends."""
     from taichi_ants import runtime
     from taichi_ants.live.choices import Choices
     from taichi_ants.live.server import Room
@@ -95,7 +95,7 @@ def watch(settings: argparse.Namespace) -> None:
 
 
 def policies(given: list[str]) -> dict[str, Policy]:
-    """Those that were given and those of a clone, by the names of their files."""
+    """Return the given policies and those in experiments/policies, by file name."""
     from taichi_ants import load_policy
 
     paths = [*sorted(_POLICIES.glob("*.npz")), *map(Path, given)]
@@ -104,10 +104,9 @@ def policies(given: list[str]) -> dict[str, Policy]:
 
 @contextmanager
 def _opened(url: str) -> Iterator[None]:
-    """Open a browser, if there is one, on a private file that leads to the address.
+    """Open a browser, if possible, on a private temporary file that redirects to the address.
 
-    Other users of the machine can read the command line of the browser, but not this file. It is
-    deleted at the end.
+    Other users of the machine can read the browser's command line, but not this file.
     """
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
@@ -123,5 +122,5 @@ def _opened(url: str) -> Iterator[None]:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
+    """Run the command line."""
     run_command(lambda: watch(parse_arguments(arguments)))

@@ -1,1 +1,1 @@
-"""A colony that people watch and change while it runs, in a browser."""
+"""Live pages: watch a colony in a browser and change it while it runs."""

@@ -1,8 +1,8 @@
-"""The form of a page for a new session: worlds, settings, and how ants act.
+"""The form for a new session: world, settings and policy.
 
-A choice is a small JSON-able dict of names and numbers; policies are those that the command was
-given, so no page ever names a file. The fields of the form are made from the declarations of the
-settings, see `taichi_ants.settings`.
+A choice is a small JSON-compatible dict of names and numbers. Pages choose among the policies that
+the command loaded, and cannot name files. The fields of the form are made from the declarations of
+the settings, see `taichi_ants.settings`.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ WORLDS = {
     "open": "an open world",
     "far_piles": "three far piles",
     "double_bridge": "a double bridge",
-    "map": "a map of your own",
+    "map": "your own map",
 }
-SIZE, SIZES = 30, (10, 180)  # of a drawn world: the usual range along each axis; the bounds
+SIZE, SIZES = 30, (10, 180)  # of a random world: default range along each axis; bounds
 TASKS = {"paper": "the paper's", "foraging": "foraging", "queueing": "queueing"}
-LEARNS, FOLLOWS = "learn ", "file "  # how the names of policies begin
+LEARNS, FOLLOWS = "learn ", "file "  # prefixes of the names of policies
 BY_HAND = "by hand"
 
-# What 64 ants need to learn to forage together in 60 episodes; see docs/foraging.md.
+# With these settings, 64 ants learn to forage together in 60 episodes; see docs/foraging.md.
 _LEARNING: dict[str, Any] = {
     **{"learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3, "epsilon_decay": 0.92},
     **{"learning_rate_decay": 0.95, "min_learning_rate": 0.01, "initial_q": 10.0},
@@ -41,11 +41,10 @@ _LEARNING: dict[str, Any] = {
 
 
 def fields() -> Iterator[dict[str, Any]]:
-    """The fields of the form, as JSON can hold them.
+    """Yield the fields of the form, JSON-compatible.
 
-    Each has "path", "kind", "words", "least", "most", "above", "unit", "help", "optional",
-    "default"; "only" with a path and its values, "world" or "learner" where it counts with these
-    alone.
+    Each has "path", "kind", "words", "least", "most", "above", "unit", "help", "optional" and
+    "default". "only" (a path and its values), "world" and "learner" limit a field to these.
     """
     for one in all_of(Task):
         if not one.is_group:
@@ -75,12 +74,12 @@ def _field(one: Setting) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Choices:
-    """What pages can choose from."""
+    """The choices that pages offer."""
 
-    policies: Mapping[str, Policy]  # besides learning and the one that is made by hand
+    policies: Mapping[str, Policy]  # policies to follow, in addition to "by hand"
 
     def as_dict(self) -> dict[str, Any]:
-        """What a page offers, as JSON can hold it."""
+        """Return all choices, JSON-compatible."""
         return {
             "worlds": WORLDS,
             "tasks": {
@@ -103,26 +102,29 @@ class Choices:
         }
 
     def setup(self, chosen: Any) -> Setup:
-        """The session that a page has chosen; AntsError if something is missing or not allowed.
+        """Return the setup that a page has chosen.
 
         Args:
-            chosen: {"world": of `WORLDS`, "map": text, "world_seed", "size": of a world that is
-                drawn, "settings": values by the paths of `fields`, "policy": "learn sarsa",
-                "file NAME" or "by hand", "ants", "seed", "ticks": of an episode, 0 for one without
-                end}.
+            chosen: A dict with these keys. "world" is a key of `WORLDS`, "map" a text; "world_seed"
+                and "size" apply to random worlds. "settings" are values by the paths of `fields`.
+                "policy" is "learn sarsa" (or another learner), "file NAME" or "by hand". "ants" and
+                "seed" are numbers; "ticks" is the length of an episode, 0 for no end.
+
+        Raises:
+            AntsError: A value is missing or not allowed.
         """
         expect("the choice", chosen, dict)
         needed = ("ants", "map", "policy", "seed", "settings", "size", "ticks")
         for name in (*needed, "world", "world_seed"):
             if name not in chosen:
-                raise AntsError(f"{name} is not chosen; choose it.")
+                raise AntsError(f"{name} is missing; choose a value.")
         world, policy, table, name = chosen["world"], chosen["policy"], None, ""
         check_one_of("the world", world, tuple(WORLDS))
         expect("policy", policy, str)
         if policy.startswith(LEARNS):
             name = policy.removeprefix(LEARNS)
             check_one_of("the learner", name, learners.names())
-        if world == "map":  # never the name of a world or of a file
+        if world == "map":  # several lines, so it cannot be the name of a world or a file
             expect("the map", chosen["map"], str)
             if "\n" not in chosen["map"]:
                 raise AntsError(f"the map is {shown(chosen['map'])}; it must have several lines.")
@@ -151,7 +153,7 @@ class Choices:
         )
 
     def chosen(self, setup: Setup) -> dict[str, Any]:
-        """The choice that gives a session, as near as the form can come."""
+        """Return the choice for a setup, as closely as the form can represent it."""
         table, is_map = setup.policy, setup.world not in WORLDS
         settings = flat(setup.task.as_dict(), "task")
         settings |= {f"world.{n}": v for n, v in setup.world_settings.items() if n != "ranges"}
@@ -178,7 +180,7 @@ class Choices:
 
 
 def _settings(given: Any, world: str, learner: str) -> dict[str, Any]:
-    """The settings of a page by their groups; AntsError if the form does not have one of them."""
+    """Return a page's settings by group; raise AntsError if the form lacks one of them."""
     expect("settings", given, dict)
     offered = {
         one["path"]

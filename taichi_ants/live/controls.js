@@ -1,4 +1,4 @@
-/* What stands beside the live world: a new session, sliders, files. */
+/* The controls of the live page: new session, sliders, files. */
 
 const SLIDERS = {
   ants: "Ants", evaporation: "Trails evaporate", half_life: "Half-life of trails", diffusion: "Diffusion",
@@ -6,7 +6,7 @@ const SLIDERS = {
 };
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const WORKS = { page: "page", gif: "GIF" };
-// What happened to the connection, and what the second button does then.
+// The state of a lost connection: its message, and the label of the second button.
 const LOST = {
   "no token": ["This page has no token, so the server refuses it. Open the address that the server prints.", "Try again"],
   lost: ["The connection is lost. This page keeps everything it has shown, and reconnects when the server is back. "
@@ -36,10 +36,10 @@ const isSwitch = ({ least, most, step }) => least === 0 && most === 1 && step ==
 class Controls {
   constructor(live) {
     this.live = live;
-    this.held = new Map(); // sliders that somebody moves -> until when
+    this.held = new Map(); // sliders that the user moves -> end of the hold
     this.filled = "";
-    this.works = new Map(); // what takes long -> its part of the page
-    this.roomy = matchMedia("(min-height: 1150px) and (min-width: 841px)"); // for all cards at once
+    this.works = new Map(); // kind of work in progress -> its element
+    this.roomy = matchMedia("(min-height: 1150px) and (min-width: 841px)"); // all cards fit
     byId("new").open = this.roomy.matches;
     document.querySelector(".stage").append(byId("notices"));
     byId("theme").insertAdjacentHTML("beforebegin", '<span class="watchers" id="watchers"></span>');
@@ -60,10 +60,10 @@ class Controls {
     on("map", "beforeinput", (event) => this.paste(event));
     for (const [id, what] of [["restart", "restart"], ["undo", "undo"], ["go-back", "back"]]) on(id, "click", () => this.anew(what));
     document.addEventListener("keydown", (event) => {
-      const fields = "textarea, input:not([type=range], [type=checkbox])"; // they undo what was typed
+      const fields = "textarea, input:not([type=range], [type=checkbox])"; // these undo typed text
       if (event.key.toLowerCase() !== "z" || event.shiftKey || !(event.ctrlKey || event.metaKey) || event.target.closest(fields)) return;
       event.preventDefault();
-      if (!this.holds && live.open) this.anew("undo"); // the server knows first whether there is something to undo
+      if (!this.holds && live.open) this.anew("undo"); // the server refuses if there is nothing to undo
     });
     on("next-episode", "click", () => live.edit({ kind: "episode" }, live.nextStroke()));
     on("files", "click", (event) => {
@@ -91,7 +91,7 @@ class Controls {
     this.hold(true);
   }
 
-  /* Offer what there is, and choose what the session has. */
+  /* Fill the form with the choices, and select those of the session. */
   fill() {
     const { choices, chosen } = this.live, options = (pairs) =>
       pairs.map(([value, words]) => `<option value="${safe(value)}">${safe(words)}</option>`).join("");
@@ -109,7 +109,7 @@ class Controls {
     }
     const fields = [...byId("chosen").elements], typed = fields.map(({ value, checked }) => ({ value, checked }));
     this.choose(chosen);
-    if (this.touched && !this.begins) { // who fills the form goes on, whatever others begin
+    if (this.touched && !this.begins) { // keep the input if another page begins a session
       fields.forEach((field, place) => (field.type === "checkbox" ? (field.checked = typed[place].checked) : (field.value = typed[place].value)));
       this.showWorld();
       this.explain();
@@ -117,7 +117,7 @@ class Controls {
     if (this.begins && !this.roomy.matches) byId("new").open = false;
     this.begins = false;
     this.connected(true);
-    this.held.clear(); // sliders show what this session has, also the one that was pulled just now
+    this.held.clear(); // all sliders show the values of this session
     this.hold(false);
     this.hush();
   }
@@ -139,8 +139,8 @@ class Controls {
     byId("now-chosen").textContent = [words("world-name"), words("task"), words("policy")].join(" · ");
   }
 
-  /* Tell what the chosen names mean, whole names too, which may be too long for their boxes. A policy
-     of a file reads what its ants saw, so that nobody chooses it. */
+  /* Explain the chosen names. A policy from a file determines the observation, so that field is
+     disabled. */
   explain() {
     const { choices } = this.live, policy = byId("policy").value, name = policy.replace(/^(learn|file) /, "");
     for (const [place, one] of choices.settings.entries()) {
@@ -158,7 +158,7 @@ class Controls {
     byId("policy-help").textContent = policy.startsWith("learn ") ? `They learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
   }
 
-  /* Put long text into the map at once: browsers take a time that grows with the square of its lines. */
+  /* Insert long text into the map at once, because browsers need quadratic time in its lines. */
   paste(event) {
     const { target: map, data } = event;
     if ((data?.length ?? 0) < 1000) return;
@@ -177,7 +177,7 @@ class Controls {
     };
   }
 
-  /* A field for each setting, as it was declared, in groups. */
+  /* The HTML of a field for each declared setting, in groups. */
   fields() {
     const html = {};
     this.live.choices.settings.forEach((one, place) => {
@@ -191,7 +191,7 @@ class Controls {
     return Object.entries(html).map(([group, inner]) => `<fieldset><legend>${safe(group.replaceAll("_", " "))}</legend>${inner}</fieldset>`).join("");
   }
 
-  /* What the form has, by path; what does not count now is left out. */
+  /* The values of the form by path, without hidden and empty fields. */
   settings() {
     const given = {};
     for (const field of document.querySelectorAll("#settings [data-path]")) {
@@ -201,7 +201,7 @@ class Controls {
     return given;
   }
 
-  /* Put values into the form; others are as usual. */
+  /* Put values into the form; the other fields get their defaults. */
   set(values) {
     for (const [place, one] of this.live.choices.settings.entries()) {
       const field = byId(`setting-${place}`), value = values[one.path] ?? one.default;
@@ -214,7 +214,7 @@ class Controls {
     const world = byId("world-name").value;
     byId("map-label").hidden = world !== "map";
     byId("drawn").hidden = !this.live.choices.drawn.includes(world);
-    // What nobody sees holds nobody up, whatever it says.
+    // Hidden fields must not block the form.
     for (const field of byId("drawn").querySelectorAll("input")) field.disabled = byId("drawn").hidden;
   }
 
@@ -226,7 +226,7 @@ class Controls {
     this.showPolicy(false);
   }
 
-  /* Name the task that has these settings; what comes and goes suits any task. */
+  /* Select the task with these settings; `life` does not matter. */
   nameTask() {
     this.explain();
     const { settings, tasks } = this.live.choices, of = settings.filter(({ path }) => /^task\.(?!life)/.test(path));
@@ -235,7 +235,7 @@ class Controls {
     byId("task").value = name;
   }
 
-  /* A policy of a file has a task of its own; one that was set by hand reads what it knows. */
+  /* Select the task of a policy file, or an observation that the policy "by hand" supports. */
   showPolicy(brings = true) {
     const { policies, by_hand: known, settings } = this.live.choices, value = byId("policy").value, policy = policies[value.replace(/^file /, "")];
     const sees = byId(`setting-${settings.findIndex(({ path }) => path === "task.observation")}`);
@@ -246,7 +246,7 @@ class Controls {
     this.nameTask();
   }
 
-  /* Show how things stand; sliders that somebody moves are left alone. */
+  /* Show the state, except in sliders that the user moves. */
   show({ values, pages, works, can_undo: canUndo, can_go_back: canGoBack }) {
     this.showWorks(works);
     byId("undo").disabled = !canUndo;
@@ -273,7 +273,7 @@ class Controls {
     byId("watchers").innerHTML = pages > 1 ? `${pages} pages<span> are watching</span>` : "";
   }
 
-  /* What decays from episode to episode, as it was in the frame that is drawn. */
+  /* Show the rates, which decay per episode, of the drawn frame. */
   showRates({ epsilon, learningRate }) {
     for (const [name, value] of Object.entries({ epsilon, learning_rate: learningRate })) {
       const slider = byId(`set-${name}`);
@@ -283,7 +283,7 @@ class Controls {
     }
   }
 
-  /* What takes long, each with a bar and a button; while a session is replayed, nothing else begins. */
+  /* Show work in progress, each with a bar and a button; disable other controls during a replay. */
   showWorks(works) {
     const box = byId("works"), kinds = works.map(({ kind }) => kind);
     for (const [kind, part] of this.works) {
@@ -302,13 +302,13 @@ class Controls {
     this.hold(kinds.includes("load"));
   }
 
-  /* Whether nothing can be asked for. */
+  /* Disable or enable all controls. */
   hold(holds) {
     if (this.holds === holds) return;
     this.holds = holds;
     if (holds) this.focused = document.activeElement;
     for (const part of document.querySelectorAll(".controls, .palette, .buttons")) part.inert = holds || (this.lost && !part.matches(".buttons"));
-    if (!holds && document.activeElement === document.body) this.focused?.focus(); // where the keyboard was
+    if (!holds && document.activeElement === document.body) this.focused?.focus(); // restore the focus
   }
 
   addWork(kind, box) {
@@ -336,11 +336,11 @@ class Controls {
     this.held.set(name, performance.now() + 500);
     if (slider.type === "range") this.showSlider(slider, slider.valueAsNumber);
     this.sliding = slider;
-    if (held && this.timer) return; // the last of several values is sent
+    if (held && this.timer) return; // only the last of several values is sent
     this.timer = setTimeout(() => this.slid(), 40);
   }
 
-  /* Send where the slider stands that somebody moves, if that is not sent yet. */
+  /* Send the value of the moved slider, unless it is already sent. */
   slid() {
     if (!this.timer) return;
     clearTimeout(this.timer);
@@ -349,7 +349,7 @@ class Controls {
     this.live.edit({ kind: "set", name: sliding.dataset.name, value }, this.stroke);
   }
 
-  /* Another session, or this one as it was; what was done before is sent before. */
+  /* Request another session, or an undo; send pending edits first. */
   anew(what) {
     this.slid();
     this.live.tools.send();
@@ -378,7 +378,7 @@ class Controls {
     this.say(`${name}: ${Math.ceil(bytes.byteLength / 1000)} kB`);
   }
 
-  /* Twice, so that nobody ends it by chance. */
+  /* Quit after a second press, so that nobody quits by accident. */
   quit() {
     if (this.quits) this.live.ask("quit");
     this.quits = !this.quits;
@@ -389,10 +389,10 @@ class Controls {
     }, 4000);
   }
 
-  /* Say why there is no connection, and what can be done; the page keeps what it has. */
+  /* Show why there is no connection, and what the user can do. */
   lose({ why, reason }) {
     const [words, button] = LOST[why];
-    if (this.lost === why || (this.lost === "ended" && why === "lost")) return; // it is still not back
+    if (this.lost === why || (this.lost === "ended" && why === "lost")) return; // the message is already shown
     this.showWorks([]);
     this.hush();
     this.connected(false);
@@ -402,7 +402,7 @@ class Controls {
     byId("keep").hidden = !this.live.viewer;
   }
 
-  /* Whether the server can be asked for anything; looking back is possible in any case. */
+  /* Enable controls if there is a connection; looking back is always possible. */
   connected(is) {
     if (is) [this.lost, this.kept] = ["", false];
     byId("lost").hidden = is;
@@ -410,7 +410,7 @@ class Controls {
     for (const id of ["play", "speed"]) byId(id).disabled = !is;
   }
 
-  /* Save what this page has shown, as a page that plays it. */
+  /* Save the history of this page as a page that plays it. */
   async keep() {
     this.busy("Making the file …");
     this.download({ name: "recording.html", bytes: await this.live.recording() });

@@ -1,17 +1,18 @@
-"""Interventions in a running colony, as pages send them: each edit is a small dictionary, as JSON
-holds it.
+"""Edits: interventions in a running colony, in the form in which pages send them.
+
+Each edit is a JSON-compatible dict::
 
     {"kind": "ground", "what": "empty", "rock" or "food", "cells": [...]}
     {"kind": "trail", "level": number, "cells": [...]}
-    {"kind": "add_ants", "cells": [...], "heading": 0 to 5, or None to draw one for each}
+    {"kind": "add_ants", "cells": [...], "heading": 0 to 5, or None for random headings}
     {"kind": "remove_ants", "cells": [...]}
     {"kind": "queen", "cell": cell}
     {"kind": "set", "name": one of `values`, "value": number}
-    {"kind": "episode"}: the episode ends, the next one begins
+    {"kind": "episode"}, which ends the episode and begins the next one
 
-Cells are flat indices of cells of the world. Cells that cannot take what is put there are left as
-they are: the ground under the queen, trails on rocks, ants on anything but empty cells. Rock and
-food move ants aside. See `taichi_ants.engines.colony.interventions` for how, and for what lasts.
+Cells are flat indices. An edit has no effect on cells that do not allow it: the queen's cell for
+ground, rock for trails, and all but empty cells for ants. Rock and food move ants aside. See
+`taichi_ants.engines.colony.interventions` for details, and for changes that last.
 """
 
 from __future__ import annotations
@@ -44,21 +45,21 @@ _FIELDS = {
 
 
 class Value(NamedTuple):
-    """A number that "set" changes."""
+    """A number that the edit "set" can change."""
 
-    value: float  # now
+    value: float  # at present
     least: float
     most: float
-    step: float  # of a slider; only whole numbers are allowed if this is one
+    step: float  # of a slider; if it is an int, only whole numbers are allowed
 
 
 def values(interventions: Interventions) -> dict[str, Value]:
-    """What "set" changes in a colony, by name; only what makes a difference there.
+    """Return the values that "set" can change in a colony, by name, if they have an effect there.
 
-    - ants: how many live now; set, it is how many start each later episode as well.
-    - epsilon, learning_rate: from now on; a value set by an intervention no longer decays.
-    - deposit, slope, cap: as `Pheromone` has them; the deposit is its level.
-    - evaporation: 1 if trails fall, else 0. half_life, diffusion: as `Pheromone` has them.
+    - ants: the number of living ants; if set, also the number at the start of later episodes.
+    - epsilon, learning_rate: if set, they no longer decay.
+    - deposit: the `level` of `Pheromone`; slope, cap, half_life, diffusion: as in `Pheromone`.
+    - evaporation: 1 if trails evaporate, else 0.
     """
     colony, pheromone = interventions.colony, interventions.colony.pheromone
     found = {
@@ -78,14 +79,14 @@ def values(interventions: Interventions) -> dict[str, Value]:
     if pheromone.half_life is not None:
         half_life = float(pheromone.half_life)
         found["half_life"] = Value(half_life, min(1.0, half_life), max(1000.0, half_life), 0.5)
-    if pheromone.dense:  # integer trails cannot spread, nor dense ones become integers
+    if pheromone.dense:  # integer trails cannot diffuse, and dense trails cannot become integers
         least = 0.0 if pheromone.evaporation == "exponential" else min(0.01, pheromone.diffusion)
         found["diffusion"] = Value(float(pheromone.diffusion), float(least), 1.0, 0.01)
     return found
 
 
 def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pheromone, Pheromone]:
-    """The pheromone that a colony has if its trails fall, or do not, and that of its task then."""
+    """Return pheromones with or without evaporation: that of the colony, and that of its task."""
     pheromone = interventions.colony.task.pheromone
     if falls and pheromone.evaporation == "none":
         pheromone = replace(pheromone, evaporation="linear")
@@ -93,10 +94,10 @@ def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pherom
 
 
 def checked(edit: object, interventions: Interventions) -> Edit:
-    """A copy of an edit; `apply` finds out whether there is room for it.
+    """Return a validated copy of an edit; `apply` checks whether the world allows it.
 
     Raises:
-        AntsError: It is none; the message says why.
+        AntsError: The edit is not valid; the message says why.
     """
     expect("an edit", edit, Mapping)
     assert isinstance(edit, Mapping)
@@ -113,10 +114,10 @@ def checked(edit: object, interventions: Interventions) -> Edit:
 
 
 def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
-    """Do an edit that `checked` gave; an episode that it begins has this length.
+    """Apply an edit that `checked` returned; `length` is the length of an episode that it begins.
 
     Raises:
-        AntsError: There is no room for it; nothing has changed.
+        AntsError: The world does not allow the edit; nothing has changed.
     """
     cells = np.array(edit.get("cells"))
     match edit["kind"]:
@@ -155,7 +156,6 @@ def _set(name: str, value: Any, interventions: Interventions) -> None:
 
 
 def _checked(name: str, edit: Mapping, interventions: Interventions) -> Any:
-    """The value of a field of an edit."""
     given = edit[name]
     match name:
         case "cells":
@@ -166,7 +166,7 @@ def _checked(name: str, edit: Mapping, interventions: Interventions) -> Any:
             return checked_whole(name, given, 0, MAX_DEPOSIT)
         case "heading" if given is not None:
             return checked_whole(name, given, 0, N_HEADINGS - 1, ", or None")
-        case "value":  # of a name that was checked before
+        case "value":  # the name has already been checked
             return _number(edit["name"], given, values(interventions)[edit["name"]])
         case "what":
             check_one_of(name, given, tuple(_GROUNDS))
@@ -176,7 +176,7 @@ def _checked(name: str, edit: Mapping, interventions: Interventions) -> Any:
 
 
 def _checked_cells(cells: Any, interventions: Interventions) -> list[int]:
-    """Cells of the world, in the order given, each once."""
+    """Return cells of the world, in the given order and without duplicates."""
     most, exists = interventions.colony.grid.count, interventions.colony.grid.exists
     if not isinstance(cells, list) or not 1 <= len(cells) <= most:
         raise AntsError(f"cells is {shown(cells)}; it must be a list of 1 to {most} cells.")

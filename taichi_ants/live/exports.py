@@ -1,4 +1,4 @@
-"""The files that a session gives, and the processes that make or replay what takes long."""
+"""Files that pages can export from a session, and worker processes that make or replay them."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from taichi_ants.viewer import Recording, page
 Progress = Callable[[int], None]  # called with the number of ticks that have passed
 
 _PROGRESS_EVERY = 0.1  # seconds
-_SLICE = 0.05  # seconds of undoing at each turn
+_SLICE = 0.05  # seconds of undoing per turn of the server
 
 
 def recording(log: Log, most_frames: int = 1000, progress: Progress | None = None) -> Recording:
-    """The session as a page plays it without a server, see `Session.snapshots`."""
+    """Return a recording of the session; `most_frames` is as in `Session.snapshots`."""
     (*_, session), frames = zip(*_snapshots(log, most_frames, progress), strict=True)
     return Recording(session.header(), list(frames))
 
 
 def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300) -> bytes:
-    """An animation of the session, see `Session.snapshots`."""
+    """Return a GIF of the session; `most_frames` is as in `Session.snapshots`."""
     from taichi_ants.rendering import colony_snapshots, frames, save_animation
 
     passed = _snapshots(log, most_frames, progress)
@@ -45,8 +45,8 @@ def _snapshots(log: Log, most: int, progress: Progress | None) -> Iterator[tuple
             progress(session.ticks)
 
 
-# What pages call it, the name of the file, and what makes it: at once, or from the beginning.
-LOAD = "load"  # what they call the replay of an uploaded file, or of a session in part undone
+LOAD = "load"  # pages' name for the replay of an uploaded file, and for undoing
+# Pages' names of files, file names, and the functions that make them: at once, or by a replay.
 QUICK: dict[str, tuple[str, Callable[[Session], bytes]]] = {
     "session": ("session.npz", Session.to_bytes),
     "policy": ("policy.npz", Session.policy_bytes),
@@ -59,7 +59,7 @@ SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
 
 
 class Undoing:
-    """A session that is made once more without its last change; attributes as of `Making`."""
+    """The replay of a session without its last change; attributes are those of `Making`."""
 
     page = None
 
@@ -69,7 +69,7 @@ class Undoing:
         self.made: Session | str | None = None
 
     def go_on(self) -> None:
-        """Undo for a moment; AntsError and MemoryError become words in `made`."""
+        """Continue for a moment; AntsError and MemoryError become messages in `made`."""
         until = time.monotonic() + _SLICE
         try:
             for session in self._pieces:
@@ -80,21 +80,21 @@ class Undoing:
         except AntsError as error:
             self.made = str(error)
         except MemoryError:
-            self.made = "undoing needs more memory than there is."
+            self.made = "undoing needs more memory than is available."
 
     def cancel(self) -> None:
-        """Nothing to do: the session is as it was."""
+        """Do nothing, because the session has not changed."""
 
 
 class Making:
-    """A file of `SLOW` that a worker process makes, or a session that it replays (`LOAD`).
+    """A worker process that makes a file of `SLOW`, or replays a session (`LOAD`).
 
-    `content` is the session as its file holds it, `total` its ticks, `prepare` what the process
-    calls first, as to load a plugin; `page` is who asked.
+    `content` is a session file, `total` its number of ticks. The process calls `prepare` first, for
+    example to load a plugin. `page` is the page that asked for it.
 
     Attributes:
-        done: How many of the ticks have passed.
-        made: What was made, or why there is nothing; None before the end.
+        done: The number of ticks that have been replayed.
+        made: The result, or a message if there is none; None before the end.
     """
 
     def __init__(
@@ -115,25 +115,25 @@ class Making:
         threading.Thread(target=self._run, args=(answers,), daemon=True).start()
 
     def go_on(self) -> None:
-        """Nothing to do: the process goes on by itself."""
+        """Do nothing, because the process continues by itself."""
 
     def cancel(self) -> None:
-        """End it now."""
+        """End the process now."""
         self._cancelled = True
         if self._process.pid is not None:
             self._process.terminate()
 
     def _run(self, answers: Connection) -> None:
         answer: bytes | str | int | Session = 0
-        with self._answers, suppress(EOFError, OSError):  # as where there is no memory
+        with self._answers, suppress(EOFError, OSError):  # for example if memory is exhausted
             self._process.start()
-            answers.close()  # so that the end of the process is the end of its answers
+            answers.close()  # so that `recv` raises EOFError when the process ends
             if self._cancelled:
                 self._process.terminate()
             while isinstance(answer := self._answers.recv(), int):
                 self.done = answer
         if isinstance(answer, int):
-            answer = "the process that was to do this has ended early, as for lack of memory."
+            answer = "the worker process has ended early, perhaps for lack of memory."
         faulty = isinstance(answer, str) and self._kind == LOAD
         self.made = _of_page(answer) if faulty else answer
 
@@ -141,10 +141,10 @@ class Making:
 def _make(
     kind: str, content: bytes, prepare: Callable[[], None] | None, answers: Connection
 ) -> None:
-    """Answer with numbers of ticks, then with what was made, or with why there is nothing."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this one
-    if hasattr(os, "nice"):  # as on Windows it has not
-        os.nice(5)  # the server answers pages first
+    """Send numbers of ticks while working, then the result, or a message if there is none."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent process ends this one
+    if hasattr(os, "nice"):  # Windows does not have it
+        os.nice(5)  # the server has priority
     told = 0.0
 
     def progress(ticks: int) -> None:
@@ -168,7 +168,7 @@ def _make(
 
 
 def uploaded(content: bytes) -> Log:
-    """The log in a file that a page has sent; AntsError with the way out that a page has."""
+    """Return the log in an uploaded file; raise AntsError with advice for users of the page."""
     try:
         return Log.from_bytes(content)
     except AntsError as error:

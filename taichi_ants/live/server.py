@@ -1,12 +1,12 @@
-"""The room in which people watch a session: its pages, and the thread in which time passes.
+"""The server of the live page, and the thread that runs its session.
 
-The room serves one page, and a socket for each page that is open. It listens on this machine alone,
-and only a page of its own that knows its token gets a socket. A page asks for things in JSON, see
-`Room._do`; it is told what happens in JSON and in frames, see `taichi_ants.viewer.frames`.
+The server is reachable only from this machine. It serves the live page and a WebSocket for each
+open page; a socket requires the server's own page and its token. Pages send requests as JSON, see
+`Room._do`; the server sends JSON messages and frames, see `taichi_ants.viewer.frames`.
 
-Two threads: one serves the sockets, the other, which calls `Room.run`, has the session. What pages
-ask for goes through a queue; messages to pages go back to the thread of the sockets. Files that
-pages upload are checked in further threads and replayed by processes, see `exports.Making`.
+One thread serves the sockets. Another one, which calls `Room.run`, owns the session. Requests pass
+through a queue to it, and messages for pages return to the socket thread. Further threads check
+uploaded files, and worker processes replay them, see `exports.Making`.
 """
 
 from __future__ import annotations
@@ -43,31 +43,31 @@ PARTS = ("controls.html", "live.css", *SCRIPTS)
 
 HOST = "127.0.0.1"
 FRAMES_A_SECOND = 30
-FASTEST = 1000.0  # ticks a second; a page that asks for these gets as many as there can be
+FASTEST = 1000.0  # ticks/s; at this speed the session runs as fast as possible
 
 _MOST_PAGES = 24
 _MOST_TEXT = 2**18  # bytes of a request
-_MOST_UPLOAD = 2**22  # bytes of a session
-_MOST_UNSEEN = 12  # frames that a page is sent before it has drawn the first of them
-_MOST_WAITING = 2**27  # bytes that wait for a page that does not read
-_FEW = 4  # frames of an episode, below which each shows another one
-_PHASES = 24  # frames that such episodes make one of
+_MOST_UPLOAD = 2**22  # bytes of a session file
+_MOST_UNSEEN = 12  # frames sent to a page before it has drawn the first of them
+_MOST_WAITING = 2**27  # bytes buffered for a page that does not read
+_FEW = 4  # with fewer frames per episode, each frame shows another episode
+_PHASES = 24  # number of such frames that together show the course of an episode
 _STATE_EVERY = 0.5  # seconds
 _PROGRESS_EVERY = 0.2  # seconds
-_BREATH = 0.004  # seconds after each frame, in which the thread of the sockets gets its turn
-_LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to end
-_QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
+_BREATH = 0.004  # seconds of waiting after each frame, so that the socket thread can run
+_LONGEST_WAIT = 0.2  # seconds to wait for a request before the next check for the end
+_QUIET = logging.getLogger("taichi_ants.live")  # keeps foreign requests out of the terminal
 _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
 
 
-# What would be lost, or would take away the session that is to go on if a replay is cancelled.
+# Requests to refuse during a replay: they would be lost, or change the session if it is cancelled.
 _CHANGES = ("play", "step", "edit", "undo", "back", "begin", "restart")
 
 _HEADERS = {
     "Allow": "GET, HEAD",
     "Cache-Control": "no-store",
-    "Content-Security-Policy": "frame-ancestors 'none'",  # the page has its other rules in itself
+    "Content-Security-Policy": "frame-ancestors 'none'",  # the page itself contains the other rules
     "Cross-Origin-Opener-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
@@ -78,7 +78,7 @@ _HEADERS = {
 
 @cache
 def live_page(server: str) -> str:
-    """The viewer with controls beside the world, as HTML; it connects to `server` alone."""
+    """Return the HTML of the viewer with controls; it connects only to `server`."""
     folder = resources.files(__package__)
     controls, style, *scripts = (folder.joinpath(name).read_text("utf-8") for name in PARTS)
     more = {"controls": controls, "style": style, "script": "\n".join(scripts)}
@@ -86,19 +86,19 @@ def live_page(server: str) -> str:
 
 
 class Closed(Exception):  # noqa: N818
-    """A page has sent what no page of ours sends; its socket is closed."""
+    """The reason to close a socket: a request that the live page never sends."""
 
 
 class Page:
-    """One page that is open, in the thread of the sockets."""
+    """An open page; used in the socket thread."""
 
     def __init__(self, connection: ServerConnection) -> None:
         self.connection = connection
-        self.unseen = 0  # frames that it was sent, but has not drawn
-        self.behind = False  # it gets no more frames until it is told how all is
+        self.unseen = 0  # frames that were sent, but not drawn yet
+        self.behind = False  # if True, the next frame must be a complete one
 
     def tell(self, *messages: str | bytes) -> None:
-        """Send messages without waiting; who never reads is cut off."""
+        """Send messages without waiting; disconnect pages that never read."""
         from websockets.asyncio.server import broadcast
 
         for message in messages:
@@ -108,29 +108,29 @@ class Page:
             transport.abort()
 
     def show(self, frame: bytes) -> None:
-        """Send a frame of what has changed; a page with too many unseen ones falls behind."""
+        """Send a frame of changes, unless too many frames are unseen: then the page is behind."""
         self.behind = self.behind or self.unseen >= _MOST_UNSEEN
         if not self.behind:
             self.unseen += 1
             self.tell(frame)
 
     def has_seen(self, frames: int) -> bool:
-        """Count frames that it has drawn; whether it is behind and has drawn all that it got."""
+        """Return whether the page is behind and, with these frames, has drawn everything sent."""
         self.unseen = max(0, self.unseen - frames)
         return self.behind and self.unseen == 0
 
     def begin(self, *messages: str | bytes) -> None:
-        """Send a frame that holds all, and what stands before it."""
+        """Send messages that end with a complete frame."""
         self.unseen, self.behind = 1, False
         self.tell(*messages)
 
 
 class Room:
-    """A session that people watch and change together.
+    """The server of a session that several pages can watch and change together.
 
-    Pages can choose from `choices`. It listens on `port`, 0 for one that is free; `prepare` is
-    called first in processes that replay the session, as to load a plugin. AntsError if the library
-    `websockets` is not installed, or the port cannot be used.
+    Pages offer `choices`. The server listens on `port`; 0 means any free port. Worker processes
+    that replay the session call `prepare` first, for example to load a plugin. AntsError if the
+    library `websockets` is not installed, or the port cannot be used.
     """
 
     def __init__(
@@ -156,27 +156,27 @@ class Room:
         self.port = self._socket.getsockname()[1]
         self.token = secrets.token_urlsafe(24)
         self.playing, self.speed = False, 12.0
-        self._shown = secrets.token_hex(8)  # by which pages that come back know the session
+        self._shown = secrets.token_hex(8)  # identifies the session for pages that reconnect
         self._pages: set[Page] = set()
-        self._joined = 0  # sockets, a page or not yet
-        # Who asks, what is to be done, and what is set when it is done.
+        self._joined = 0  # sockets, including those that have not received a session yet
+        # The page, its request as a function, and a future for the result.
         self._requests: queue.Queue[tuple[Page, Callable[[], None], asyncio.Future[None]]]
         self._requests = queue.Queue()
         self._loop = asyncio.new_event_loop()
         self._over, self._leave = threading.Event(), asyncio.Event()
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
         self._prepare = prepare
-        self._former: Session | None = None  # whose place the present one has taken
-        self._undone: tuple[int, int] | None = None  # steps and edits, if it is in part undone
-        self._stroke: tuple[Page, float] | None = None  # by whom, and which, of the last edit
-        self._works: dict[str, Making | Undoing] = {}  # what takes long: LOAD, or a file of SLOW
-        self._loaded: Session | None = None  # by another process, and has not gone on yet
-        self._compiles = False  # whether the first step of the session goes on
-        self._tells = 0.0  # when pages are told next how things stand
+        self._former: Session | None = None  # the session before the present one
+        self._undone: tuple[int, int] | None = None  # its steps and edits, after an undo
+        self._stroke: tuple[Page, float] | None = None  # page and number of the last edit's stroke
+        self._works: dict[str, Making | Undoing] = {}  # running work: LOAD, or a file of SLOW
+        self._loaded: Session | None = None  # from a worker process, before its first step here
+        self._compiles = False  # whether the first step of a session is running
+        self._tells = 0.0  # time of the next state message
 
     @property
     def url(self) -> str:
-        """Where the page is, with the token."""
+        """The address of the page, with the token."""
         return f"http://{HOST}:{self.port}/?token={self.token}"
 
     @property
@@ -185,17 +185,17 @@ class Room:
         return bool(self._pages)
 
     def end(self) -> None:
-        """Let `run` return soon; for any thread."""
+        """Make `run` return soon; can be called from any thread."""
         self._over.set()
 
-    # In the thread that calls `run`: time, and what pages ask for.
+    # Methods for the thread that calls `run`: simulation and requests.
 
     def run(
         self, seconds: float | None = None, each_turn: Callable[[], object] = lambda: None
     ) -> None:
-        """Serve pages and let time pass, for some `seconds` or until somebody ends it.
+        """Serve pages and run the session, for some `seconds` or until `end` is called.
 
-        `each_turn` is called several times a second; what it raises ends it, too.
+        Calls `each_turn` several times per second; its exceptions end the server and propagate.
         """
         sockets = threading.Thread(target=self._serve, name="sockets", daemon=True)
         sockets.start()
@@ -208,18 +208,18 @@ class Room:
             self._over.set()
             for work in self._works.values():
                 work.cancel()
-            with contextlib.suppress(RuntimeError):  # it has ended by itself
+            with contextlib.suppress(RuntimeError):  # the loop has already ended
                 self._loop.call_soon_threadsafe(self._leave.set)
             sockets.join(2)
 
     @property
     def _runs(self) -> bool:
-        """Whether time passes; not while another session is replayed to take the place of this."""
+        """Whether the session runs; it pauses during a replay of the session that replaces it."""
         return self.playing and LOAD not in self._works
 
     def _turn(self) -> None:
-        """Let a frame's time pass if it is due, and do what a page asks for."""
-        runs = self._runs and bool(self._pages)  # time stands still while nobody looks on
+        """Advance by a frame if one is due, and handle requests."""
+        runs = self._runs and bool(self._pages)  # pause if no page is open
         for kind, work in [*self._works.items()]:
             work.go_on()
             if work.made is not None:
@@ -235,12 +235,12 @@ class Room:
         due = now if undoes else self._due if runs else math.inf
         wait = min(due - now, self._tells - now, _LONGEST_WAIT)
         with contextlib.suppress(queue.Empty):
-            for _ in range(1 + len(self._pages)):  # all have their turn
+            for _ in range(1 + len(self._pages)):  # about one request per page
                 self._answer(*self._requests.get(timeout=max(wait, _BREATH)))
                 wait = 0.0
 
     def _end_work(self, kind: str, work: Making | Undoing) -> None:
-        """Begin the session that was made, give its file to a page, or tell the fault."""
+        """Begin the finished session, send the finished file to its page, or send an error."""
         del self._works[kind]
         self._tells = 0.0
         if isinstance(work.made, Session):
@@ -252,7 +252,7 @@ class Room:
             self._tell(_say("error", words=work.made), to=work.page)
 
     def _pass(self) -> None:
-        """Let the ticks of one frame pass, and show it."""
+        """Advance by the ticks of one frame, and show it."""
         began, before = time.monotonic(), self.session.steps
         if self.speed >= FASTEST:
             ticks = self._leap()
@@ -262,41 +262,41 @@ class Room:
             self._pace -= ticks
         try:
             self._advance(ticks)
-        except AntsError as error:  # as of a learner whose values are no longer finite
+        except AntsError as error:  # for example if a learner's values are no longer finite
             self.playing = False
             self._tell(_say("error", words=str(error)))
         took, passed = time.monotonic() - began, self.session.steps - before
         if passed == ticks and took > 0:
             self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
         usual = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
-        self._due = max(self._due + usual, began + took)  # lost time is not made up
+        self._due = max(self._due + usual, began + took)  # do not catch up on lost time
 
     def _leap(self) -> int:
-        """The steps that fill the time of a frame, as far as is known.
+        """Return the estimated number of steps that fill the time of a frame.
 
-        Where these are a large part of an episode, each frame shows another episode, some ticks
-        later in it than the one before: pages see the slow course of an episode.
+        If this is a large part of an episode, each frame shows another episode, at a slightly later
+        tick. So pages show the course of an episode slowly.
         """
         steps, length = int(self._piece), self.session.setup.ticks_per_episode
         if not length or _FEW * steps < length:
             return steps
-        cycle = length + 1  # with the step that begins the next one
+        cycle = length + 1  # including the step that begins the next episode
         return max(1, round(steps / cycle)) * cycle + max(1, length // _PHASES)
 
     def _advance(self, ticks: int) -> None:
-        """Let ticks pass, and show them. The first ones compile kernels, which takes seconds."""
+        """Advance by ticks, and show them; the first call compiles kernels, which takes seconds."""
         if self.session.steps == 0 or self.session is self._loaded:
             self._compiles, self._loaded = True, None
             self._tell(self._state())
-            time.sleep(_BREATH)  # in which the thread of the sockets tells it
+            time.sleep(_BREATH)  # so that the socket thread sends this state first
         try:
             self._show(self.session.advance() if ticks == 1 else self.session.leap(ticks))
         finally:
             if self._compiles:
-                self._compiles, self._tells = False, 0.0  # as soon as that is so
+                self._compiles, self._tells = False, 0.0  # send the new state at once
 
     def _answer(self, page: Page, act: Callable[[], None], answered: asyncio.Future[None]) -> None:
-        """Do what a page asks for, or tell it why not; all are told soon how things stand then."""
+        """Perform a request or send its page an error; then send the state to all pages soon."""
         refused = None
         try:
             act()
@@ -304,18 +304,18 @@ class Room:
             refused = error
         except (AntsError, MemoryError) as error:
             no_memory = isinstance(error, MemoryError)
-            words = "this needs more memory than there is." if no_memory else str(error)
+            words = "this needs more memory than is available." if no_memory else str(error)
             self._tell(_say("error", words=words), to=page)
 
         def answer() -> None:
-            if not answered.done():  # as where the page has gone
+            if not answered.done():  # it is done if the page has disconnected
                 answered.set_exception(refused) if refused else answered.set_result(None)
 
         self._post(answer)
         self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
 
     def _do(self, page: Page, request: dict[str, Any]) -> None:
-        """Do what a page asks for in JSON."""
+        """Perform a JSON request of a page."""
         if request["do"] in _CHANGES:
             self._check_free()
         match request["do"]:
@@ -327,11 +327,9 @@ class Room:
                 self.playing = False
                 for _ in range(int(_number(request, "ticks", 1, 100))):
                     self._advance(1)
-            case "speed":  # {"value": ticks a second, 1 to FASTEST}
+            case "speed":  # {"value": ticks/s, 1 to FASTEST}
                 self.speed, self._due = _number(request, "value", 1, FASTEST), time.monotonic()
-            case (
-                "edit"
-            ):  # {"edit": see taichi_ants.live.edits, "stroke": same in those of a stroke}
+            case "edit":  # {"edit": see `edits`, "stroke": a number, equal for edits of one stroke}
                 if not isinstance(request.get("edit"), dict):
                     raise Closed("an edit has to be an object")
                 stroke = page, _number(request, "stroke", 0, 2**53)
@@ -339,17 +337,17 @@ class Room:
                 self._stroke = stroke
             case "undo":
                 self._works[LOAD] = Undoing(self.session)
-            case "back":  # go on with the session whose place the present one has taken
+            case "back":  # return to the session before the present one
                 if self._former is None:
                     raise AntsError("there is no session before this one.")
                 self._begin(self._former, comes_back=True)
-            case "begin":  # {"chosen": see taichi_ants.live.choices}
+            case "begin":  # {"chosen": see `Choices.setup`}
                 self._begin(Session(self.choices.setup(request.get("chosen"))))
             case "restart":
                 self._begin(Session(self.session.setup))
             case "export":  # {"kind": of `QUICK` or `SLOW`}
                 self._export(page, str(request.get("kind")))
-            case "cancel":  # {"kind": of what takes long}; it may have ended meanwhile
+            case "cancel":  # {"kind": LOAD or of `SLOW`}; it may have ended already
                 kind = str(request.get("kind"))
                 if kind in self._works:
                     self._works.pop(kind).cancel()
@@ -357,19 +355,18 @@ class Room:
             case "quit":
                 self.end()
             case _:
-                raise Closed("there is no such request")
+                raise Closed("this request does not exist")
 
     def _check_free(self) -> None:
         if LOAD in self._works:
-            raise AntsError("a session is being replayed; wait for its end, or cancel it.")
+            raise AntsError("a session is being replayed; wait until it ends, or cancel it.")
 
     def _load(self, log: Log, content: bytes) -> None:
-        """Replay a session that was uploaded."""
         self._check_free()
         self._works[LOAD] = Making(LOAD, content, log.steps, self._prepare)
 
     def _forget(self, page: Page) -> None:
-        """Cancel the file of a page that has gone."""
+        """Cancel the files that a disconnected page has asked for."""
         for kind, work in [*self._works.items()]:
             if work.page is page:
                 self._works.pop(kind).cancel()
@@ -379,7 +376,7 @@ class Room:
             name, make = QUICK[kind]
             self._tell(_say("file", name=name), make(self.session), to=page)
         elif kind not in SLOW:
-            raise Closed("there is no file of this kind")
+            raise Closed("this kind of file does not exist")
         elif self._works.keys() & SLOW.keys():
             raise AntsError("another file is being made; wait for it, or cancel it.")
         else:
@@ -387,10 +384,10 @@ class Room:
             self._works[kind] = Making(kind, content, ticks, self._prepare, page)
 
     def _begin(self, session: Session, undoes: bool = False, comes_back: bool = False) -> None:
-        """Go on with another session; pages can go back to the one before.
+        """Replace the session; pages can return to the previous one with the request "back".
 
-        That is the one before several in a row, where each undoes a change of the last one, or
-        where a session begins that stands as the present one does: nothing would be lost.
+        After several undos in a row, "back" returns to the session before the first. If the new
+        session equals the present one, "back" does not change.
         """
         before = self.session
         in_a_row = undoes and self._undone == (before.steps, len(before.edits))
@@ -402,7 +399,7 @@ class Room:
         self._tell_whole()
 
     def _tell_whole(self, page: Page | None = None, begins: bool = True) -> None:
-        """Tell a page, or all, how all is now; where a session begins, also what it is about."""
+        """Send a complete frame to a page, or to all; with `begins`, also facts of the session."""
         messages: list[str | bytes] = [_say("snapshot"), self.session.snapshot()]
         if begins:
             header, setup, choices = self.session.header(), self.session.setup, self.choices
@@ -418,7 +415,7 @@ class Room:
         self._post(show)
 
     def _show(self, frame: bytes) -> None:
-        """Send a frame to all pages but those that are behind."""
+        """Send a frame to all pages except those that are behind."""
         news = self.session.news()
 
         def show() -> None:
@@ -448,8 +445,6 @@ class Room:
         )
 
     def _tell(self, *messages: str | bytes, to: Page | None = None) -> None:
-        """Send messages to a page, or to all."""
-
         def tell() -> None:
             for page in self._pages if to is None else [to]:
                 page.tell(*messages)
@@ -457,18 +452,18 @@ class Room:
         self._post(tell)
 
     def _post(self, act: Callable[[], Any]) -> None:
-        """Let the thread of the sockets do something, in the order of these calls."""
-        with contextlib.suppress(RuntimeError):  # it has ended
+        """Call a function in the socket thread, in the order of these calls."""
+        with contextlib.suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(act)
 
-    # In the thread of the sockets.
+    # Methods for the socket thread.
 
     def _serve(self) -> None:
         asyncio.set_event_loop(self._loop)
         try:
             self._loop.run_until_complete(self._listen())
         finally:
-            self._over.set()  # nobody can be served any more
+            self._over.set()  # without sockets, `run` has to end too
             self._loop.close()
 
     async def _listen(self) -> None:
@@ -485,30 +480,29 @@ class Room:
                 page.tell(_say("over"))
 
     def _open(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request: with the page, with a refusal, or None, which opens a socket.
+        """Return the page or an error; None opens a socket.
 
-        The page holds no secret; a socket needs the token.
+        The page does not contain a secret; a socket requires the token.
         """
-        method = getattr(request, "method", "GET")  # websockets before 17 takes no other one
+        method = getattr(request, "method", "GET")  # websockets before 17 accepts only GET
         asked = urlsplit(request.path)
         hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
         host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         opens, tokens = asked.path == "/socket", parse_qs(asked.query).get("token", [])
         mine = len(host) == 1 and host[0] in hosts
-        # A page of ours has the origin that it was asked for at; the page itself is asked for by
-        # nobody's page.
+        # The origin of a socket must be this server. The page must not be requested by other pages.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
         knows = hmac.compare_digest("".join(tokens[:1]).encode(), self.token.encode())
         if method not in ("GET", "HEAD")[: 1 if opens else 2]:
             response = connection.respond(405, "Only GET is allowed here.\n")
         elif not mine or not (knows or (asked.path == "/" and not tokens)):
-            response = connection.respond(403, "Open the address that was printed.\n")
+            response = connection.respond(403, "Open the address that the command printed.\n")
         elif opens:
             if self._joined < _MOST_PAGES:
                 return None
             response = connection.respond(503, "Too many pages are open.\n")
         elif asked.path != "/":
-            response = connection.respond(404, "There is nothing here.\n")
+            response = connection.respond(404, "This page does not exist.\n")
         else:
             response = connection.respond(200, live_page(f"ws://{host[0]}"))
             del response.headers["Content-Type"]
@@ -520,7 +514,7 @@ class Room:
         return response
 
     async def _hear(self, connection: ServerConnection) -> None:
-        """All that one page says; what it asks for is done before it is heard further."""
+        """Handle the messages of a page, one after the other."""
         from websockets.exceptions import ConnectionClosed
 
         page = Page(connection)
@@ -546,7 +540,7 @@ class Room:
             self._requests.put((page, partial(self._forget, page), self._loop.create_future()))
 
     async def _upload(self, page: Page, content: bytes) -> None:
-        """Look at a file of a page in a thread, while others are answered."""
+        """Check an uploaded file in a thread, so that other pages do not wait."""
         try:
             log = await asyncio.to_thread(uploaded, content)
         except AntsError as error:
@@ -561,29 +555,27 @@ class Room:
 
 
 def _say(kind: str, /, **facts: Any) -> str:
-    """A message to a page."""
     return json.dumps({"say": kind, **facts}, separators=(",", ":"))
 
 
 def _read(message: str) -> dict[str, Any]:
-    """The request in a message."""
     if len(message) > _MOST_TEXT:
-        raise Closed("this is too long")
+        raise Closed("the message is too long")
     try:
         request = json.loads(message, parse_constant=_refuse)
     except (ValueError, RecursionError):
-        raise Closed("this is no JSON") from None
+        raise Closed("the message is not JSON") from None
     if not isinstance(request, dict) or not isinstance(request.get("do"), str):
         raise Closed('a request has to be an object with a "do"')
     return request
 
 
 def _refuse(name: str) -> None:
-    raise ValueError(f"{name} is no number")
+    raise ValueError(f"{name} is not a number")
 
 
 def _number(request: dict[str, Any], name: str, least: float, most: float) -> float:
-    """A number of a request; no page of ours sends one that is not allowed."""
+    """Return a number of a request; raise Closed if the live page never sends it."""
     value = request.get(name)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value <= most:
         raise Closed(f"{name} has to be a number from {least} to {most}")

@@ -1,4 +1,4 @@
-"""A colony that people watch and change, and its log, which replays it to the bit."""
+"""Sessions: a colony with interventions, and a log that replays it bit for bit."""
 
 from __future__ import annotations
 
@@ -27,40 +27,40 @@ from taichi_ants.viewer import Recorder
 
 MOST_TICKS = 1_000_000_000
 MOST_EDITS = 10_000
-MOST_CELLS = 400_000  # that edits name, all together
+MOST_CELLS = 400_000  # cells in all edits together
 # Sessions within these limits fit into `most`, so reading a file takes little time and memory.
 _WRITER = "Session.save, or Save on its page,"
 KIND = Kind("session", 3, _WRITER, most=5_000_000, most_lists=100_000)
-_PIECE = 0.02  # seconds, of a session that is replayed
-_BETWEEN = 0.1  # seconds of simulation between two snapshots, which undoing has to replay at most
-_MOST_KEPT = 1 << 28  # bytes of snapshots
-_LARGEST = 1 << 26  # bytes of a colony of which snapshots are taken
+_PIECE = 0.02  # seconds of a piece of a replay
+_BETWEEN = 0.1  # seconds of simulation between snapshots, the longest replay of an undo
+_MOST_KEPT = 1 << 28  # bytes of all snapshots
+_LARGEST = 1 << 26  # bytes of a colony above which there are no snapshots
 
 
 def cells_of(edit: Any) -> int:
-    """The number of cells that an edit names, which may be none."""
+    """Return the number of cells that an edit names, 0 if it names none."""
     cells = edit.get("cells") if isinstance(edit, dict) else None
     return len(cells) if isinstance(cells, list) else 0
 
 
 def check_room(n_edits: int, n_cells: int) -> None:
-    """Raises AntsError if a session has more edits, or cells in them, than one may have."""
+    """Raise AntsError if a session has too many edits, or too many cells in them."""
     if n_edits > MOST_EDITS or n_cells > MOST_CELLS:
         raise AntsError(
-            f"the session has {n_edits} edits of {n_cells} cells, and at most {MOST_EDITS} edits "
+            f"the session has {n_edits} edits of {n_cells} cells, but at most {MOST_EDITS} edits "
             f"of {MOST_CELLS} cells are allowed; begin another session."
         )
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """What a session was up to some moment; see `Session.replay`."""
+    """The setup and all edits of a session up to some step, from which it can be replayed."""
 
     setup: Setup
-    edits: tuple[tuple[int, Any], ...]  # (steps, edit) of each, in order, see `edits`
-    steps: int  # that time has made, see `Session`
-    ticks: int | None  # that have passed, if that is known
-    state: str | None  # of `Interventions.state` then, if that is known
+    edits: tuple[tuple[int, Any], ...]  # (steps, edit), in order, see `edits`
+    steps: int  # see `Session`
+    ticks: int | None  # see `Session`; None if unknown
+    state: str | None  # `Interventions.state` at the end; None if unknown
     name: str = "the session"  # in messages
     changes: tuple[int, ...] = ()  # as in `Session`
 
@@ -77,7 +77,7 @@ class Log:
 
     @classmethod
     def read(cls, path: files.PathLike, content: bytes | None = None) -> Log:
-        """The log in a file; arguments and errors are those of `archives.read`."""
+        """Return the log in a file; arguments and errors are those of `archives.read`."""
         with KIND.reading(path, content) as (arrays, facts):
             expect("state", facts["state"], str)
             steps = checked_whole("steps", facts["steps"], 0, MOST_TICKS)
@@ -100,30 +100,30 @@ class Log:
 
     @classmethod
     def from_bytes(cls, content: bytes) -> Log:
-        """As `read`, of what a file holds that somebody has sent."""
+        """Return the log in the bytes of an uploaded file; raises as `read` does."""
         return cls.read("the loaded file", content)
 
 
 class _Snapshot(NamedTuple):
-    """A session as it was before one of its changes."""
+    """A session before one of its changes."""
 
-    edits: int  # that it had
-    spent: float  # seconds of simulation
+    edits: int  # number of edits before the snapshot
+    spent: float  # seconds of simulation before the snapshot
     content: bytes  # the session without its edits, pickled and compressed
 
 
 class Session:
-    """A colony in a world, from its first tick on, and all interventions.
+    """A colony with all interventions since its first tick.
 
-    It depends on its setup and its edits alone: `load` replays them. AntsError if the world or the
-    colony cannot be built.
+    A session depends only on its setup and its edits, so `load` can replay it. AntsError if the
+    world or the colony cannot be built.
 
     Attributes:
-        colony: As it is now; nobody else may move it on.
-        ticks: How many have passed in all episodes.
-        steps: How many steps time has made: ticks, and episodes that began since one had ended.
+        colony: The colony; only the session may advance it.
+        ticks: The number of ticks in all episodes.
+        steps: The number of ticks, plus the number of episodes that began after one had ended.
         edits: (steps, edit) of each edit, in order.
-        changes: Where in `edits` each change begins; the strokes of a brush are one change.
+        changes: The index in `edits` of the first edit of each change; a stroke is one change.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -133,12 +133,12 @@ class Session:
         self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []
         self.changes: list[int] = []
-        self._cells = 0  # that the edits name
+        self._cells = 0  # cells in all edits
         self._snapshots: list[_Snapshot] = []
         self._spent = 0.0  # seconds of simulation so far
         self.interventions.begin_episode(self._length)
-        self.colony.observe()  # changes nothing, but compiles what the first edit needs
-        # Interventions change the number of ants.
+        self.colony.observe()  # has no effect, but compiles kernels for the first edit
+        # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
         self._recorder = Recorder(self.colony, title=title)
         self._recorder.progress.note()
@@ -151,15 +151,15 @@ class Session:
 
     @property
     def ended(self) -> bool:
-        """Whether the episode has ended; the next step of time begins another one."""
+        """Whether the episode has ended; the next step begins another one."""
         return self.colony.ticks == self._length
 
     def header(self) -> dict[str, Any]:
-        """What all frames are about, see `Recorder.header`."""
+        """Return facts about all frames, see `Recorder.header`."""
         return self._recorder.header()
 
     def news(self) -> dict[int, tuple[str, str, list[str]]]:
-        """The names of states that have been seen since this was asked last."""
+        """Return the names of states that ants have visited since the last call."""
         if len(self._named) == self.colony.task.n_states:
             return {}
         new = self._recorder.names(self._named)
@@ -167,20 +167,20 @@ class Session:
         return new
 
     def snapshot(self) -> bytes:
-        """A frame of all as it is now, for a page that has read none."""
+        """Return a complete frame, for a page without frames."""
         return self._recorder.whole()
 
     def advance(self, n: int = 1) -> bytes:
-        """Let n ticks pass, fewer where the episode ends before; a frame of what has changed.
+        """Return a frame of changes after up to n more ticks of this episode.
 
-        If the episode has ended, the next one begins instead, and no tick passes.
+        If the episode has ended, the next one begins instead, without a tick.
         """
         return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
 
     def leap(self, n: int) -> bytes:
-        """Let time make n steps, also through several episodes; a frame of what has changed.
+        """Return a frame of changes after n more steps, possibly through several episodes.
 
-        What ants did between is in no frame, as it may be in those of `advance`.
+        The frame does not have the actions of ants.
         """
         until = self.steps + checked_whole("n", n)
         while self.steps < until:
@@ -188,7 +188,7 @@ class Session:
         return self._recorder.snapshot()
 
     def _pass(self, n: int, tick: Callable[[int], Any]) -> Any:
-        """As `advance`, by a function that lets ticks pass; what it gives, None without ticks."""
+        """Advance with the function `tick`; return its result, None if no tick passes."""
         progress = self._recorder.progress
         if self.ended:
             progress.note(ended=True)
@@ -201,7 +201,7 @@ class Session:
         before, began = self.colony.ticks, time.perf_counter()
         try:
             frame = tick(n)
-        finally:  # even if somebody interrupts it
+        finally:  # also after an interrupt
             self.ticks += self.colony.ticks - before
             self.steps += self.colony.ticks - before
             self._spent += time.perf_counter() - began
@@ -209,11 +209,11 @@ class Session:
         return frame
 
     def apply(self, edit: object, goes_on: bool = False) -> bytes:
-        """Do an edit now, see `edits`, and record it; a frame of what has changed.
+        """Return a frame of changes after applying and recording an edit, see `edits`.
 
-        If the episode has ended, what is of this episode alone goes with it. An edit that `goes_on`
-        belongs to the same change as the one before, see `undone`. AntsError if it is none, or
-        there is no room for it; nothing has changed.
+        An edit that affects only an ended episode is lost when the next one begins. An edit that
+        `goes_on` belongs to the same change as the previous edit, see `undone`. AntsError if the
+        edit is not valid or not possible; nothing has changed.
         """
         self._do(edit, goes_on)
         return self._recorder.snapshot()
@@ -235,10 +235,9 @@ class Session:
         self._spent += time.perf_counter() - began
 
     def _take_snapshot(self) -> None:
-        """Keep the session as it is now, unless it can be made quickly from the last snapshot.
+        """Take a snapshot of the session, unless a replay from the last snapshot would be quick.
 
-        If the snapshots take too much memory, drop the one that is missed least: its neighbours
-        are the nearest to each other in time.
+        If snapshots take too much memory, drop the one whose neighbours are closest in time.
         """
         kept = self._snapshots
         is_near = kept and self._spent - kept[-1].spent < _BETWEEN
@@ -254,11 +253,11 @@ class Session:
             del kept[gaps.index(min(gaps))]
 
     def values(self) -> dict[str, dict[str, float]]:
-        """What the edit "set" can change, by name: value, least, most and step."""
+        """Return the values that the edit "set" can change, by name: value, least, most, step."""
         return {name: value._asdict() for name, value in edits.values(self.interventions).items()}
 
     def log(self) -> Log:
-        """How it began, the edits, and what its end is like."""
+        """Return the log: the setup, the edits, and the state at the end."""
         state = self.interventions.state()
         done, changes = tuple(self.edits), tuple(self.changes)
         return Log(self.setup, done, self.steps, self.ticks, state, changes=changes)
@@ -268,15 +267,15 @@ class Session:
         self.log().write(path)
 
     def to_bytes(self) -> bytes:
-        """The log, as a file holds it."""
+        """Return the bytes of a file with the log."""
         return bytes_of("session.npz", self.save)
 
     @classmethod
     def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
-        """Replay a session that `save` wrote, up to its end.
+        """Return the replay of a session that `save` wrote.
 
-        `progress` is called now and then with the share of the ticks that have passed. AntsError if
-        the file is missing, damaged or altered, or its end is another one here.
+        Calls `progress` from time to time with the completed share of the steps. AntsError if the
+        file is missing, damaged or altered, or if the replay ends in another state.
         """
         log = Log.read(path)
         for session in cls.replay(log):
@@ -286,10 +285,10 @@ class Session:
 
     @classmethod
     def replay(cls, log: Log) -> Iterator[Session]:
-        """Make the session of a log once more, in pieces, so that others get their turn.
+        """Yield the session of a log while it is replayed, at least a few times per second.
 
-        Yields the session as far as it has come, some times a second at least; at last all of it.
-        AntsError if the log is damaged, or its end is another one here.
+        The last session is the whole replay. AntsError if the log is damaged, or if the replay ends
+        in another state.
         """
         with KIND.building(log.name):
             session = cls(log.setup)
@@ -300,7 +299,7 @@ class Session:
     def _follow(
         self, edits: Sequence[tuple[int, Any]], steps: int, changes: Sequence[int]
     ) -> Iterator[Session]:
-        """Let time pass until it has made so many steps, with these edits, in short pieces."""
+        """Advance to a number of steps and apply the edits, in short pieces."""
         for at, edit in edits:
             yield from self._pieces(at)
             self._do(edit)
@@ -311,14 +310,14 @@ class Session:
         yield self
 
     def same(self, other: Session) -> bool:
-        """Whether another one began alike, was changed alike, and stands where this one does."""
+        """Return whether both sessions have the same setup, edits and state."""
         one, two = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
         return one == two and self.interventions.state() == other.interventions.state()
 
     def undone(self) -> Iterator[Session]:
-        """Make the session as it was before its last change, from the last snapshot before it.
+        """Return a replay up to the last change, from the last snapshot; it yields as `replay`.
 
-        Yields as `replay` does; this session stays as it is. AntsError if nothing has been changed.
+        This session does not change. AntsError if it has no changes.
         """
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
@@ -335,11 +334,9 @@ class Session:
 
     @classmethod
     def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
-        """Replay a session from its beginning, snapshot by snapshot.
+        """Yield about `most` snapshots of a replay: the session, and a frame of changes.
 
-        There are about `most` snapshots. If there are fewer steps and edits, each step has a
-        snapshot, and so does each intervention. Yields the session at that moment, and a frame of
-        what has changed since the last one.
+        If there are fewer steps and edits, each step and each edit has a snapshot.
         """
         changes = len({steps for steps, _ in log.edits})
         every = max(1, -(-(log.steps + changes) // most))
@@ -361,7 +358,7 @@ class Session:
                 yield session, session._recorder.snapshot()
 
     def _pieces(self, steps: int) -> Iterator[Session]:
-        """Let time pass until it has made so many steps, in pieces of about `_PIECE` seconds."""
+        """Advance to a number of steps, in pieces of about `_PIECE` seconds."""
         ticks = 1
         while self.steps < steps:
             began = time.perf_counter()
@@ -370,12 +367,12 @@ class Session:
             yield self
 
     def policy_bytes(self) -> bytes:
-        """The action values as a policy file holds them; AntsError if each ant has a table."""
+        """Return the bytes of a policy file; raise AntsError if each ant has its own table."""
         colony = self.colony
         if colony.one_a_slot:
             raise AntsError(
-                "each ant has a table of its own, and a policy file holds one; begin a session in "
-                "which they share one."
+                "each ant has its own table, but a policy file holds a single one; begin a session "
+                "in which ants share a table."
             )
         told = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
         if self.setup.learns:
@@ -384,16 +381,16 @@ class Session:
         return bytes_of("policy.npz", lambda path: save_policy(path, *given))
 
     def colony_bytes(self) -> bytes:
-        """The colony as it is now, as `Colony.save` writes it; `Colony.load` goes on from it.
+        """Return the bytes of a file from which `Colony.load` resumes the colony.
 
-        Its later episodes begin as those of the session would, with as many ants as this one.
+        Its later episodes begin with as many ants as this one, as those of the session do.
         """
         self.colony.worlds = (self.interventions.world(),)
         return bytes_of("colony.npz", self.colony.save)
 
 
 def bytes_of(name: str, write: Callable[[Path], None]) -> bytes:
-    """What a function writes into a file of that name."""
+    """Return the bytes that a function writes into a file with the given name."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
         write(path)

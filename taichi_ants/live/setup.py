@@ -1,4 +1,4 @@
-"""How a session begins: a world, the rules, who decides what ants do, and how many there are."""
+"""Setups of sessions: the world, the rules, the policy or learner, and the number of ants."""
 
 from __future__ import annotations
 
@@ -22,31 +22,30 @@ from taichi_ants.worlds.double_bridge import bridge_ranges
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
-# The same for the form of the page, for files and for Python; small enough for any machine.
-MOST_CELLS = 1_500_000  # of the arrays of a world, see `AxialGrid.size`
+# Limits for the form of the page, for files and for Python; small enough for any machine.
+MOST_CELLS = 1_500_000  # elements of the arrays of a world, see `AxialGrid.size`
 MOST_ANTS = 100_000
 MOST_TEXT = 50_000  # characters of a map
-_MOST_NUMBERS = 1 << 27  # of tables of ants' own
+_MOST_NUMBERS = 1 << 27  # elements of independent tables
 
 
 @dataclass(frozen=True, eq=False)
 class Setup:
-    """How a session begins.
+    """The initial conditions of a session.
 
-    AntsError if a value is not allowed; `Session` finds out whether the world, and a colony in it,
-    can be built.
+    AntsError if a value is not allowed; `Session` raises it if the world or colony cannot be built.
     """
 
     world: str  # the name of a registered world, or the text of a map
     task: Task
-    policy: TrainingConfig | np.ndarray  # or the action values that ants follow, (n_states, 5)
-    ants: int = 64  # that start each episode
-    capacity: int | None = None  # how many ants can live at once; None: 2 * `ants` + 64
-    seed: int = 0  # of the colony
-    ticks_per_episode: int = 0  # 0: one episode without an end
-    sharing: str = "shared"  # or "independent", of ants that learn, see `Colony`
-    epsilon: float = 0.01  # with which ants follow action values
-    world_seed: int = 0  # of a world that is drawn
+    policy: TrainingConfig | np.ndarray  # a learner, or action values (n_states, 5) to follow
+    ants: int = 64  # ants at the start of each episode
+    capacity: int | None = None  # largest number of living ants; None means 2 * `ants` + 64
+    seed: int = 0  # seed of the colony
+    ticks_per_episode: int = 0  # 0 means a single episode without an end
+    sharing: str = "shared"  # or "independent", for learners, see `Colony`
+    epsilon: float = 0.01  # exploration rate of ants that follow action values
+    world_seed: int = 0  # seed of a random world
     world_settings: Mapping[str, Any] = field(default_factory=dict)  # see `worlds.build`
 
     def __post_init__(self) -> None:
@@ -70,22 +69,22 @@ class Setup:
             settings = json.loads(files.to_json(dict(self.world_settings)))
         except (TypeError, ValueError, RecursionError):
             raise AntsError(
-                f"world_settings is {shown(self.world_settings)}; it must be names and numbers."
+                f"world_settings is {shown(self.world_settings)}; it must be JSON-compatible."
             ) from None
         object.__setattr__(self, "world_settings", settings)
 
     @property
     def learns(self) -> bool:
-        """Whether ants learn, not follow action values."""
+        """Whether ants learn rather than follow a policy."""
         return isinstance(self.policy, TrainingConfig)
 
     def check_size(self) -> None:
-        """Raise AntsError if the world is too large, as far as is known before it is built."""
+        """Raise AntsError if the world is known to be too large before it is built."""
         settings, is_map = self.world_settings, "\n" in self.world
         if is_map and len(self.world) > MOST_TEXT:
             raise AntsError(
-                f"the map has {len(self.world)} characters, and at most {MOST_TEXT} are allowed; "
-                "draw a smaller one."
+                f"the map has {len(self.world)} characters, but at most {MOST_TEXT} are allowed; "
+                "use a smaller map."
             )
         if is_map:
             _check_cells(text_map.ranges_of(self.world))
@@ -95,23 +94,23 @@ class Setup:
             _check_cells(bridge_ranges(**settings))
 
     def build_world(self) -> World:
-        """The world; raises AntsError if there is none of that name, or it cannot be built."""
+        """Return the world; raise AntsError if it is unknown or cannot be built."""
         self.check_size()
         if "\n" in self.world:
             return worlds.from_text(self.world)
-        check_one_of("the world", self.world, worlds.names())  # never a path
+        check_one_of("the world", self.world, worlds.names())  # excludes paths
         world = worlds.build(self.world, self.world_seed, **self.world_settings)
         _check_cells(world.ranges)
         return world
 
     def build_colony(self) -> Colony:
-        """The colony, before its first episode; AntsError if it cannot be."""
+        """Return the colony before its first episode; raise AntsError if it cannot be built."""
         options: dict[str, Any] = {"ants": self.ants, "capacity": self.capacity}
         numbers = self.capacity * self.task.n_states * ROW  # type: ignore[operator]
         if self.learns and self.sharing == "independent" and numbers > _MOST_NUMBERS:
             raise AntsError(
-                f"capacity is {self.capacity}, but tables of {self.task.n_states} states for so "
-                'many ants take too much memory; take a smaller one, or sharing "shared".'
+                f"capacity is {self.capacity}, but that many tables of {self.task.n_states} states "
+                'need too much memory; use a smaller capacity, or sharing "shared".'
             )
         if isinstance(self.policy, TrainingConfig):
             training, options["sharing"] = self.policy, self.sharing
@@ -121,7 +120,7 @@ class Setup:
         return Colony(self.build_world(), self.task, training, self.seed, **options)
 
     def to_json(self) -> dict[str, Any]:
-        """The setup as JSON holds it, but for action values, of which it says "table" only."""
+        """Return the setup, JSON-compatible; a policy of action values is only "table"."""
         facts = {one.name: getattr(self, one.name) for one in fields(self)}
         policy = self.policy.as_dict() if isinstance(self.policy, TrainingConfig) else "table"
         settings = dict(self.world_settings)
@@ -129,20 +128,21 @@ class Setup:
 
     @classmethod
     def from_json(cls, facts: object, table: np.ndarray | None = None) -> Setup:
-        """The setup of `to_json`, with the action values if the policy is "table".
+        """Return the setup of `to_json`; `table` are action values if the policy is "table".
 
-        What is left out is as usual. AntsError if a value is not allowed.
+        Missing values have their defaults. AntsError if a value is not allowed.
         """
         expect("a setup", facts, Mapping)
         assert isinstance(facts, Mapping)
         known = [one.name for one in fields(cls)]
         for name in facts.keys() - known:
-            raise AntsError(f"a setup has no {shown(name)}; choose among {', '.join(known)}.")
+            raise AntsError(f"a setup has no {shown(name)}; it has only {', '.join(known)}.")
         policy: Any = facts.get("policy")
         try:
             policy = TrainingConfig(**policy) if policy != "table" or table is None else table
-        except TypeError:  # no mapping, or other names than it has
-            raise AntsError(f"policy is {shown(policy)}; it must be a training.") from None
+        except TypeError:  # not a mapping, or wrong names
+            message = f"policy is {shown(policy)}; it must have the fields of a TrainingConfig."
+            raise AntsError(message) from None
         task = Task.from_dict(facts.get("task", {}))
         return cls(**{"world": "paper", **facts, "task": task, "policy": policy})
 
@@ -151,6 +151,6 @@ def _check_cells(ranges: tuple[int, int, int]) -> None:
     cells = AxialGrid(ranges).size
     if cells > MOST_CELLS:
         raise AntsError(
-            f"a world of ranges {ranges} takes arrays of {cells} cells, and at most {MOST_CELLS} "
+            f"a world of ranges {ranges} needs arrays of {cells} cells, but at most {MOST_CELLS} "
             "are allowed; choose a smaller world."
         )

@@ -1,28 +1,28 @@
-/* The simulation that runs now, as a source of the viewer: one socket, see live/server.py.
+/* The live simulation as a source of the viewer, over one socket, see live/server.py.
 
-   What has arrived is drawn before the server is told that it was seen; a page that is slow, or that
-   nobody looks at, is then sent less, and later a whole frame from which to go on.
+   The page acknowledges frames after drawing them. The server sends fewer frames to a slow or hidden
+   page, and later a complete one.
 
-   Where the connection is lost, the page keeps what it has and tries again. It goes on with the same
-   session by itself; another one it shows only if asked to, since that takes the place of what it has. */
+   If the connection is lost, the page keeps its history and reconnects. It resumes the same session
+   automatically, but asks before it replaces its history with another session. */
 
-const PAGE = document.documentElement.outerHTML; // before anything has changed it
-const LIVE_SCRIPT = "/* The secret of the address"; // where the scripts of the live page begin, in token.js
+const PAGE = document.documentElement.outerHTML; // before scripts change it
+const LIVE_SCRIPT = "/* The secret of the address"; // start of the live page's scripts, in token.js
 const FIRST_RETRY = 500, LAST_RETRY = 15_000; // milliseconds
-const CUT_OFF = 1008; // the server has closed the socket, since the page has sent something wrong
+const CUT_OFF = 1008; // the server has closed the socket because of an invalid request
 
 class Live {
   constructor() {
     this.news = new EventTarget(); // "state", "error", "drawn", "file", "cancelled", "lost", "back"
-    this.waiting = null; // what the next bytes are, if no frame
-    this.arrived = 0; // frames since the server was told
+    this.waiting = null; // message about the next bytes, if these are not a frame of changes
+    this.arrived = 0; // frames that are not acknowledged yet
     this.running = false;
     this.stands = false;
     this.speed = 12;
     this.speedUntil = 0;
     this.strokes = 0;
     this.viewer = null;
-    this.session = null; // which one the page shows
+    this.session = null; // the session that the page shows
     this.retry = FIRST_RETRY;
     this.connect();
   }
@@ -37,14 +37,14 @@ class Live {
     const on = (kind, act) => socket.addEventListener(kind, (event) => this.socket === socket && act(event));
     this.socket?.close();
     this.socket = socket;
-    this.joins = true; // until it is told which session there is
+    this.joins = true; // until the server sends the session
     this.ended = false;
     socket.binaryType = "arraybuffer";
     on("message", ({ data }) => (typeof data === "string" ? this.hear(JSON.parse(data)) : this.take(data)));
     on("close", (event) => this.lose(event));
   }
 
-  /* Why there is no connection: "lost" or "ended", and it is tried again; "no token", "cut off", or "another" session. */
+  /* Find out why there is no connection: "lost" or "ended", which are retried; "no token", "cut off", or "another" session. */
   lose({ code, reason }) {
     const why = TOKEN === "" ? "no token" : code === CUT_OFF ? "cut off" : this.differs ? "another" : this.ended ? "ended" : "lost";
     this.waiting = this.begins = null;
@@ -58,7 +58,7 @@ class Live {
     this.viewer?.player.take();
   }
 
-  /* Try at once, and show whatever session there is if `any`. */
+  /* Reconnect at once; `any` accepts another session. */
   reconnect(any) {
     if (any) this.session = null;
     this.differs = false;
@@ -78,9 +78,9 @@ class Live {
     return ++this.strokes;
   }
 
-  /* Another session stands still at first; who presses play before it is there means that one. */
+  /* Pause until another session begins; playing before that refers to the new session. */
   stand() {
-    this.stands = true; // until it begins, or cannot
+    this.stands = true; // until the session begins or fails
     this.running = false;
     this.viewer?.player.take();
   }
@@ -99,14 +99,14 @@ class Live {
     else {
       if (message.say === "state") {
         if (!this.stands) this.running = message.playing;
-        if (performance.now() > this.speedUntil) this.speed = message.speed; // not while somebody moves it
+        if (performance.now() > this.speedUntil) this.speed = message.speed; // not while the user moves the slider
         this.state = message;
       }
       this.tell(message.say, message);
     }
   }
 
-  /* A session is announced. A page that comes back goes on with the one that it has. */
+  /* Handle the start of a session; a page that reconnects resumes its own session. */
   meet({ session, header, choices, chosen }) {
     const comesBack = this.joins && this.session !== null;
     this.joins = false;
@@ -124,7 +124,7 @@ class Live {
     Object.assign(this, { session, choices, chosen, begins: header });
   }
 
-  /* A page that plays what this one has, by itself; it holds the script of the viewer alone. */
+  /* The HTML of a page that plays the history, with only the viewer's scripts. */
   async recording() {
     const { history } = this.viewer, page = new DOMParser().parseFromString(PAGE, "text/html");
     const reader = new FileReader(), script = page.querySelector("script:not([type])");
@@ -152,7 +152,7 @@ class Live {
     else this.receive(bytes, Boolean(waiting));
   }
 
-  /* A session begins: the viewer starts anew, and looks as it did where it can. */
+  /* Begin a session with a new viewer, which keeps the view if possible. */
   begin(header, bytes) {
     const before = this.viewer, source = {
       header, live: true, acts: this.acts, keys: this.keys,
@@ -171,7 +171,7 @@ class Live {
     this.tell("begin", { header });
   }
 
-  /* What was in sight stays there, as where a change is undone, if the world is as large. */
+  /* Keep the view if the world has the same size, for example after an undo. */
   lookAs({ history, stage, followed, aims, cell, cursor }) {
     const { viewer } = this, { header } = viewer.history;
     if (history.header.ranges.join() !== header.ranges.join()) return;
@@ -193,7 +193,7 @@ class Live {
   }
 }
 
-/* Time, which passes on the server. Who looks back still gets what happens meanwhile. */
+/* The player of a live session, which runs on the server, also while the user looks back. */
 class LivePlayer extends Player {
   constructor(history, changed, live) {
     super(history, changed);
@@ -202,8 +202,8 @@ class LivePlayer extends Player {
     this.fastest = 1000;
     this.speed = live.speed;
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
-    this.newest = 0; // the last moment that was there before
-    this.back = false; // whether it looks back
+    this.newest = 0; // the last moment at the previous call
+    this.back = false; // whether the user looks back
     live.news.addEventListener("state", () => this.take());
     this.take();
   }
@@ -228,7 +228,7 @@ class LivePlayer extends Player {
     this.wish(false);
     this.live.ask("pause");
   }
-  /* The page shows what is wanted until the server tells how things stand. */
+  /* Show the requested state until the server sends the actual one. */
   wish(running) {
     this.live.running = running;
     this.take();
@@ -245,7 +245,7 @@ class LivePlayer extends Player {
     if (Number.isFinite(n) && n > 0 && !this.back) this.live.ask("step", { ticks: n });
     else this.go(this.moment + n);
   }
-  /* Between two ticks ants glide, so the picture is up to a tick behind. */
+  /* Ants glide between two ticks, so the picture is up to one tick behind. */
   pass(seconds) {
     if (this.back) return false;
     const { last, history } = this, moment = this.moment, share = this.share;

@@ -1,6 +1,6 @@
-/* The secret of the address, which lets this page in. It is taken out of the address and the history
-   at once. A reload finds it in the storage of this tab: a cookie would go to all ports of this
-   machine, where other users may have servers. */
+/* The secret of the address, which authorises this page. The script removes it from the address and
+   the history at once, and stores it for this tab, for reloads. A cookie would be sent to all ports of
+   this machine, where other users may have servers. */
 
 const TOKEN = (() => {
   const name = "taichi-ants token", given = new URLSearchParams(location.search).get("token");

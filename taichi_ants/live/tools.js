@@ -1,4 +1,4 @@
-/* What mouse, fingers and keys do to the world: look, draw, erase, move the queen. */
+/* Tools for mouse, touch and keys: look, draw, erase, move the queen. */
 
 const TOOLS = {
   look: ["Look", "follow an ant, choose a cell, move the view", '<path d="M4.5 3 15 9.2l-4.7 1.1L8 15z"/>'],
@@ -17,9 +17,9 @@ class Tools {
     this.name = "look";
     this.radius = 0;
     this.at = -1; // the cell under the mouse
-    this.last = -1; // of the stroke
+    this.last = -1; // the last cell of the stroke
     this.stroke = new Set(); // cells of the stroke so far
-    this.fresh = new Set(); // those that are not sent yet
+    this.fresh = new Set(); // cells that are not sent yet
     const bar = byId("palette");
     bar.innerHTML = Object.entries(TOOLS).map(([name, [label, does, drawing]], number) =>
       `<button type="button" class="icon" data-tool="${name}" aria-pressed="false" aria-label="${label}: ${does}" title="${label}: ${does} (${number + 1})">
@@ -79,7 +79,7 @@ class Tools {
 
   down(cell) {
     this.stroke.clear();
-    this.aside = 0; // ants that the stroke has moved
+    this.aside = 0; // number of ants that the stroke has moved
     this.number = this.live.nextStroke();
     this.last = -1;
     this.draw(cell);
@@ -97,7 +97,7 @@ class Tools {
     if (this.aside) this.live.controls.say(`${this.aside} ${this.aside > 1 ? "ants" : "ant"} moved aside.`);
   }
 
-  /* The cells from where the stroke was to a cell. */
+  /* Extend the stroke to a cell, with all cells on the way. */
   draw(cell) {
     if (cell < 0 || !this.live.open) return;
     const { grid } = this.live.viewer.history, [x1, y1] = grid.centre(cell);
@@ -114,7 +114,7 @@ class Tools {
     this.last = cell;
   }
 
-  /* Ask for what the new part of a stroke does. */
+  /* Send the edits of the new part of a stroke. */
   send() {
     const cells = [...this.fresh];
     this.fresh.clear();

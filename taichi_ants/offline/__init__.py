@@ -1,4 +1,4 @@
-"""Data sets of transitions, and what is learned and judged from them without the world."""
+"""Data sets of transitions, offline learning and off-policy evaluation."""
 
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.offline.evaluation import PolicyValues, importance_sampling, model_based

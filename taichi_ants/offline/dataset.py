@@ -1,4 +1,4 @@
-"""Data sets: what ants did, step by step, as arrays that others learn from."""
+"""Data sets: recorded transitions of ants as arrays."""
 
 from __future__ import annotations
 
@@ -33,28 +33,27 @@ COLUMNS: dict[str, np.dtype] = {
 class Dataset(Record):
     """Transitions, one row each; see `record` and `record_colony`.
 
-    An *episode* is what one ant does from the step in which it appears to the one with which its
-    data end: terminated by a delivery that is a terminal state, or truncated, by its death, by
-    another delivery that ends its episode, or by the end of the recording. The *behaviour policy*
-    is the one that chose the actions. The arrays (n,) are read-only.
+    An *episode* consists of consecutive steps of one ant. A delivery that is a terminal state
+    terminates it; death, any other delivery that ends it, or the end of the recording truncates it.
+    The *behaviour policy* is the policy that chose the actions. The arrays (n,) are read-only.
 
     Attributes:
-        world, task: The world that the ants started in, and the rules.
-        seeds: One for each run.
-        behaviour: What chose the actions: names and numbers, as JSON knows them.
+        world, task: The world at the start, and the rules.
+        seeds: One seed per run.
+        behaviour: Facts about the behaviour policy, JSON-compatible.
         run: int32, the number of the seed, ascending.
-        episode: int32, from 0, ascending: in a run, those that began first come first. The steps of
-            an episode come in order.
-        agent: int32, the number of the ant in its colony, 0 of an ant that is alone.
-        step: int32, the tick of its world, from 0. A newborn's first is larger.
+        episode: int32, from 0, ascending; the episodes of a run are in the order in which they
+            began, and their steps are in order.
+        agent: int32, the number of the ant in its colony; 0 for a lone ant.
+        step: int32, the tick in the world's episode, from 0; ants that are born start later.
         state, action, reward, next_state: int32; actions are 0 to 4.
-        terminated: bool, whether there is nothing to gain after this step.
-        truncated: bool, whether the episode ends with this step all the same.
-        behaviour_probability: float64, with which the behaviour policy took the action; nan if it
-            is not known.
+        terminated: bool, whether the episode ends here in a terminal state.
+        truncated: bool, whether the episode ends here without a terminal state.
+        behaviour_probability: float64, the probability with which the behaviour policy took the
+            action; nan if unknown.
 
     Raises:
-        AntsError: The arrays do not belong together.
+        AntsError: The arrays are inconsistent.
     """
 
     world: World
@@ -74,10 +73,10 @@ class Dataset(Record):
     behaviour_probability: np.ndarray
 
     def __post_init__(self) -> None:
-        """Refuse arrays that kernels, which believe them, could not work on."""
+        """Check the arrays, because kernels do not."""
         n = len(self.run) if isinstance(self.run, np.ndarray) and self.run.ndim == 1 else 0
         if not n:
-            raise AntsError("a data set has no transitions; record at least one.")
+            raise AntsError("the data set has no transitions; it must have at least one.")
         for name, dtype in COLUMNS.items():
             array = getattr(self, name)
             check_array(f"{name} of a data set", array, dtype, (n,))
@@ -90,8 +89,8 @@ class Dataset(Record):
             array = getattr(self, name)
             if array.min() < 0 or array.max() >= size:
                 raise AntsError(
-                    f"{name} of a data set runs from {array.min()} to {array.max()}; it must lie "
-                    f"between 0 and {size - 1}."
+                    f"{name} of a data set runs from {array.min()} to {array.max()}; all values "
+                    f"must be from 0 to {size - 1}."
                 )
         chance = self.behaviour_probability
         if not ((np.isnan(chance)) | ((chance > 0) & (chance <= 1))).all():
@@ -99,7 +98,7 @@ class Dataset(Record):
         self._check_episodes()
 
     def _check_episodes(self) -> None:
-        """Episodes stand one after the other, each of one ant, and end where their flags say."""
+        """Check that episodes follow each other, belong to one ant each, and end at their flags."""
         goes_on = ~(self.terminated | self.truncated)
         names = ("run", "episode", "agent", "step")
         run, episode, agent, step = (np.diff(getattr(self, name)) for name in names)
@@ -109,8 +108,8 @@ class Dataset(Record):
         ordered = ordered and (run >= 0).all() and not goes_on[-1]
         if not ordered or not chained[goes_on[:-1]].all():
             raise AntsError(
-                "the episodes of a data set do not stand one after the other, each from its first "
-                "step to the one that is terminated or truncated; sort the rows."
+                "the rows of a data set are not in order; sort them so that episodes follow each "
+                "other, each from its first step to the terminated or truncated one."
             )
 
     def __len__(self) -> int:
@@ -118,19 +117,19 @@ class Dataset(Record):
 
     @property
     def begins(self) -> np.ndarray:
-        """Where each episode begins, and behind them where the last one ends: int64 (e + 1,)."""
+        """The first row of each of the e episodes, then the number of rows, int64 (e + 1,)."""
         return np.concatenate([[0], np.flatnonzero(self.terminated | self.truncated) + 1])
 
     def returns(self, discount: float = 1.0) -> np.ndarray:
-        """The discounted return of each episode from its first step, float64 (e,)."""
+        """Return the discounted return of each episode from its first step, float64 (e,)."""
         discount = checked_share("discount", discount)
         ages = np.arange(len(self)) - self.begins[self.episode]
         return np.bincount(self.episode, weights=discount**ages * self.reward)
 
     def first(self, transitions: int | None = None, episodes: int | None = None) -> Dataset:
-        """The first rows, or episodes, of each run; a last episode that is cut is truncated."""
+        """Return the first transitions or episodes of each run; a cut episode is truncated."""
         keep = np.ones(len(self), bool)
-        # Where the run of each row begins.
+        # The first row of each row's run.
         where = np.searchsorted(self.run, np.arange(len(self.seeds)))[self.run]
         if transitions is not None:
             keep &= np.arange(len(self)) - where < checked_whole("transitions", transitions)
@@ -139,12 +138,12 @@ class Dataset(Record):
         return self._take(keep)
 
     def of_run(self, run: int) -> Dataset:
-        """The data of one seed alone, which keeps its number; AntsError if there are none."""
+        """Return the data of one seed, which keeps its number; AntsError if it has no data."""
         checked_whole("run", run, 0, len(self.seeds) - 1)
         return self._take(self.run == run)
 
     def _take(self, keep: np.ndarray) -> Dataset:
-        """Some rows, of each episode the first ones or none; episodes are numbered anew."""
+        """Return the rows `keep`, which cut episodes only at their end; renumber episodes."""
         columns = {name: getattr(self, name)[keep] for name in COLUMNS}
         if keep.any():
             last = np.append(np.diff(columns["episode"]) != 0, True)
@@ -160,19 +159,19 @@ class Dataset(Record):
 
     @classmethod
     def load(cls, path: PathLike) -> Dataset:
-        """Read a data set that `save` wrote; AntsError if it cannot be used."""
+        """Return a data set that `save` wrote; raise AntsError if the file is not valid."""
         with _KIND.reading(path) as (arrays, facts):
             rows: dict[str, Any] = {n: arrays[n].astype(kind) for n, kind in COLUMNS.items()}
             return cls(**cls.described(facts), **rows)
 
     def facts(self) -> dict[str, Any]:
-        """Return all except the transitions, for files; `described` reads it."""
+        """Return everything except the transitions, for files; `described` reads it."""
         facts = {"world": self.world.as_dict(), "task": self.task.as_dict()}
         return {**facts, "seeds": self.seeds, "behaviour": dict(self.behaviour)}
 
     @staticmethod
     def described(facts: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the fields of a data set that are in such facts."""
+        """Return the fields of a data set that `facts` holds."""
         expect("behaviour", facts["behaviour"], dict)
         return {
             "world": World.from_dict(facts["world"]),

@@ -1,7 +1,7 @@
-"""Off-policy evaluation: what a policy will bring, judged from data of another one.
+"""Off-policy evaluation: estimates of the value of a policy from data of another policy.
 
-The *target policy* is the one in question, the *behaviour policy* the one that made the data. The
-value of a policy is its expected discounted return from where the episodes of the data begin.
+The *target policy* is the evaluated policy, and the *behaviour policy* generated the data. The
+value of a policy is its expected discounted return from the first states of the data's episodes.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ Resamples = Annotated[int, Is(least=0, most=100_000)]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PolicyValues(Record):
-    """Estimated values of policies, float64 arrays of their shape.
+    """Estimated values of policies, float64 arrays in the leading shape of the tables.
 
     Attributes:
-        value: The discounted return that is to be expected.
+        value: The estimated discounted return.
         low, high: The ends of its bootstrap interval over episodes (percentiles); nan without
             resamples. It covers the choice of episodes, not the error of the method.
-        effective_sample_size: (sum of weights)^2 / sum of squared weights of whole episodes: how
-            many episodes of the target policy tell as much (Kong, A note on importance sampling
-            using standardized weights, 1992). nan where none is weighted. 0: the target policy
-            would have done no whole episode of the data; do not believe the value.
+        effective_sample_size: (sum of weights)^2 / sum of squared weights, over whole episodes
+            (Kong, A note on importance sampling using standardized weights, 1992). As many episodes
+            of the target policy would be as informative. nan without weights. If it is 0, ignore
+            the value, because the target policy cannot produce any whole episode of the data.
     """
 
     value: np.ndarray
@@ -57,31 +57,33 @@ def importance_sampling(
     level: Share = 0.95,
     threads: int | None = None,
 ) -> PolicyValues:
-    """Per-decision importance sampling (Precup, Sutton and Singh, ICML 2000).
+    """Return values by per-decision importance sampling (Precup, Sutton and Singh, ICML 2000).
 
-    Each reward counts as much more often as the target policy would have come to it than the
-    behaviour policy did: the product, over the actions up to it, of the ratios of their
-    probabilities. It needs no Markov states, but the variance grows exponentially with the length
-    of episodes.
+    The weight of a reward is the product, over the actions up to it, of their probability under the
+    target policy divided by that under the behaviour policy. States need not be Markov, but the
+    variance grows exponentially with the length of episodes.
 
     Args:
-        q_values: float (..., n_states, 5), the target policies, with `epsilon`.
-        weighted: Divide by the sum of the weights, not by the number of episodes: for each step of
-            an episode (Thomas, Safe reinforcement learning, 2015, section 3.8; an episode that has
-            ended keeps its weight). It is biased, but its variance is far smaller.
-        resamples: Bootstrap resamples of the episodes, 0 for no intervals. Ants of one colony are
-            not independent of each other: take their intervals as too short.
-        level: Confidence level of the intervals.
-        threads: CPU threads; None keeps what runs, or takes all.
+        data: The recorded transitions.
+        q_values: float (..., n_states, 5), the tables of the target policies.
+        discount: The factor by which later rewards count less, per step.
+        epsilon: The exploration rate of the target policies.
+        weighted: At each step, divide by the sum of the weights rather than by the number of
+            episodes (Thomas, Safe reinforcement learning, 2015, section 3.8; an episode that has
+            ended keeps its weight). The estimate is biased, but its variance is far smaller.
+        resamples: The number of bootstrap resamples of episodes; 0 gives no intervals. Intervals
+            are too short for ants of one colony, because they are not independent.
+        level: The confidence level of the intervals.
+        threads: CPU threads; None keeps the running number, or starts one for each CPU.
 
     Raises:
-        AntsError: An argument is not allowed, or the data do not know their probabilities.
+        AntsError: An argument is not allowed, or the data have no behaviour probabilities.
     """
     policies, shape = _policies(data, q_values, epsilon)
     if np.isnan(data.behaviour_probability).any():
         raise AntsError(
-            "the data do not tell with which probability their actions were taken; record them "
-            "with record, or use model_based."
+            "behaviour_probability of the data contains nan; record data with record or "
+            "record_colony, or use model_based."
         )
     runtime.start(threads)
     from taichi_ants.offline.kernels import add_up, weigh  # imports Taichi
@@ -113,17 +115,17 @@ def model_based(
     level: Share = 0.95,
     threads: int | None = None,
 ) -> PolicyValues:
-    """The value that target policies have in the empirical model of the data.
+    """Return the values of target policies in the empirical model of the data.
 
-    The direct method, as Jiang and Li (Doubly robust off-policy value evaluation for reinforcement
-    learning, ICML 2016) call it: little variance, but wrong however many data there are where the
-    states that ants see are not Markov. A resample has a model of its own. Pairs that the data lack
-    have the value `initial_q`. Other arguments are those of `importance_sampling`.
+    This is the direct method (Jiang and Li, Doubly robust off-policy value evaluation for
+    reinforcement learning, ICML 2016). Its variance is small, but it is biased for any amount of
+    data if states are not Markov. Each resample has a separate model. Pairs of state and action
+    without data have the value `initial_q`. Other arguments are those of `importance_sampling`.
     """
     policies, shape = _policies(data, q_values, epsilon)
     times = _times(data, resamples)
     model, first = EmpiricalModel.resampled(data, times), data.state[data.begins[:-1]]
-    starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # of each episode
+    starts = times / times.sum(axis=1, keepdims=True, dtype=np.int64)  # shares of episodes
 
     def estimated(policy: np.ndarray) -> tuple[np.ndarray, float]:
         q = model.solve(discount, model.rewards, initial_q, policy, threads=threads)
@@ -136,7 +138,7 @@ def model_based(
 def _values(
     of_policies: Iterable[tuple[np.ndarray, float]], shape: tuple[int, ...], level: float
 ) -> PolicyValues:
-    """From estimates, of the data and of each resample, and sample size of each policy."""
+    """Summarise, for each policy, its estimates (data, then resamples) and its sample size."""
     tail, rows = (1.0 - level) / 2.0, []
     for (value, *resampled), size in of_policies:
         ends = np.quantile(resampled, (tail, 1.0 - tail)) if resampled else (np.nan, np.nan)
@@ -145,7 +147,7 @@ def _values(
 
 
 def _policies(data: Dataset, q_values: np.ndarray, epsilon: float) -> tuple[np.ndarray, tuple]:
-    """The probabilities of actions (policies, n_states, 5), and the leading shape of the tables."""
+    """Return action probabilities (policies, n_states, 5) and the leading shape of the tables."""
     expect("data", data, Dataset)
     tables = checked_q_values(q_values, data.task)
     probabilities = action_probabilities(tables, epsilon)
@@ -153,7 +155,7 @@ def _policies(data: Dataset, q_values: np.ndarray, epsilon: float) -> tuple[np.n
 
 
 def _times(data: Dataset, resamples: int) -> np.ndarray:
-    """How often each episode counts, uint8 (1 + resamples, episodes): once, then as drawn."""
+    """Return counts of each episode, uint8 (1 + resamples, episodes): all 1, then as drawn."""
     n = len(data.begins) - 1
     once = np.ones((1, n), np.uint8)
     return np.concatenate([once, resampling_counts(n, resamples)]) if resamples else once

@@ -1,6 +1,6 @@
 """The kernels of offline learning and off-policy evaluation.
 
-Each parallel task does its sums alone and in order, so that threads change no bit.
+A single thread computes each sum, in order, so results do not depend on the number of threads.
 """
 
 import taichi as ti
@@ -16,7 +16,7 @@ _f64_2 = ti.types.ndarray(dtype=ti.f64, ndim=2)
 
 @ti.func
 def best_of(q: ti.template(), row):
-    """The largest of the five action values from `row` on."""
+    """Return the largest of the five action values that begin at `row`."""
     best = q[row]
     for a in ti.static(range(1, N_ACTIONS)):
         best = ti.max(best, q[row + a])
@@ -36,7 +36,7 @@ def replay(
     learning_rate: ti.f32,
     discount: ti.f32,
 ):
-    """Q-learning over the rows of each group, from the first to the last; moves `q` on."""
+    """Update `q` by Q-learning over the rows of each group, from the first to the last."""
     ti.loop_config(block_dim=1)
     for group in range(begins.shape[0] - 1):
         table = group * n_states * N_ACTIONS
@@ -65,10 +65,10 @@ def iterate(
     lowest: ti.f64,
     tolerance: ti.f64,
 ):
-    """Back up all pairs of each group at once, until no value changes by more than `tolerance`.
+    """Back up all pairs of each group, until no value changes by more than `tolerance`.
 
-    Moves `q` (groups * n_states * 5,) on and writes the `values` of states; see `EmpiricalModel`.
-    If `greedy`, the best action counts, else those of the `policy` (n_states * 5,).
+    Updates `q` (groups * n_states * 5,) and writes the `values` of states; see `EmpiricalModel`.
+    If `greedy`, values are of the best action, otherwise of the `policy` (n_states * 5,).
     """
     ti.loop_config(block_dim=1)
     for group in range(pairs_begin.shape[0] - 1):
@@ -95,7 +95,7 @@ def iterate(
 
 @ti.kernel
 def weigh(weights: _f64, begins: _i32, ratios: _f64):
-    """The importance weight of each row: the product of the ratios of its episode so far."""
+    """Write the importance weight of each row: the product of its episode's ratios so far."""
     for episode in range(begins.shape[0] - 1):
         weight = ti.f64(1.0)
         for i in range(begins[episode], begins[episode + 1]):
@@ -116,12 +116,12 @@ def add_up(
     weighted: ti.i32,
     discount: ti.f64,
 ):
-    """Per-decision importance sampling, of each resample of the episodes (`counts`).
+    """Write `estimates` by per-decision importance sampling, for each resample of the episodes.
 
-    By the step of an episode, it writes into zeros (resamples, steps + 1) the `sums` of weight *
-    reward, the `mass` of the weights, and the last weights of the episodes that have just `ended`;
-    then the `estimates`. `weighted` divides by the sum of the weights, where an episode that has
-    ended keeps its last one, not by the number of episodes.
+    `counts` (resamples, episodes) are the resamples. The kernel also fills three arrays of zeros,
+    (resamples, steps + 1), by step: `sums` of weight * reward, the total weight `mass`, and the
+    final weights of episodes that have just `ended`. `weighted` divides by the total weight, which
+    includes the final weights of ended episodes, rather than by the number of episodes.
     """
     ti.loop_config(block_dim=1)
     for r in range(counts.shape[0]):

@@ -1,10 +1,10 @@
 """Offline learners: tables of action values from a data set alone.
 
-Tables are float32 (n_states, 5), or (runs, n_states, 5) with a table from the data of each run.
+Tables are float32 (n_states, 5), or (runs, n_states, 5) with one table per run.
 
-Where data lack a pair of state and action, its value is a guess, and a policy that maximises goes
-where guesses are too high: the extrapolation error of Fujimoto, Meger and Precup (Off-policy deep
-reinforcement learning without exploration, ICML 2019); Levine, Kumar, Tucker and Fu (Offline
+The value of a pair of state and action without data is a guess, and a greedy policy prefers pairs
+whose guess is too high. This is the extrapolation error of Fujimoto, Meger and Precup (Off-policy
+deep reinforcement learning without exploration, ICML 2019). Levine, Kumar, Tucker and Fu (Offline
 reinforcement learning: tutorial, review, and perspectives on open problems, 2020) survey remedies.
 """
 
@@ -23,7 +23,7 @@ from taichi_ants.settings import Count, Flag, Is, Share, checked_arguments
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.task.events import Event
 
-# Values of endless episodes stay finite; with the largest one Q iteration takes half a second.
+# Below 1, so that values of endless episodes are finite; at 0.9999 Q iteration takes half a second.
 Discount = Annotated[Share, Is(most=0.9999)]
 
 
@@ -37,11 +37,11 @@ def batch_q_learning(
     by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
-    """Q-learning that goes over the data again and again, in the order in which they stand.
+    """Return action values learned by Q-learning in repeated sweeps over the data, in their order.
 
-    Lin (Self-improving reactive agents, Machine Learning 8, 1992) calls it experience replay. The
-    last transitions of a sweep count most; the smaller the learning rate, the less. Pairs that the
-    data lack keep `initial_q`. With `by_run`, a table is learned from the data of each run.
+    This is experience replay (Lin, Self-improving reactive agents, Machine Learning 8, 1992). The
+    last transitions of a sweep count most, less so with a small learning rate. Pairs of state and
+    action without data keep `initial_q`. With `by_run`, there is one table per run.
 
     Raises:
         AntsError: An argument is not allowed.
@@ -52,7 +52,7 @@ def batch_q_learning(
     from taichi_ants.offline.kernels import replay  # imports Taichi
 
     rows = (data.state, data.action, data.reward, data.next_state, data.terminated.view(np.uint8))
-    for _ in range(sweeps):  # a launch cannot be interrupted
+    for _ in range(sweeps):  # one launch per sweep, because a launch cannot be interrupted
         replay(q.reshape(-1), groups, *rows, data.task.n_states, *rates)
     return q if by_run else q[0]
 
@@ -65,13 +65,12 @@ def fitted_q_iteration(
     by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
-    """The best action values of the empirical model of the data, see `EmpiricalModel`.
+    """Return the optimal action values of the empirical model of the data, see `EmpiricalModel`.
 
-    Fitted Q iteration (Ernst, Geurts and Wehenkel, Tree-based batch mode reinforcement learning,
-    JMLR 6, 2005) with a table for regression: its fit to all targets is their mean over the
-    transitions of a pair, so that it iterates Q on that model. The order of the data is irrelevant.
-    Pairs that the data lack keep `initial_q`. Arguments and errors are those of
-    `batch_q_learning`, but the discount must be at most 0.9999.
+    This is fitted Q iteration (Ernst, Geurts and Wehenkel, Tree-based batch mode reinforcement
+    learning, JMLR 6, 2005) with a table as regression, which fits the mean target of each pair of
+    state and action. The order of the data does not matter. Pairs without data keep `initial_q`.
+    Arguments and errors are those of `batch_q_learning`; the discount must be at most 0.9999.
     """
     model = EmpiricalModel.of(data, by_run)
     q = model.solve(discount, model.rewards, initial_q, threads=threads)
@@ -86,15 +85,16 @@ def pessimistic_q_iteration(
     by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:
-    """Action values from below: the fewer data a pair has, the less it is worth.
+    """Return pessimistic action values, which are lower the fewer data a pair has.
 
-    Value iteration with lower confidence bounds (Rashidinejad, Zhu, Ma, Jiao and Russell, Bridging
-    offline reinforcement learning and imitation learning, NeurIPS 2021): as `fitted_q_iteration`,
-    but from the mean reward of a pair with n transitions penalty / sqrt(n) is taken away. No value
-    falls below that of the worst reward for ever, which is what pairs have that the data lack.
+    This is value iteration with lower confidence bounds (Rashidinejad, Zhu, Ma, Jiao and Russell,
+    Bridging offline reinforcement learning and imitation learning, NeurIPS 2021). It differs from
+    `fitted_q_iteration` in that it subtracts penalty / sqrt(n) from the mean reward of a pair with
+    n transitions. Pairs without data have the value of the worst reward forever, the lowest value.
 
     Args:
-        penalty: From 0 to 1e9, in rewards; the others, and errors, as of `fitted_q_iteration`.
+        penalty: From 0 to 1e9, in units of reward. Other arguments and errors are those of
+            `fitted_q_iteration`.
     """
     model = EmpiricalModel.of(data, by_run)
     worst = data.task.rewards.by_event()[Event.ENTERED_EMPTY :].min()
@@ -106,18 +106,18 @@ def pessimistic_q_iteration(
 
 @dataclass(frozen=True, eq=False)
 class EmpiricalModel:
-    """The Markov decision process of maximum likelihood: which pair led where how often.
+    """The maximum-likelihood Markov decision process of the data, for each group of rows.
 
-    Where the states that ants see are not Markov, it depends on the behaviour policy too.
+    If states are not Markov, the model depends on the behaviour policy too.
 
     Attributes:
         largest: The largest absolute reward of the task.
-        groups: int32 (groups + 1,), where the pairs of a group of rows begin.
+        groups: int32 (groups + 1,), the index of the first pair of each group, then of the end.
         pairs: int32 (pairs,), state * 5 + action, ascending in a group.
-        counts, rewards: int64, float64 (pairs,), transitions and their mean rewards.
-        begins: int32 (pairs + 1,), where the successors of a pair begin.
+        counts, rewards: int64, float64 (pairs,), numbers of transitions and their mean rewards.
+        begins: int32 (pairs + 1,), the index of the first successor of each pair, then of the end.
         successors: int32 (k,), states, ascending in a pair; none for transitions that terminated.
-        probabilities: float64 (k,), which may add up to less than 1 for a pair.
+        probabilities: float64 (k,); for a pair that may terminate, their sum is less than 1.
     """
 
     n_states: int
@@ -132,7 +132,7 @@ class EmpiricalModel:
 
     @classmethod
     def of(cls, data: Dataset, by_run: bool) -> EmpiricalModel:
-        """Of each run a group, or of all of them one."""
+        """Return the model of the data, with one group per run or a single group."""
         groups = _groups(data, by_run)
         group = np.repeat(np.arange(len(groups) - 1), np.diff(groups))
         pair = (group * data.task.n_states + data.state) * N_ACTIONS + data.action
@@ -140,7 +140,7 @@ class EmpiricalModel:
 
     @classmethod
     def resampled(cls, data: Dataset, times: np.ndarray) -> EmpiricalModel:
-        """Of resamples of the episodes, a group each; (resamples, episodes) how often one is in."""
+        """Return the model of resamples, a group each; `times` (resamples, episodes) are counts."""
         n_states = data.task.n_states
         pair = data.state.astype(np.int64) * N_ACTIONS + data.action
         pairs, successors, _, _, triple = _tally(data, pair)
@@ -163,7 +163,7 @@ class EmpiricalModel:
         counts: np.ndarray,
         rewards: np.ndarray,
     ) -> EmpiricalModel:
-        """From counts and sums of rewards by pair, that of group g moved by g tables, and state."""
+        """Make a model from tallies by pair, with an offset of g tables in group g, and state."""
         n_states, size = data.task.n_states, data.task.n_states * N_ACTIONS
         pairs, first = np.unique(pair, return_index=True)
         total = np.add.reduceat(counts, first)
@@ -190,11 +190,11 @@ class EmpiricalModel:
         lowest: float = -np.inf,
         threads: int | None = None,
     ) -> np.ndarray:
-        """Iterate Q until it stays, each group for itself: float64 (groups, n_states, 5).
+        """Return converged action values, float64 (groups, n_states, 5).
 
-        `rewards` are those expected of the pairs; `initial_q` is the value of all pairs before, and
-        of those that the data lack after; the values are those of the `policy` with these
-        probabilities of actions (n_states, 5), None: the greedy one. No value falls below `lowest`.
+        `rewards` are the expected rewards of the pairs. `initial_q` is the initial value, which
+        pairs without data keep, and `lowest` a lower bound of all values. `policy` are action
+        probabilities (n_states, 5); None means the greedy policy.
         """
         n_groups = len(self.groups) - 1
         q = np.full((n_groups, self.n_states, N_ACTIONS), initial_q, np.float64)
@@ -204,7 +204,7 @@ class EmpiricalModel:
         from taichi_ants.offline.kernels import iterate  # imports Taichi
 
         tables = q.reshape(-1), values.reshape(-1), np.ascontiguousarray(greedy).reshape(-1)
-        # An array of length 0 cannot be an argument.
+        # Taichi does not accept arrays of length 0.
         after = np.append(self.successors, np.int32(0)), np.append(self.probabilities, 0.0)
         numbers = self.n_states, discount, lowest, tolerance(self.largest, discount, initial_q)
         model = self.groups, self.pairs, rewards, self.begins, *after
@@ -213,10 +213,10 @@ class EmpiricalModel:
 
 
 def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Count the states to which each pair led, ascending; n_states stands for termination.
+    """Count the next states of each pair in ascending order; n_states means termination.
 
     Returns:
-        Pairs, next states, counts, sums of rewards, and for each row which of these it is.
+        Pairs, next states, counts, sums of rewards, and the index of these for each row.
     """
     ends = data.task.n_states
     key = pair * (ends + 1) + np.where(data.terminated, ends, data.next_state)
@@ -226,12 +226,12 @@ def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def tolerance(largest: float, discount: float, initial_q: float) -> float:
-    """Q iteration ends when no action value changes by more: far above rounding errors."""
+    """Return the change of action values at which Q iteration ends, far above rounding errors."""
     return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_q))
 
 
 def _groups(data: Dataset, by_run: bool) -> np.ndarray:
-    """Where the rows of each run begin, and end; of all runs together without `by_run`."""
+    """Return the first row of each run, or of all runs without `by_run`, and the end."""
     expect("data", data, Dataset)
     n = len(data.seeds)
     runs = np.arange(n + 1) if by_run else np.array([0, n])

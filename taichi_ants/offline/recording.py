@@ -1,4 +1,4 @@
-"""Recording: the transitions of ants that act, alone or in a colony, as a data set."""
+"""Recording of the transitions of lone ants or of a colony as a data set."""
 
 from __future__ import annotations
 
@@ -38,18 +38,18 @@ def record(
     arch: str | None = None,
     progress: Progress | None = None,
 ) -> Dataset:
-    """Record what single ants do, one run for each seed, each alone in its world.
+    """Return the transitions of single ants, one run per seed, each ant alone in its world.
 
-    A learner's steps are those of `train` with the same arguments; those of a table are those of
-    `evaluate`, to the bit.
+    The steps of a learner are, bit for bit, those of `train` with the same arguments, and the steps
+    of a table are those of `evaluate`.
 
     Args:
-        behaviour: The behaviour policy. None: any action, at random. Action values (n_states, 5),
-            or (seeds, n_states, 5) for a table of each run: epsilon-greedy, ties at random. A
-            TrainingConfig: a learner, while it learns.
-        task: The rules of the game; None is the paper's. Learners have its evaporation in training,
-            others that in evaluation.
-        epsilon: Probability of a random action, of a table; a learner has its own.
+        behaviour: The behaviour policy: None for random actions; action values (n_states, 5), or
+            (seeds, n_states, 5) for one table per run, followed epsilon-greedily with random ties;
+            or a TrainingConfig for a learner while it learns.
+        task: The rules; None is the paper's task. Learners use its evaporation in training, other
+            policies its evaporation in evaluation.
+        epsilon: The exploration rate of a table; a learner has its own.
         world, episodes, seeds, max_steps, threads, arch, progress: As in `train`.
 
     Raises:
@@ -71,12 +71,12 @@ def record(
         facts = {"policy": "random" if behaviour is None else "table", "epsilon": epsilon}
         table = random_policy(task.observation) if behaviour is None else behaviour
         tables = checks.checked_q_values(table, task)
-        if tables.ndim == 4 and len(tables) == 1:  # as `train` gives of one configuration
+        if tables.ndim == 4 and len(tables) == 1:  # as `train` returns for one configuration
             tables = tables[0]
         if tables.shape[:-2] not in ((), (len(numbers),)):
             raise AntsError(
-                f"behaviour has shape {tables.shape}; give one table, or one for each of the "
-                f"{len(numbers)} seeds."
+                f"behaviour has shape {tables.shape}; give a single table, or one table for each "
+                f"of the {len(numbers)} seeds."
             )
         tables = np.broadcast_to(tables, (len(numbers), *tables.shape[-2:]))
         words = np.array(numbers, dtype=object)
@@ -90,7 +90,7 @@ def record(
 
 
 def _typed(piece: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The columns that recorders give, in their types; where episodes end follows from them."""
+    """Convert columns to their types, except `truncated`, which follows from the others."""
     given = {name: dtype for name, dtype in COLUMNS.items() if name != "truncated"}
     return {name: piece[name].astype(dtype) for name, dtype in given.items()}
 
@@ -98,22 +98,22 @@ def _typed(piece: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 def record_colony(
     colony: Colony, episodes: int = 1, ticks: int = 1000, progress: Progress | None = None
 ) -> Dataset:
-    """Record what the ants of a colony do, while it goes on for some episodes of so many ticks.
+    """Return the transitions of a colony's ants while it runs more episodes of `ticks` each.
 
-    A run is a world of the colony. An episode of the data is what one ant does until it dies, until
-    the colony's episode ends, or, if a delivery terminates the episode, until it gives its food;
-    then another one of the same ant begins. The colony acts and learns as in `Colony.run`, to the
-    bit; all its worlds must be the same one.
+    A run is a world of the colony. An episode of the data ends when its ant dies or the colony's
+    episode ends. If deliveries terminate episodes, it also ends at a delivery, and another episode
+    of the same ant begins. The colony acts and learns, bit for bit, as in `Colony.run`. All its
+    worlds must be equal.
 
     Raises:
-        AntsError: An argument is not allowed, or the colony lives in different worlds.
+        AntsError: An argument is not allowed, or the colony has different worlds.
     """
     expect("colony", colony, Colony)
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
     checks.check_progress(progress)
     if len(dict.fromkeys(colony.worlds)) > 1:
-        raise AntsError("the colony lives in different worlds; record a colony for each world.")
+        raise AntsError("the colony has different worlds; record a separate colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}
     facts["training"] = colony.training.as_dict()
     pieces = []
@@ -126,7 +126,7 @@ def record_colony(
             pieces.append(_typed({**piece, "episode": np.full(len(piece["run"]), episode)}))
             if progress is not None:
                 progress((episode + (tick + 1) / ticks) / episodes)
-            if not len(piece["run"]) and tick + 1 < ticks:  # all have died
+            if not len(piece["run"]) and tick + 1 < ticks:  # all ants are dead
                 colony.tick(ticks - tick - 1)
                 break
         colony.end_episode()
@@ -135,7 +135,7 @@ def record_colony(
 
 
 def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, np.ndarray]:
-    """Let a tick pass; what each ant did in it, by `tables`, or `before` if it has drawn ahead."""
+    """Advance by a tick and return its transitions; actions drawn in advance follow `before`."""
     step, acting = colony.ticks, colony.living & colony.running[:, None]
     run, slot = np.nonzero(acting)
     owner = (run, slot)[: tables.ndim - 2]
@@ -145,7 +145,7 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
         known = colony.next_actions[acting] >= 0
         values = np.where(known[:, None], before[(*owner, state)], values)
     colony.tick()
-    if not np.array_equal(colony.numbers[run, slot], agent):  # the colony has sorted its ants
+    if not np.array_equal(colony.numbers[run, slot], agent):  # the colony has re-sorted its ants
         keys = (np.arange(len(colony.seeds))[:, None] * 2**32 + colony.numbers).ravel()
         order = np.argsort(keys)
         slot = order[np.searchsorted(keys[order], run * 2**32 + agent)] % colony.capacity
@@ -161,7 +161,7 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
 
 
 def _dataset(pieces: list[dict[str, np.ndarray]], **known: Any) -> Dataset:
-    """The data set of rows, those of an ant in order; it finds out where episodes end."""
+    """Return the data set of rows, and find the ends of episodes; each ant's rows are in order."""
     rows: dict[str, Any] = {
         name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]
     }
@@ -172,7 +172,7 @@ def _dataset(pieces: list[dict[str, np.ndarray]], **known: Any) -> Dataset:
     order = np.argsort(key, kind="stable")
     last = np.append(np.diff(key[order]) != 0, True) | rows["terminated"][order]
     number = np.cumsum(last) - last
-    # What began first comes first.
+    # Episodes are in the order in which they began.
     begins = order[np.append(0, np.flatnonzero(last)[:-1] + 1)]
     by_age = np.lexsort([rows[name][begins] for name in ("agent", "step", "episode", "run")])
     place = np.argsort(by_age)[number]

@@ -1,10 +1,10 @@
-"""Pictures of worlds and their ants, without a display: stills, GIF, MP4.
+"""Pictures and animations of worlds and their ants: PNG, GIF and MP4, without a display.
 
-- `frames` draws snapshots, which `Episode.snapshots` and `colony_snapshots` yield, as arrays;
-  `Scene` draws one.
-- `learning_frames` shows one ant after more and more episodes, side by side.
-- `policy_sheet` shows what a policy does in each state.
-- `save_picture` and `save_animation` write arrays; a file appears when it is whole.
+- `frames` draws the snapshots of `Episode.snapshots` or `colony_snapshots` as arrays; `Scene`
+  draws a single snapshot.
+- `learning_frames` shows an ant at several stages of training, side by side.
+- `policy_sheet` shows the best action of a policy in each state.
+- `save_picture` and `save_animation` write arrays to files, which appear only once complete.
 """
 
 from taichi_ants.engines.records import Snapshot

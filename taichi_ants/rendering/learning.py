@@ -1,4 +1,4 @@
-"""Learning made visible: the same ant after more and more episodes, side by side."""
+"""Pictures of learning: the same ant at several stages of training, side by side."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
-CHECKPOINTS = (0, 1, 2, 20)  # in the world of the paper, ants differ at these most
+CHECKPOINTS = (0, 1, 2, 20)  # in the paper's world, behaviour differs most between these
 SEEDS = 200
 DEFAULT_SIZE = (1280, 520)  # four worlds in a row fill it
-# In sizes of the text: the title of a tile, one more line below it, all other text, the legend.
+# Heights in multiples of the text size: a tile's title, a second line below it, all text of a tile,
+# the legend.
 _TITLE_LINES, _MORE_LINES, _TILE_LINES, _LEGEND_LINES = 1.7, 1.4, 5.6, 2.6
-# What earns or costs reward: its letter, that of a cell, its words, and which reward it is.
+# Sources of reward: letter, letter of the cell drawn with it, label, field of `Rewards`.
 _SOURCES = (
     ("T", "T", "onto a trail", "shaping"),
     ("S", "S", "nearer to the queen", "shaping"),
@@ -40,19 +41,19 @@ _SOURCES = (
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """How an ant does after so many episodes of training."""
+    """The behaviour of an ant after a number of training episodes."""
 
     episodes: int
     episode: Episode
-    note: str = ""  # beside its return at its end
-    among: str = ""  # a line below its title: the outcome of other seeds
+    note: str = ""  # shown after the return at the end of the episode
+    among: str = ""  # a line below the title, about other seeds
 
     @property
     def title(self) -> str:
         return f"after {count(self.episodes, 'episode')}" if self.episodes else "before learning"
 
     def account(self) -> np.ndarray:
-        """What was earned until each snapshot, int (len(episode), 5), by `_SOURCES`."""
+        """Return the reward earned up to each snapshot by source, int (len(episode), 5)."""
         trace, events = self.episode.trace, self.episode.trace.events
         gave, took = events == Event.DELIVERED, events == Event.PICKED_UP
         failed = (events == Event.FAILED) | (events == Event.BLOCKED)
@@ -74,14 +75,14 @@ def learning_checkpoints(
     epsilon: float = 0.0,
     progress: Callable[[float], None] | None = None,
 ) -> list[Checkpoint]:
-    """Train one ant, and roll its policy out whenever it has had a given number of episodes.
+    """Return rollouts of an ant's policy, one after each given number of training episodes.
 
     Args:
-        world, config, task: Where and how it learns; None is the paper's task.
-        seed: Of training and rollouts.
+        world, config, task: The training setup; a task of None is the paper's.
+        seed: The seed of training and rollouts.
         checkpoints: Numbers of episodes, ascending; 0 is before learning.
-        max_steps, epsilon: Of a rollout.
-        progress: Called with the share of the work that is done.
+        max_steps, epsilon: The step limit and the exploration rate of rollouts.
+        progress: Called with the completed share of the work.
     """
     task, checkpoints = _checked(task, checkpoints, progress)
     played = []
@@ -106,12 +107,12 @@ def typical_seed(
     epsilon: float = 0.0,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[int, list[int]]:
-    """Return the seed of the run that is nearest to the median run, and how many seeds deliver.
+    """Return the seed closest to the median run, and the number of seeds that deliver.
 
-    Each run is ranked among all seeds by the return and by the steps of its rollout at each
-    checkpoint; equal values share the middle rank. The typical run is the one whose largest
-    distance from the middle rank is smallest; of several, the first. Arguments and errors are those
-    of `learning_checkpoints`, but for the `seeds` to choose from.
+    The function ranks all seeds by the return and by the steps of their rollouts at each
+    checkpoint; equal values share the mean of their ranks. It chooses the seed whose largest
+    distance from the middle rank is smallest, and the first one on a tie. `seeds` are the seeds to
+    choose from; other arguments and errors are those of `learning_checkpoints`.
 
     Returns:
         The seed, and for each checkpoint the number of seeds that deliver within `max_steps`.
@@ -142,7 +143,7 @@ def _checked(
     checkpoints = [whole("a checkpoint", checkpoint) for checkpoint in listed]
     if not checkpoints or checkpoints != sorted(set(checkpoints)) or checkpoints[0] < 0:
         raise AntsError(
-            f"checkpoints are {shown(tuple(checkpoints))}; they must ascend, from 0 or more."
+            f"checkpoints is {shown(tuple(checkpoints))}; it must be ascending numbers, 0 or more."
         )
     return task, checkpoints
 
@@ -150,7 +151,7 @@ def _checked(
 def _tables(
     world: World, config: TrainingConfig, seeds: Sequence[int], episodes: int, task: Task
 ) -> np.ndarray:
-    """Action values after so many episodes, float32 (seeds, n_states, 5)."""
+    """Return action values after a number of training episodes, float32 (seeds, n_states, 5)."""
     if not episodes:
         return np.zeros((len(seeds), task.n_states, N_ACTIONS), dtype=np.float32)
     return train(world, config, seeds, episodes, task=task).q_values[0]
@@ -159,17 +160,17 @@ def _tables(
 def learning_frames(
     checkpoints: Sequence[Checkpoint], size: tuple[int, int] = DEFAULT_SIZE, title: str = ""
 ) -> Iterator[np.ndarray]:
-    """The pictures of checkpoints of one world side by side, uint8 (height, width, 3).
+    """Yield frames that show checkpoints of one world side by side, uint8 (height, width, 3).
 
-    A checkpoint that has ended stays as it ended, until the last one does. `size` is width and
-    height in pixels, `title` a line above all.
+    Shorter episodes show their last snapshot until the longest ends. `size` is width and height in
+    pixels; `title` is a line of text at the top.
     """
     expect("checkpoints", checkpoints, list, tuple)
     for checkpoint in checkpoints:
         expect("a checkpoint", checkpoint, Checkpoint)
     if len({checkpoint.episode.made.world for checkpoint in checkpoints}) != 1:
         raise AntsError(
-            "the checkpoints are of several worlds, or there are none; give those of one."
+            "checkpoints is empty or mixes several worlds; give checkpoints of one world."
         )
     width, height = check_size(size)
     expect("title", title, str)
@@ -185,7 +186,7 @@ def learning_frames(
     more = _MORE_LINES * any(checkpoint.among for checkpoint in checkpoints)
     rows, lines = math.ceil(len(checkpoints) / columns), round((_TILE_LINES + more) * letters)
     w = width // columns
-    # No higher than wide, so that a title stays near to what it speaks of.
+    # Not higher than wide, so that each title is close to its world.
     h = min((bottom - top) // rows, w + lines)
     top += (bottom - top - rows * h) // 2
     grid, margin = checkpoints[0].episode.made.world.grid, max(2, round(min(w, h) / 60))
@@ -204,7 +205,7 @@ def learning_frames(
 def _tile_pictures(
     checkpoint: Checkpoint, rasteriser: Rasteriser, height: int, letters: int, more: float
 ) -> Iterator[np.ndarray]:
-    """One of the worlds, with a title above and how its ant does below."""
+    """Yield pictures of one world, with the title above and the return below."""
     account, width = checkpoint.account(), rasteriser.width
     above = round((_TITLE_LINES + more) * letters)
     tile = np.empty((height, width, 3), dtype=np.uint8)
@@ -234,9 +235,8 @@ def _tile_pictures(
 
 
 def _draw_legend(canvas: np.ndarray, top: int, letters: int, rewards: Rewards) -> None:
-    """Draw what earns reward in a line across the canvas."""
     lines = [f"{letter} {words} {getattr(rewards, name):+}" for letter, _, words, name in _SOURCES]
-    before, after = 1.9 * letters, 0.9 * letters  # room for a cell, and to the next one
+    before, after = 1.9 * letters, 0.9 * letters  # pixels for the cell, and after the label
     width = sum(before + text.width(line, letters) + after for line in lines) - after
     x, y = (canvas.shape[1] - width) / 2, top + 1.2 * letters
     baseline = y + 0.36 * letters

@@ -1,8 +1,8 @@
-"""The kernels that turn cells and marks into pixels. They assume valid arguments.
+"""Kernels that draw cells and marks as pixels; they do not check their arguments.
 
-A frame is uint8 (height, width, 3), colours are 0xRRGGBB. Outlines are signed distances: negative
-inside, in units of the shape, which lies within the unit circle around (0, 0). Its x is to the
-right, y downwards; an ant looks up, towards negative y.
+A frame is uint8 (height, width, 3), colours are 0xRRGGBB. Outlines are signed distances, negative
+inside. Their unit is the radius of the mark: each shape lies within the unit circle around (0, 0).
+x points right and y down; an ant looks up, towards negative y.
 """
 
 import math
@@ -12,16 +12,16 @@ from taichi.math import clamp, mix, vec2, vec3
 
 from taichi_ants.rendering.colours import CELL_FOOD, PAGE, Mark
 
-BAND = 16  # rows that one thread draws
+BAND = 16  # rows of pixels per thread
 _SQRT_3 = math.sqrt(3.0)
 _HALO = 1.2  # pixels around an ant in the colour of the page
-_CRUMB_AT = -0.70  # where an ant carries food, before its head
+_CRUMB_AT = -0.70  # y of the food that an ant carries, in front of its head
 _CRUMB_RADIUS = 0.25
 
 
 @ti.func
 def unpack(colour):
-    """Red, green and blue, 0 to 255."""
+    """Return red, green and blue, 0 to 255."""
     word = ti.cast(colour, ti.i32)
     return vec3(word >> 16 & 255, word >> 8 & 255, word & 255)
 
@@ -43,16 +43,17 @@ def draw_small_cells(
     rows: ti.i32,
     z_range: ti.i32,
 ):
-    """Cells of a few pixels and less: each pixel is the mean of what it covers, by area.
+    """Draw cells of a few pixels or less: each pixel is the mean of its cells, weighted by area.
 
-    Cells are taken as bricks of the same centres and areas as the hexagons, which nobody can see at
-    this size: the part of a brick within a pixel is a product. The origin `(x, y)` and the size
-    `hexagon` are those of a `Rasteriser`; `columns`, `rows` and `z_range` those of an `AxialGrid`.
+    Cells are drawn as rectangles with the centres and areas of the hexagons, because the overlap of
+    two rectangles is a simple product; at this size the difference is invisible. The origin
+    `(x, y)` and the size `hexagon` are those of a `Rasteriser`; `columns`, `rows` and `z_range` are
+    those of an `AxialGrid`.
     """
     ti.loop_config(block_dim=BAND)
     for j in range(frame.shape[0]):
         for i in range(frame.shape[1]):
-            # A brick is 1 wide and 1 high here; its column is r, its place in it grows with q.
+            # In these units a rectangle is 1 wide and 1 high, in column r, and higher up with q.
             x0 = (i - x) / (1.5 * hexagon) + 0.5
             x1 = (i + 1 - x) / (1.5 * hexagon) + 0.5
             low = (y - (j + 1)) / (_SQRT_3 * hexagon) + 0.5
@@ -77,13 +78,13 @@ def draw_small_cells(
 
 @ti.func
 def disc(p, x, y, radius):
-    """A disc around (x, y)."""
+    """Return the distance to a disc around (x, y)."""
     return (p - vec2(x, y)).norm() - radius
 
 
 @ti.func
 def ellipse(p, y, half_width, half_height):
-    """An upright ellipse around (0, y); close to the true distance near its outline."""
+    """Return the distance to an upright ellipse around (0, y), accurate near its outline."""
     inverse = vec2(1.0 / half_width, 1.0 / half_height)
     scaled = (p - vec2(0.0, y)) * inverse
     level = scaled.norm()
@@ -93,7 +94,7 @@ def ellipse(p, y, half_width, half_height):
 
 @ti.func
 def line(p, x0, y0, x1, y1):
-    """The distance to a line from (x0, y0) to (x1, y1), not negative."""
+    """Return the distance, not negative, to the line from (x0, y0) to (x1, y1)."""
     along = vec2(x1 - x0, y1 - y0)
     from_start = p - vec2(x0, y0)
     share = ti.math.clamp(from_start.dot(along) / along.dot(along), 0.0, 1.0)
@@ -110,7 +111,7 @@ def hexagon(p):
 
 @ti.func
 def ant_body(p):
-    """Head, thorax and abdomen."""
+    """Head, thorax and abdomen of an ant."""
     head = ellipse(p, -0.37, 0.19, 0.17)
     thorax = ellipse(p, -0.06, 0.13, 0.20)
     abdomen = ellipse(p, 0.45, 0.27, 0.39)
@@ -130,7 +131,7 @@ def ant_limbs(p):
 
 @ti.func
 def dart(p):
-    """A pointed shape for ants of few pixels."""
+    """A dart, the shape of ants in small cells."""
     q = vec2(ti.abs(p.x), p.y)
     side = q.dot(vec2(0.932, -0.362)) - 0.326  # from the tip (0, -0.9) to (0.67, 0.824)
     back = q.dot(vec2(-0.336, 0.942)) - 0.551  # from there to the notch (0, 0.585)
@@ -148,7 +149,7 @@ def crumbs(p):
 def crown(p):
     """The queen: a crown with three points, each with a bead."""
     q = vec2(ti.abs(p.x), p.y)
-    # Half of it, from the middle point (0, -0.5) down to (0.32, -0.02) and up to (0.8, -0.28).
+    # The right half, from the middle point (0, -0.5) down to (0.32, -0.02), up to (0.8, -0.28).
     top = ti.min(q.dot(vec2(0.832, -0.555)) - 0.277, q.dot(vec2(-0.476, -0.879)) + 0.135)
     side = q.dot(vec2(0.975, 0.222)) - 0.718
     beads = ti.min(disc(p, 0.0, -0.60, 0.12), disc(q, 0.84, -0.38, 0.12))
@@ -166,14 +167,14 @@ def arrow(p):
 
 @ti.func
 def blend(rgb, colour, distance, opacity):
-    """A colour over another where `distance` (pixels) is negative, its edge smooth."""
+    """Blend `colour` over `rgb` where `distance` (pixels) is negative, with a smooth edge."""
     return mix(rgb, unpack(colour), opacity * clamp(0.5 - distance, 0.0, 1.0))
 
 
 @ti.func
 def draw_mark(rgb, p, radius, shape, colour):
-    """A pixel with a mark over it; `p` in units of the mark, which looks up."""
-    # A halo of the page around it; none at all, not even on smooth edges, around a cell.
+    """Return the colour of a pixel with a mark over it; `p` is relative to the upright mark."""
+    # Marks have a halo in the colour of the page; -1 disables it, also at smooth edges.
     distance, halo, opacity = radius * hexagon(p), -1.0, 1.0
     if shape == Mark.OUTLINE:
         half_width = ti.max(0.06 * radius, 0.8)
@@ -205,10 +206,10 @@ def draw_marks(
     frame: ti.types.ndarray(dtype=ti.u8, ndim=3),
     table: ti.types.ndarray(dtype=ti.f32, ndim=2),
 ):
-    """Marks over a frame, in the order of the table: later ones cover others.
+    """Draw marks over a frame, in the order of the table: later marks cover earlier ones.
 
-    Rows of `table`: x, y (pixels), radius (pixels), heading, mark, opacity, colour. A band of rows
-    belongs to one thread, so that the order is the same however many there are.
+    Columns of `table`: x, y (pixels), radius (pixels), heading, mark, opacity, colour. Each thread
+    draws whole bands of pixel rows, so the order does not depend on the number of threads.
     """
     ti.loop_config(block_dim=1)
     for band in range((frame.shape[0] + BAND - 1) // BAND):

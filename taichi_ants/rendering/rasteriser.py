@@ -1,4 +1,4 @@
-"""Draws the cells and the ants of a world, and marks over them: tables of a row for each."""
+"""Drawing of cells and ants as tables of marks, one row per mark."""
 
 from __future__ import annotations
 
@@ -16,26 +16,27 @@ from taichi_ants.rendering import colours
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
-# From this size on, food and queen are drawings on a light floor. In smaller cells food is a dot
-# with a ring of that light colour, and the queen colours the whole cell.
+# Sizes of hexagons are in pixels, from the centre to a corner.
+# At this size and above, food and queen are drawings on a light background. In smaller cells, food
+# is a dot with a light ring, and the queen is a filled cell.
 _SMALLEST_DRAWING = 6.0
-# The radius of the dot in sizes of a hexagon and at least in pixels; the ring's width in pixels.
+# Radius of the dot as a share of the hexagon, its minimum in pixels, width of the ring in pixels.
 _CRUMB, _SMALLEST_CRUMB, _CRUMB_RING = 0.6, 1.4, 1.8
-# Below, the outlines of three cells would bury the ant: one stands around it and what it sees.
+# Below this size, outlines of single cells would hide the ant: one outline encloses all of them.
 _SMALLEST_OUTLINE = 7.0
-_MARK = 2.7  # its radius in sizes of the hexagon, and in pixels at least
-_SMALLEST_MARK = 8.0
+_MARK = 2.7  # radius of that outline as a multiple of the hexagon
+_SMALLEST_MARK = 8.0  # its minimum in pixels
 
 _SQRT_3 = math.sqrt(3.0)
-_QUEEN, _QUEEN_OUTLINE = 2.5, 7.0  # pixels, her radius where cells are small
-_DOTS_BELOW = 2.5  # pixels from the centre of a cell to its corners: ants are dots
-_DARTS_BELOW = 11.0  # ants have no legs
-_DOT = 0.9  # pixels, the radius of an ant in cells that are too small for it
+_QUEEN, _QUEEN_OUTLINE = 2.5, 7.0  # pixels, the queen's minimum radius and that of her outline
+_DOTS_BELOW = 2.5  # size of a hexagon below which ants are dots
+_DARTS_BELOW = 11.0  # size below which ants are darts
+_DOT = 0.9  # pixels, the minimum radius of a dot
 _DOT_WITH_FOOD = 0x9A3F00
-_FILL = 0.83  # the radius of an ant in sizes of its cell; the largest disc in one is 0.866
+_FILL = 0.83  # radius of an ant as a share of its hexagon, whose inner circle has 0.866
 
 _COLOURS = {Mark.FOOD: colours.CELL_FOOD, Mark.QUEEN: colours.CELL_QUEEN}
-# By the letters of states: the colour of a cell, and what stands on it.
+# For each letter of a state: the colour of the cell, and the mark on it.
 _CELLS: dict[str, tuple[int, Mark | None]] = {
     "E": (colours.CELL_EMPTY, None),
     "O": (colours.CELL_OBSTACLE, None),
@@ -55,12 +56,13 @@ def marks(
     headings: npt.ArrayLike = 0,
     opacity: float = 1.0,
 ) -> np.ndarray:
-    """Marks, float32 (n, 7), of kinds of `Mark` with their middles at places (n, 2) in pixels.
+    """Return a table of marks, float32 (n, 7), centred at `places` (n, 2) in pixels.
 
-    `radius` is of the circle that holds them, in pixels; `headings` are where they point, 0 to 5.
+    `mark` is of type `Mark`, `radius` is the radius of the enclosing circle in pixels, and
+    `headings` are directions, 0 to 5.
     """
     places = np.asarray(places, dtype=np.float32).reshape(-1, 2)
-    table = np.empty((len(places), 7), dtype=np.float32)  # colours are below 2^24, so it holds them
+    table = np.empty((len(places), 7), dtype=np.float32)  # exact for colours, which are below 2^24
     table[:, :2] = places
     for column, value in enumerate((radius, headings, mark, opacity, colour), start=2):
         table[:, column] = value
@@ -68,17 +70,17 @@ def marks(
 
 
 def thing(places: npt.ArrayLike, hexagon: float, mark: Mark) -> np.ndarray:
-    """Marks of food or queens on cells of a size."""
+    """Return marks of food or queens in cells of the size `hexagon`."""
     return marks(places, 0.72 * hexagon, mark, _COLOURS[mark])
 
 
 def cell_colour(letter: str) -> int:
-    """The colour of a cell by its letter in a state; letters of other observations look empty."""
+    """Return the colour of a cell by its letter in a state; unknown letters look empty."""
     return _CELLS.get(letter[0], _CELLS["E"])[0]
 
 
 def cell(letter: str, centre: npt.ArrayLike, hexagon: float) -> np.ndarray:
-    """Marks of a cell as it is called in a state, with what stands on it."""
+    """Return marks of a cell and its content, by its letter in a state."""
     table = marks(centre, hexagon, Mark.HEXAGON, cell_colour(letter))
     stands = _CELLS.get(letter, _CELLS["E"])[1]
     return table if stands is None else np.concatenate([table, thing(centre, hexagon, stands)])
@@ -92,7 +94,7 @@ def ants(
     radius: float | None = None,
     opacity: float = 1.0,
 ) -> np.ndarray:
-    """Marks of ants (n,) as they look in cells of a size, or with another radius in pixels."""
+    """Return marks of ants (n,) in cells of the size `hexagon`, or of another radius in pixels."""
     if hexagon < _DOTS_BELOW:
         colour = np.where(carries, _DOT_WITH_FOOD, colours.ANT)
         return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)
@@ -104,7 +106,7 @@ def ants(
 
 
 def kernels() -> ModuleType:
-    """The kernels, with Taichi started: it has to be configured before it is imported."""
+    """Return the kernels; starts Taichi first, which must be configured before their import."""
     runtime.start()
     from taichi_ants.rendering import raster_kernels
 
@@ -119,15 +121,15 @@ def draw_marks(frame: np.ndarray, *tables: np.ndarray) -> None:
 
 
 class Rasteriser:
-    """Draws worlds of one grid as pictures of one size, whole, centred, and as large as possible.
+    """Draws worlds of one grid as pictures of one size, centred and as large as fits.
 
-    Pixel coordinates are x to the right and y downwards; the pixel in column i and row j has its
-    centre at (i + 0.5, j + 0.5).
+    Pixel coordinates are x to the right and y downwards; the centre of the pixel in column i and
+    row j is (i + 0.5, j + 0.5).
 
     Args:
         grid: The grid of all worlds to draw.
-        width, height, margin: Of the pictures, and what to leave free at each side, in pixels.
-        beyond: Whether to leave room for the cells just beyond the border of the world.
+        width, height, margin: The size of the pictures and the margin on each side, in pixels.
+        beyond: Leave space for the cells just outside the border of the world.
         strongest: The trail level of the darkest colour.
 
     Attributes:
@@ -146,8 +148,8 @@ class Rasteriser:
         self.grid, self._strongest = grid, strongest
         self.width, self.height = width, height
         x_range, y_range, z_range = grid.ranges
-        # The lowest and the highest (x, y), in sizes of a hexagon from the cell (0, 0, 0). By
-        # `hexgrid.centre_of`, x grows with y and falls with z, y falls with x.
+        # The lowest and the highest (x, y), relative to cell (0, 0, 0) in hexagon sizes. In
+        # `hexgrid.centre_of`, x increases with y and decreases with z; y decreases with x.
         low = np.array([-1.5 * (z_range - 1) - 1, -_SQRT_3 * (x_range - 0.5)])
         high = np.array([1.5 * (y_range - 1) + 1, _SQRT_3 * (y_range + z_range - 1) / 2])
         ring = beyond * np.array([1.5, _SQRT_3])
@@ -159,20 +161,20 @@ class Rasteriser:
         self._drawn: tuple[np.ndarray, np.ndarray] | None = None  # colours of cells, their picture
 
     def centres(self, cells: object) -> np.ndarray:
-        """Pixel coordinates, float64 (..., 2), of the centres of cells (..., 3) in any form."""
+        """Return pixel coordinates of the centres of cells (..., 3), float64 (..., 2)."""
         return hexgrid.centre_of(cells, self.hexagon) + self._origin
 
     def draw(self, snapshot: Snapshot, in_view: np.ndarray | None = None) -> np.ndarray:
-        """The picture of a world with its ants, uint8 (height, width, 3).
+        """Return the picture of a world with its ants, uint8 (height, width, 3).
 
-        `in_view` are flat indices of the cells that ant number 0 sees, to be marked.
+        `in_view` are flat indices of the cells to mark, those that ant number 0 sees.
         """
         hexagon, tables = self.hexagon, []
         frame = self.draw_cells(self.cell_colours(snapshot))
         queens = self._places(np.flatnonzero(snapshot.ground == QUEEN))
         foods = self._places(np.flatnonzero(snapshot.ground == FOOD))
         if hexagon < _SMALLEST_DRAWING:
-            # Some trails are as light as food, none is as light as both the dot and its ring.
+            # The ring distinguishes food from trails, some of which are as light as its dot.
             radius = max(_CRUMB * hexagon, _SMALLEST_CRUMB)
             tables.append(marks(foods, radius + _CRUMB_RING, Mark.DOT, colours.FLOOR_FOOD))
             tables.append(marks(foods, radius, Mark.DOT, colours.CELL_FOOD))
@@ -187,14 +189,14 @@ class Rasteriser:
             tables.append(marks(places, radius, Mark.OUTLINE, colours.INK))
         tables.append(self._ants(snapshot))
         if hexagon < _DOTS_BELOW:
-            # Dots overlap. A dot of hers over the ants would hide those beside her, one under them
-            # may be hidden by a crowd: they lie over it, and an outline around it over them.
+            # Ants would hide the queen's dot, and the dot would hide ants next to her. So ants are
+            # drawn over the dot, and an outline around the dot over the ants.
             tables.append(marks(queens, _QUEEN_OUTLINE, Mark.OUTLINE, colours.CELL_QUEEN))
         draw_marks(frame, *tables)
         return frame
 
     def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
-        """The picture of the cells in the given colours, uint32 (grid.size,); the last is kept."""
+        """Return a picture of cells in the given colours, uint32 (grid.size,); caches the last."""
         if self._drawn is None or not np.array_equal(self._drawn[0], of_cells):
             self._drawn = of_cells.copy(), self._cells(of_cells)
         return self._drawn[1].copy()
@@ -206,9 +208,9 @@ class Rasteriser:
             layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
             kernels().draw_small_cells(frame, of_cells, *layout)
             return frame
-        # The lines between cells fade away where these are small, and do not grow for ever.
+        # The lines between cells vanish in small cells, and are at most 3 pixels wide.
         line = min(max(0.09 * hexagon - 0.25, 0.0), 3.0)
-        # Through two smooth edges side by side the page shines, so narrow lines need less room.
+        # The page shows through the smooth edges of neighbours, so a narrow line needs less space.
         gap = line if line > 1 else 2 * math.sqrt(line) - 1
         existing = np.flatnonzero(grid.exists)
         radius = hexagon - gap / _SQRT_3
@@ -217,7 +219,7 @@ class Rasteriser:
         return frame
 
     def cell_colours(self, snapshot: Snapshot) -> np.ndarray:
-        """The colours of all cells, uint32 (grid.size,): by what they hold, else by the trail."""
+        """Return the colours of all cells, uint32 (grid.size,), by content or trail level."""
         small = self.hexagon < _SMALLEST_DRAWING
         of_ground = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
         of_ground[OBSTACLE] = colours.CELL_OBSTACLE
@@ -239,7 +241,7 @@ class Rasteriser:
         hexagon, opacity = self.hexagon, 1.0
         places = self._places(snapshot.ant_cells)
         if hexagon < _DOTS_BELOW:
-            # Dots that would hide the world and each other become a shade, which grows with them.
+            # Crowded dots would hide the world, so their opacity decreases with their total area.
             world = self.grid.count * 1.5 * _SQRT_3 * hexagon**2
             covered = len(places) * math.pi * _DOT**2 / world
             opacity = min(1.0, 0.5 * max(covered, 1e-9) ** -0.6)

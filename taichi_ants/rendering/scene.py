@@ -1,4 +1,4 @@
-"""Pictures of a world: the cells, and beside them what the ant does and what the colours mean."""
+"""Pictures of a world with a panel: the state and action values of an ant, and a legend."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ from taichi_ants.task.states import REACHABLE_STATES, TASK_NAMES
 PAPER = observations.get("paper")
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
 DEFAULT_SIZE = (1280, 720)
-# In sizes of the text.
+# In multiples of the text size.
 _PANEL_WIDTH = 15
 _TITLE_HEIGHT = 2.2
-_SMALLEST_LETTERS = 10.0  # size of a hexagon in pixels
-# A cell by its letter, whether an ant on it carries food, a letter on it, and what it is called.
+_LEGEND_HEIGHT = 14.8
+_SMALLEST_LETTERS = 10.0  # smallest hexagon with a letter, in pixels
+# Letter of the cell, whether an ant on it carries food (None: no ant), letter drawn on it, label.
 _LEGEND = (
     ("E", None, "", "empty (E)"),
     ("O", None, "", "obstacle (O)"),
@@ -35,13 +36,12 @@ _LEGEND = (
     ("E", True, "", "ant with food"),
 )
 
-_LEGEND_HEIGHT = 14.8  # in sizes of the text
-
 
 def name_parts(observation: Observation, state: int) -> tuple[str, str, list[str]]:
-    """The task in a state's name or "", the rest, and in it a letter or two for each cell in view.
+    """Return the parts of a state's name: task ("" if none), the remainder, labels of cells.
 
-    Of two letters the first tells the kind of cell, as in "T3". Names of other forms have none.
+    There is one label for each cell in view: a letter that names the kind of cell, and for some
+    observations a second one, as in "T3". Names of other forms have no labels.
     """
     name = observation.name_of(state)
     task, _, rest = name.partition(" ")
@@ -53,25 +53,25 @@ def name_parts(observation: Observation, state: int) -> tuple[str, str, list[str
 
 
 def possible_states(observation: Observation) -> Sequence[int]:
-    """The states that an ant can come into, as far as is known."""
+    """Return the states that can occur: the reachable ones of the paper, otherwise all states."""
     paper = observation.name == PAPER.name
     return REACHABLE_STATES if paper else range(observation.n_states)
 
 
 @dataclass(frozen=True, eq=False)
 class Status:
-    """The text about a snapshot, with the state of ant number 0 and its action values."""
+    """Text for the panel of a snapshot, with the state of ant number 0 and its action values."""
 
-    lines: tuple[tuple[str, str], ...]  # names and values, such as ("step", "12")
+    lines: tuple[tuple[str, str], ...]  # names and values, for example ("step", "12")
     state: int | None = None
     q_values: np.ndarray | None = None  # float (5,), of the state; None draws no bars
-    action: int | None = None  # the chosen one, 0 to 4
-    q_range: tuple[float, float] = (0.0, 1.0)  # at the ends of the bars; at most 0, and above
-    observation: Observation = PAPER  # whose state it is
+    action: int | None = None  # the chosen action, 0 to 4
+    q_range: tuple[float, float] = (0.0, 1.0)  # the scale of the bars, from at most 0 to above 0
+    observation: Observation = PAPER  # the observation that encodes the state
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
-    """Width and height of a picture; AntsError if they are no two numbers from 64 to 4096."""
+    """Return width and height in pixels; raise AntsError unless both are from 64 to 4096."""
     if not isinstance(size, (tuple, list)) or len(size) != 2:
         raise AntsError(f"the size is {shown(size)}; it must be a width and a height in pixels.")
     for side in size:
@@ -82,17 +82,17 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
 class Scene:
     """Draws snapshots of worlds of one grid as pictures of one size.
 
-    Beside the world stands a panel: the lines and bars of the `Status` given with a snapshot, and
-    what the colours mean. The cells that ant number 0 sees are marked, with its letters for them.
-    Pictures whose shorter side is below 323 pixels have no room for text and no panel.
+    The panel on the right has the text and bars of the `Status`, and a legend. Outlines and letters
+    mark the cells that ant number 0 sees. Pictures whose shorter side is below 323 pixels have no
+    panel, because text would not fit.
 
     Args:
         grid: The grid of all worlds to draw.
         size: Width and height of the pictures, 64 to 4096 pixels each.
         title: A line above the panel.
-        overlay: Whether to draw the panel and marks, not the world alone.
-        view: Whether to leave room for the cells in view beyond the border of the world.
-        strongest: The trail level, 1 or more, from which trails have the darkest colour.
+        overlay: Draw the panel and the marks; False draws the world alone.
+        view: Leave space for cells in view outside the border of the world.
+        strongest: The trail level, 1 or more, at and above which trails have the darkest colour.
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
@@ -118,7 +118,7 @@ class Scene:
         self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
         margin = max(2, round(min(width, height) / 60))
         self._has_panel = overlay and letters >= text.SMALLEST
-        room = width  # of the world, on the left
+        room = width  # pixels for the world, on the left
         if self._has_panel:
             room -= _PANEL_WIDTH * letters + margin
         self._rasteriser = Rasteriser(grid, room, height, margin, view and overlay, strongest)
@@ -132,17 +132,17 @@ class Scene:
             draw_legend(self._background, room, bottom, column, letters, hexagon, strongest)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
-        """A picture, uint8 (height, width, 3), of a world and of what is said of it.
+        """Return the picture of a snapshot and its panel, uint8 (height, width, 3).
 
         Raises:
-            AntsError: An argument is of the wrong kind, or the snapshot is of another grid.
+            AntsError: An argument is of the wrong kind, or the snapshot has another grid.
         """
         expect("the snapshot", snapshot, Snapshot)
         expect("status", status, Status, type(None))
         if snapshot.grid.ranges != self._rasteriser.grid.ranges:
             raise AntsError(
-                f"the snapshot is of ranges {snapshot.grid.ranges}, the scene of "
-                f"{self._rasteriser.grid.ranges}; draw it with a Scene of its own grid."
+                f"the snapshot has ranges {snapshot.grid.ranges}, but the scene has "
+                f"{self._rasteriser.grid.ranges}; use a Scene of the same grid."
             )
         world = self._draw_world(snapshot, status)
         frame = self._background.copy()
@@ -152,7 +152,7 @@ class Scene:
         return frame
 
     def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
-        """The world; the cells that ant number 0 sees are marked, with its letters for them."""
+        """Draw the world, with outlines and letters on the cells that ant number 0 sees."""
         rasteriser, hexagon = self._rasteriser, self._rasteriser.hexagon
         state = None if status is None or not self._overlay else status.state
         if status is None or state is None or not len(snapshot.ant_cells):
@@ -164,7 +164,7 @@ class Scene:
             *_, letters = name_parts(status.observation, state)
             floors = rasteriser.cell_colours(snapshot)[cells].tolist()
             centres = rasteriser.centres(snapshot.grid.cells(cells)).tolist()
-            taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN))  # by their drawings
+            taken = np.isin(snapshot.ground[cells], (FOOD, QUEEN))  # these have drawings instead
             for number, letter in enumerate(letters):
                 if not taken[number]:
                     text.write_on(world, letter, centres[number], hexagon, floors[number])
@@ -174,7 +174,7 @@ class Scene:
 def _draw_status(
     frame: np.ndarray, status: Status, left: int, top: int, width: int, size: int
 ) -> None:
-    """Draw what is said into a part of a frame, in text of a size."""
+    """Draw the lines and bars of a status into a part of a frame."""
     y = top + size
     for label, value in status.lines:
         text.write(frame, label, left, y, size, colours.FAINT_INK)
@@ -205,7 +205,7 @@ def _draw_bars(
         fill(frame, ends[0], y + 0.35 * size, ends[1] - ends[0], thickness, bar)
         baseline = y + round(1.05 * size)
         text.write(frame, ACTION_NAMES[action], left, baseline, size, ink)
-        number = f"{round(value, 2) + 0.0:.2f}"  # no minus zero
+        number = f"{round(value, 2) + 0.0:.2f}"  # 0.0 turns -0.0 into 0.0
         text.write(frame, number, left + width, baseline, size, ink, align="right")
     fill(frame, zero - 1, top + 0.1 * size, 1, N_ACTIONS * pitch - 0.1 * size, colours.FAINT_INK)
 
@@ -213,9 +213,9 @@ def _draw_bars(
 def draw_legend(
     frame: np.ndarray, left: int, top: int, width: int, size: int, hexagon: float, strongest: int
 ) -> None:
-    """Draw what colours, shapes and letters mean, `_LEGEND_HEIGHT` sizes of the text high.
+    """Draw the legend of colours, shapes and letters, `_LEGEND_HEIGHT` text sizes high.
 
-    The world's hexagons have `hexagon` pixels, trails of the level `strongest` the darkest colour.
+    `hexagon` is the size of the world's cells in pixels, `strongest` the level of darkest trails.
     """
     pitch, radius = round(1.55 * size), 0.82 * size
     for row, (kind, carries, letter, label) in enumerate(_LEGEND):
@@ -242,6 +242,6 @@ def draw_legend(
 def fill(
     frame: np.ndarray, left: float, top: float, width: float, height: float, colour: int
 ) -> None:
-    """Fill a rectangle, its edges rounded to whole pixels."""
+    """Fill a rectangle whose edges are rounded to whole pixels."""
     x, y = max(0, round(left)), max(0, round(top))
     frame[y : round(top + height), x : round(left + width)] = colours.channels(colour)

@@ -1,7 +1,7 @@
-"""A policy on one sheet: what the ant does in each state in which something was learned.
+"""Policy sheets: the best action in each state for which something was learned.
 
-The states stand in two parts, foraging and carrying, or in one if their names have no task, ordered
-by the cell ahead, then by the other cells in view.
+There is one part for foraging and one for carrying, or a single part if state names have no task.
+States are ordered by the cell ahead, then by the other cells in view.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from taichi_ants.task import Observation, Task
 from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
-MOST = 128  # states of a part that are drawn
-_HARDLY = 0.01  # of the usual spread: below, nothing was learned
+MOST = 128  # states drawn in each part
+_HARDLY = 0.01  # share of the usual spread below which a state counts as not learned
 
 # Lengths in pixels.
 WIDTH, _MARGIN, _COLUMNS = 1280, 20, 8
 _TILE = (WIDTH - 2 * _MARGIN) // _COLUMNS
 _HEXAGON = _TILE / 5.7
-_SMALL, _LARGE = 18, 27  # sizes of text
-_TOP, _HEADING, _BELOW = 145, 70, 47  # heights of what stands above all, a part; below a state
+_SMALL, _LARGE = 18, 27  # text sizes
+_TOP, _HEADING, _BELOW = 145, 70, 47  # heights of the header, of a part's heading, below a state
 
 _PARTS = {
     **dict(zip(TASK_NAMES, ("Foraging (without food)", "Carrying (with food)"), strict=True)),
@@ -54,14 +54,14 @@ _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
 
 
 def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
-    """The mean gap from best to worst action value of possible states with different values."""
+    """Return the mean spread of action values, over possible states whose values differ."""
     rows = q_values.astype(np.float64)[list(possible_states(observation))]
     spreads = np.ptp(rows, axis=1)
     return float(spreads[spreads > 0].mean()) if spreads.any() else 0.0
 
 
 def clarity(values: np.ndarray, spread: float) -> float:
-    """The gap from best to second best of action values (5,) as a share of `usual_spread`, 0 to 1.
+    """Return the gap between the two best action values as a share of the usual spread, 0 to 1.
 
     As a share of the state's own values, every small gap would look like a clear choice.
     """
@@ -70,9 +70,9 @@ def clarity(values: np.ndarray, spread: float) -> float:
 
 
 def learned(values: np.ndarray, spread: float) -> bool:
-    """Whether action values (5,) differ by 1 % of the table's `usual_spread` or more.
+    """Return whether action values (5,) differ by 1 % of the table's `usual_spread` or more.
 
-    Below, the best action may be the one that was tried least rather than one that is good.
+    Below, the best action may just be the one that was tried least.
     """
     gap = float(np.ptp(values.astype(np.float64)))
     return gap > 0 and gap >= _HARDLY * spread
@@ -81,12 +81,12 @@ def learned(values: np.ndarray, spread: float) -> bool:
 def policy_sheet(
     q_values: np.ndarray, title: str = "Policy", *, task: Task | None = None
 ) -> np.ndarray:
-    """The sheet of a policy, uint8 (height, 1280, 3), with a title above it.
+    """Return a picture of a policy's best actions, uint8 (height, 1280, 3), with a title.
 
     Args:
         q_values: float (n_states, 5), finite action values; or the `TrainingResult` of a single
             run, or a `Policy`.
-        task: Whose states they are; None is the paper's.
+        task: The task of the policy, which defines its states; None is the paper's.
     """
     task = checked_task(Task() if task is None else task)
     table = checked_table(q_values, task)
@@ -138,7 +138,7 @@ def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None
 
 
 def _write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> None:
-    """Write the best actions below a state, with a bar of how clear they are."""
+    """Write the best actions below a state, with a bar for `clarity`."""
     words, size = " / ".join(ACTION_NAMES[action] for action in best), _SMALL
     while text.width(words, size) > _TILE:
         size -= 1
@@ -162,14 +162,14 @@ class _Picture:
         self._own, *self._seen = centres
 
     def order(self, state: int) -> list[int]:
-        """Sorts by the cell ahead, then by the others."""
+        """Return a sort key: the cell ahead first, then the others."""
         *_, letters = name_parts(self._observation, state)
         if letters:
             letters.insert(0, letters.pop(self._observation.cells.index(0)))
         return [*(CELL_LETTERS.find(letter[0]) for letter in letters), state]
 
     def draw(self, state: int, actions: list[int]) -> np.ndarray:
-        """The picture, uint8 (height, width, 3)."""
+        """Return the picture of a state, uint8 (height, width, 3)."""
         frame = np.full((self.height, _TILE, 3), colours.channels(colours.PAGE))
         task, rest, letters = name_parts(self._observation, state)
         carries, radius = np.array([task == TASK_NAMES[1]]), 0.96 * _HEXAGON
@@ -177,7 +177,7 @@ class _Picture:
         cells = [cell(letter, centre, radius) for letter, centre in [("E", self._own), *seen]]
         ant = ants(self._own + (0, 0.2 * _HEXAGON), 0, carries, _HEXAGON, 0.62 * _HEXAGON)
         draw_marks(frame, *cells, ant, *self._arrows(letters, actions))
-        if not letters:  # a name of another form
+        if not letters:  # the name has no letters of cells
             text.write(frame, rest, _TILE / 2, _SMALL, _SMALL, align="middle", room=_TILE)
         for letter, (x, y) in seen if letters else ():
             if letter not in _GOALS:
@@ -186,11 +186,11 @@ class _Picture:
         return frame
 
     def _arrows(self, letters: list[str], actions: list[int]) -> Iterator[np.ndarray]:
-        """An arrow to where a move goes, from the food that is picked up, or to the queen."""
+        """Yield an arrow for each action: to the target of a move, from the food, to the queen."""
         for action in actions:
             for place, turn in enumerate(self._observation.cells):
                 towards = turn == action - 1
-                if action > RIGHT:  # it reaches what lies ahead only
+                if action > RIGHT:  # pick up and give reach only the cells ahead
                     goal = letters[place : place + 1] == [_GOALS[action == GIVE]]
                     towards = goal and -1 <= turn <= 1
                 if towards:

@@ -1,6 +1,6 @@
-"""Snapshots of ants: a world as it is, and what is said of it beside the picture.
+"""Snapshots of a world, with the text for the panel of their pictures.
 
-An episode is played by a colony of one ant, so what is drawn is what the engine has done.
+A colony of one ant replays an episode, so pictures show the engine's own steps.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ CaptionedSnapshot = tuple[Snapshot, Status]
 
 
 def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
-    """A world with n ants as an episode starts; raises as `World.start` does."""
+    """Return a world with n ants at the start of an episode; raises as `World.start` does."""
     expect("world", world, World)
     cells, headings = world.start(seed, n)
     nothing = np.zeros(n, dtype=bool)
@@ -37,9 +37,9 @@ def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
 def frames(
     snapshots: Iterable[CaptionedSnapshot], size: tuple[int, int] = DEFAULT_SIZE, **look: Any
 ) -> Iterator[np.ndarray]:
-    """The pictures of snapshots of one world, uint8 (height, width, 3), as they come.
+    """Yield pictures of snapshots of one world, uint8 (height, width, 3), one by one.
 
-    `size` is width and height in pixels; `look`, what to draw, see `Scene`.
+    `size` is width and height in pixels; `look` are further arguments of `Scene`.
     """
     scene = None
     expect("snapshots", snapshots, Iterable)
@@ -54,10 +54,10 @@ def frames(
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """Rollout 0 of a seed: its trace, and what the panel calls it."""
+    """Rollout 0 of a seed."""
 
     trace: Trace
-    name: str
+    name: str  # in the panel
 
     @classmethod
     def play(
@@ -70,7 +70,7 @@ class Episode:
         task: Task | None = None,
         epsilon: float = 0.0,
     ) -> Episode:
-        """Roll a policy out; arguments and errors are those of `rollout`."""
+        """Return a rollout of a policy; arguments and errors are those of `rollout`."""
         expect("world", world, World)
         trace = rollout(world, q_values, seed, 0, max_steps, task, epsilon)
         return cls(trace, "greedy" if epsilon == 0 else f"epsilon {epsilon:g}")
@@ -78,20 +78,20 @@ class Episode:
     @property
     def made(self) -> Made:
         """World, task, policy and seed."""
-        assert self.trace.made is not None  # it is of `rollout`
+        assert self.trace.made is not None  # `rollout` sets it
         return self.trace.made
 
     @property
     def delivered(self) -> bool:
-        """Whether it ended with the food given to the queen."""
+        """Whether the episode ended with a delivery."""
         return bool(self.trace.delivered[-1])
 
     def __len__(self) -> int:
-        """The number of its snapshots, one more than its steps."""
+        """Return the number of snapshots, which is the number of steps plus 1."""
         return len(self.trace) + 1
 
     def snapshots(self) -> Iterator[CaptionedSnapshot]:
-        """The world before each step with what the ant is about to do, and the world at the end."""
+        """Yield the world before each step, with the action that follows, and at the end."""
         colony = colony_of_rollout(self.made)
         returns = np.concatenate([[0], np.cumsum(self.trace.rewards)]).tolist()
         for step, gained in enumerate(returns):
@@ -115,7 +115,7 @@ class Episode:
 
 
 def colony_of_rollout(made: Made) -> Colony:
-    """A colony of one ant that will do what it did in `rollout`, since it has the same stream."""
+    """Return a colony of one ant that repeats a `rollout`: it has the same random numbers."""
     steady = TrainingConfig("q_learning", 1.0, 0.0, made.epsilon, 1.0, min_epsilon=0.0)
     frozen: dict[str, Any] = {"sharing": "frozen", "q_values": made.q_values}
     colony = Colony(made.world, made.task, steady, made.seed, **frozen)
@@ -127,14 +127,14 @@ def colony_of_rollout(made: Made) -> Colony:
 def colony_snapshots(
     colony: Colony, ticks: int = 0, frame_interval: int = 1, follow: int | None = None
 ) -> Iterator[CaptionedSnapshot]:
-    """The first world of a colony as it is now, then every few ticks while time passes.
+    """Yield snapshots of a colony's first world: one now, then one every `frame_interval` ticks.
 
     Args:
-        colony: In an episode; it is moved on by `ticks`.
-        ticks: How many; 0 gives the world as it is. The last step is shorter if need be.
-        frame_interval: Ticks from one snapshot to the next, at least 1.
-        follow: The number of an ant, from 0, whose view, state and action values are shown while
-            it lives; None: of no ant.
+        colony: A colony in an episode; it advances by `ticks`.
+        ticks: The number of ticks; 0 yields only the present. The last interval may be shorter.
+        frame_interval: Ticks between snapshots, at least 1.
+        follow: The number of an ant, from 0. Its view, state and action values are shown while it
+            lives. None follows no ant.
     """
     between = intervals(colony, ticks, frame_interval, follow)
     yield _snapshot(colony, follow)
@@ -144,14 +144,14 @@ def colony_snapshots(
 
 
 def intervals(colony: Colony, ticks: int, frame_interval: int, follow: int | None) -> list[int]:
-    """The ticks between snapshots; arguments and errors are those of `colony_snapshots`."""
+    """Return the ticks between snapshots; arguments and errors as in `colony_snapshots`."""
     expect("colony", colony, Colony)
     ticks = checked_whole("ticks", ticks, least=0)
     every = checked_whole("frame_interval", frame_interval)
     if follow is not None:
         checked_whole("follow", follow, least=0)
         if follow >= colony.ants and not colony.task.life.births:
-            raise AntsError(f"follow is {follow}; the {colony.ants} ants have numbers from 0.")
+            raise AntsError(f"follow is {follow}; it must be from 0 to {colony.ants - 1}.")
     return [min(every, ticks - done) for done in range(0, ticks, every)]
 
 
@@ -165,11 +165,11 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
         ("delivered", str(outcome.deliveries[0, 0])),
         ("moves blocked", f"{100 * blocked:.0f} %"),
     ]
-    (slots,) = np.nonzero(colony.living[0])  # those of the snapshot
+    (slots,) = np.nonzero(colony.living[0])  # in the order of the snapshot
     followed = colony.numbers[0, slots] == follow
     if follow is None or not followed.any():
         return snapshot, Status(tuple(lines))
-    # The one that is followed comes first, since pictures mark what the first one sees.
+    # Pictures mark the view of the first ant, so the followed ant must be first.
     order = np.argsort(~followed, kind="stable")
     snapshot = replace(
         snapshot,
@@ -177,7 +177,7 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
         ant_headings=snapshot.ant_headings[order],
         ant_carries=snapshot.ant_carries[order],
     )
-    # There is no room for all lines.
+    # All lines together do not fit into the panel.
     lines = [lines[0], lines[3], ("ant", str(follow))]
     slot, table = int(slots[order[0]]), colony.q_values[0]
     state = int(colony.states[0, slot])
@@ -194,7 +194,7 @@ def _status_of(
     lines: list[tuple[str, str]],
     last: Sequence[tuple[str, str]] = (),
 ) -> Status:
-    """The lines, with what an ant sees; its action values on the scale of the table."""
+    """Return a status with the ant's observation; the bars have the scale of the table."""
     task, seen, _ = name_parts(observation, state)
     lines += [("task", task), ("sees", seen)] if task else [("state", seen)]
     lines += [("", observation.letters)] if observation.letters else []

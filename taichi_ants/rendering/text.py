@@ -1,4 +1,4 @@
-"""Text in pictures, with the font that comes with Pillow."""
+"""Text in pictures, in Pillow's default font."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ def write(
     align: str = "left",
     room: float | None = None,
 ) -> None:
-    """Write a line of text into a frame; what lies beyond its edges is cut off.
+    """Write a line of text into a frame, clipped at the edges of the frame.
 
     Args:
         frame: uint8 (height, width, 3).
-        text: The text; the font has little but ASCII, so accents and other letters are left out.
-        x, align: Pixels to the "left" edge, the "middle" or the "right" edge of the text.
-        baseline: Where its letters stand, in pixels from the top.
-        size: Of the font, in pixels; what is smaller than 9 cannot be read and is left out.
-        room: Pixels for the text, which is shortened; None is without bounds.
+        text: The text. Accents and letters outside ASCII are removed.
+        x, align: The x coordinate of the "left" edge, the "middle" or the "right" edge of the text.
+        baseline: The y coordinate of the baseline.
+        size: The font size in pixels. Below 9, text is unreadable and nothing is drawn.
+        room: The largest width in pixels; longer text is shortened. None means no limit.
     """
     if size < SMALLEST:
         return
@@ -56,7 +56,7 @@ def write(
 def write_on(
     frame: np.ndarray, letter: str, centre: tuple[float, float], hexagon: float, floor: int
 ) -> None:
-    """Write a letter on a cell of the colour `floor`, dark or light as can be read."""
+    """Write a letter on a cell, dark or light in contrast to the cell's colour `floor`."""
     x, y = centre
     size = round(0.85 * hexagon)
     red, green, blue = channels(floor).tolist()
@@ -66,13 +66,13 @@ def write_on(
 
 @lru_cache(maxsize=4096)
 def width(text: str, size: int) -> float:
-    """Pixels from the start of a line of text to its end."""
+    """Return the width of a line of text in pixels."""
     return _font(size).getlength(_plain(text))
 
 
 def shortened(text: str, size: int, room: float) -> str:
-    """The text, or as much of its beginning as fits into `room` pixels, with three dots."""
-    kept = text[: 4 * max(1, round(room))]  # more letters than there is room for
+    """Return the text, cut and with three dots at the end if it is wider than `room` pixels."""
+    kept = text[: 4 * max(1, round(room))]  # more letters than can fit
     if kept == text and width(text, size) <= room:
         return text
     n = bisect_right(range(len(kept) + 1), room, key=lambda n: width(kept[:n] + "...", size)) - 1
@@ -92,7 +92,7 @@ def _font(size: int) -> FreeTypeFont | ImageFont:
 
 @lru_cache(maxsize=4096)
 def _mask(text: str, size: int) -> tuple[np.ndarray, int, int]:
-    """Coverage 0 to 1, float32 (height, width, 1), and where its corner lies from the start."""
+    """Return coverage, 0 to 1, float32 (height, width, 1), and the offset of its corner."""
     from PIL import Image, ImageDraw
 
     text = _plain(text)

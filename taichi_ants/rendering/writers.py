@@ -1,4 +1,4 @@
-"""Files of pictures: they appear when they are whole. Frames are written as they come."""
+"""Writers of pictures and animations; files appear only once they are complete."""
 
 from __future__ import annotations
 
@@ -21,15 +21,14 @@ from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.rendering import colours
 
 DEFAULT_FPS = 8.0
-PAUSE = 1.5  # seconds, for which episodes are shown as they ended
-# The shortest and the longest side of a picture in pixels, by the kind of file; of PNG anything
-# that fits into the memory.
+PAUSE = 1.5  # seconds for which the last frame of an episode is shown
+# The shortest and the longest side of a picture in pixels, by file type. PNG is limited by memory.
 _SIDES = {".gif": (1, 65_535), ".mp4": (2, 16_384), "": (1, 2**31 - 1)}
 
-_SAME = 255  # in a GIF, for pixels that stay as they are; palettes have fewer colours
-_LONGEST = 600  # seconds for which a GIF shows a picture; it can count 655
+_SAME = 255  # colour index of unchanged pixels in a GIF; palettes use fewer colours
+_LONGEST = 600  # seconds for which a GIF shows one picture; the format allows 655
 
-# The colours of scenes, which all palettes hold.
+# Colours of scenes, which are in every palette.
 _KEPT = (
     *(colours.PAGE, colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.CELL_FOOD),
     *(colours.CELL_QUEEN, colours.FLOOR_FOOD, colours.FLOOR_QUEEN, colours.ANT),
@@ -39,14 +38,14 @@ _KEPT = (
 
 
 def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
-    """Make sure, before the work begins, that an animation can be written.
+    """Return the path of an animation after checking that it can be written.
 
     Args:
-        path: The file, .gif or .mp4; without an ending a new folder for numbered PNG pictures.
+        path: A .gif or .mp4 file; without an extension, a new folder for numbered PNG pictures.
         fps: Frames per second, 0.1 to 50.
 
     Raises:
-        AntsError: One is not allowed, or the place cannot be written to, or PyAV is missing.
+        AntsError: An argument is not allowed, the path is not writable, or PyAV is missing.
     """
     expect("path", path, str, os.PathLike)
     target = Path(path)
@@ -55,10 +54,10 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
         files.check_writable_file(target)
     if target.suffix.lower() not in (".gif", ".mp4", ""):
         raise AntsError(
-            f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, .mp4, or in "
-            "nothing for a folder of PNG pictures."
+            f"{str(path)!r} ends in {target.suffix!r}; an animation must end in .gif or .mp4, or "
+            "have no extension to make a folder of PNG pictures."
         )
-    _check_number("fps", fps, "number", 0.1, 50)  # viewers slow a GIF down that is faster
+    _check_number("fps", fps, "number", 0.1, 50)  # viewers slow down faster GIFs
     if target.suffix.lower() == ".mp4":
         _import_av()
     if is_old_folder:
@@ -66,8 +65,8 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
         named = target.name not in ("", "..") and not target.is_symlink()
         if not (named and target.is_dir() and not any(target.iterdir())):
             raise AntsError(
-                f"{str(path)!r} exists already and is no empty folder; name a new folder, or a "
-                "file that ends in .gif or .mp4."
+                f"{str(path)!r} already exists and is not an empty folder; choose a new folder, or "
+                "a file that ends in .gif or .mp4."
             )
     return target
 
@@ -78,21 +77,21 @@ def _check_number(name: str, value: float, kind: str, least: float, most: float)
 
 
 def is_picture(path: files.PathLike) -> bool:
-    """Whether a path is one of a single picture, not of an animation."""
+    """Return whether a path names a single picture rather than an animation."""
     return Path(path).suffix.lower() == ".png"
 
 
 def check_picture(path: files.PathLike) -> Path:
-    """Make sure that a picture can be written; raises as `save_picture` does."""
+    """Return the path of a picture after checking it; raises as `save_picture` does."""
     return check_single(path, "one picture", ".png")
 
 
 def check_single(path: files.PathLike, holds: str, *endings: str) -> Path:
-    """Make sure that a file of one of these endings can be written; AntsError if not."""
+    """Return a path after checking its extension and that it is writable; AntsError if not."""
     target = files.check_writable_file(path)
     if target.suffix.lower() not in endings:
         raise AntsError(
-            f"{str(path)!r} is to hold {holds}; give it a name that ends in {endings[0]}."
+            f"{str(path)!r} cannot hold {holds}; choose a file name that ends in {endings[0]}."
         )
     return target
 
@@ -104,14 +103,13 @@ def save_animation(
     *,
     pause: float = 0.0,
 ) -> None:
-    """Write frames as they come; raises as `check_animation` does, which it calls first.
+    """Write an animation frame by frame; checks and raises as `check_animation` does.
 
     Args:
-        path: The file or folder, see `check_animation`. A file that exists is replaced.
-        frames: At least one, uint8 (height, width, 3), all of one size.
+        path: The file or folder, see `check_animation`. An existing file is replaced.
+        frames: One or more frames, uint8 (height, width, 3), all of the same size.
         fps: Frames per second.
-        pause: Seconds, at most 60, for which the last one is shown, so that it can be looked at
-            before all begins anew.
+        pause: Seconds, at most 60, for which the last frame is shown before the animation repeats.
     """
     target = check_animation(path, fps)
     _check_number("pause", pause, "number of seconds", 0, 60)
@@ -138,7 +136,7 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     """Write a picture, uint8 (height, width, 3), as PNG.
 
     Raises:
-        AntsError: The file does not end in .png, or cannot be written.
+        AntsError: The file does not end in .png, or is not writable.
     """
     target = check_picture(path)
     _check_frame(frame)
@@ -146,37 +144,37 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
 
 
 def write(target: Path, content: bytes) -> None:
-    """Write a file into a folder that is made if it is missing."""
+    """Write a file, and create its folder if it is missing."""
     files.check_writable_folder(target.parent)
     files.write_atomically(target, lambda file: file.write(content))
 
 
 def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
-    """Write numbered pictures to a folder that appears when all of them exist."""
+    """Write numbered pictures to a folder that appears only once it is complete."""
     with files.writing(folder), files.unfinished(folder) as whole:
         whole.mkdir()
         for number, frame in enumerate(frames):
             (whole / f"frame_{number:06d}.png").write_bytes(_png(frame))
         if folder.exists():
-            folder.rmdir()  # it was empty
+            folder.rmdir()  # `check_animation` has checked that it is empty
         os.replace(whole, folder)
 
 
 def _checked(
     frames: Iterable[np.ndarray], more: int, sides: tuple[int, int]
 ) -> Iterator[np.ndarray]:
-    """The frames, if they fit together and into the file, the last one so many times more."""
+    """Yield the frames after checking their sizes, and the last one `more` times again."""
     try:
         coming = iter(frames)
     except TypeError:
-        raise AntsError(f"frames is {shown(frames)}; it must be pictures, one by one.") from None
+        raise AntsError(f"frames is {shown(frames)}; it must be an iterable of arrays.") from None
     shape = None
     for frame in coming:
         _check_frame(frame, sides)
         shape = shape or frame.shape
         if frame.shape != shape:
             raise AntsError(
-                f"a frame is {frame.shape}, the first one {shape}; all must be of one size."
+                f"a frame has shape {frame.shape}, but the first has {shape}; all must be equal."
             )
         yield frame
     if shape is None:
@@ -195,8 +193,8 @@ def _check_frame(frame: np.ndarray, sides: tuple[int, int] = _SIDES[""]) -> None
     least, most = sides
     if not least <= min(height, width) <= max(height, width) <= most:
         raise AntsError(
-            f"a frame is {width} pixels wide and {height} high; this kind of file has from {least} "
-            f"to {most}, so choose another size, or another ending."
+            f"a frame is {width} pixels wide and {height} high; each side must be from {least} to "
+            f"{most} for this file type, so choose another size or file type."
         )
 
 
@@ -209,10 +207,10 @@ def _png(frame: np.ndarray, optimize: bool = False) -> bytes:
 
 
 def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Write a GIF that repeats for ever.
+    """Write a GIF that repeats forever.
 
-    Pillow's own writer keeps all frames until the last one; this one keeps two, and has Pillow
-    compress what has changed since the one before. Equal frames become one.
+    Pillow's own writer holds all frames in memory. This one holds two, lets Pillow compress the
+    difference, and merges equal frames.
     """
     from PIL import GifImagePlugin, Image
 
@@ -237,7 +235,7 @@ def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: f
         differs = picture != before
         box = Image.fromarray(differs).getbbox() or (0, 0, 1, 1)
         change = Image.fromarray(np.where(differs, picture, np.uint8(_SAME))).crop(box)
-        # A GIF counts hundredths of a second; rounded so that their sum is right.
+        # GIF durations are in hundredths of a second. Rounding the end time keeps their sum exact.
         until = 10 * round(100 * number / fps)
         options = {"duration": until - shown, "transparency": _SAME, "disposal": 1}
         for part in GifImagePlugin.getdata(change, box[:2], **options):
@@ -247,21 +245,21 @@ def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: f
 
 
 def _palette(first: np.ndarray) -> np.ndarray:
-    """Colours for all frames, uint8 (n, 3): those of scenes, and what else represents the first."""
+    """Return a palette for all frames, uint8 (n, 3): the colours of scenes and the first frame."""
     from PIL import Image
 
     kept = colours.channels(np.array(_KEPT))
-    # As one number each, colours are sorted several times faster than as rows.
+    # Colours packed into integers sort several times faster than rows.
     sample = colours.channels(np.unique(first.astype(np.int32) @ (1 << 16, 1 << 8, 1)))
     free = Image.fromarray(sample[None]).quantize(200).getpalette()
     others = np.array(free, dtype=np.uint8).reshape(-1, 3)
-    # Pillow looks colours up by their upper bits, so one close by would take a kept one's place.
+    # Pillow looks up colours by their upper bits, so a close colour would replace a scene's.
     away = np.abs(others[:, None].astype(int) - kept).sum(axis=2).min(axis=1)
     return np.concatenate([kept, others[away > 20]])
 
 
 def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Write an MP4 (H.264); of an odd width or height the last column or row is left out."""
+    """Write an MP4 (H.264), without the last column or row of an odd width or height."""
     av = _import_av()
     from fractions import Fraction
 
@@ -277,7 +275,7 @@ def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: f
         for frame in frames:
             picture = np.ascontiguousarray(frame[:height, :width])
             video = av.VideoFrame.from_ndarray(picture, format="rgb24")
-            # Players take pictures of this kind for BT.709, PyAV's default is BT.601.
+            # Players assume BT.709 for such videos, but PyAV's default is BT.601.
             video = video.reformat(format="yuv420p", dst_colorspace="ITU709")
             container.mux(stream.encode(video))
         container.mux(stream.encode())
@@ -289,6 +287,6 @@ def _import_av() -> ModuleType:
     except ImportError as error:
         raise AntsError(
             f"MP4 needs PyAV, which cannot be imported ({error}); install it with "
-            "pip install 'taichi_ants[video]', or choose .gif."
+            "pip install 'taichi_ants[video]', or choose a .gif file."
         ) from error
     return av

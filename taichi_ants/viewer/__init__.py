@@ -1,8 +1,8 @@
-"""A web page that plays what ants did: one file, without a server and without a network.
+"""Web pages that play recordings of ants: a single file, which needs no server and no network.
 
 - `record_episode`, `record_trace` and `record_colony` make a `Recording`; a `Recorder` makes its
-  frames one at a time, of a colony that somebody else moves on.
-- `page` puts a recording into a page, `save_page` writes it, `frame` shows it in a notebook.
+  frames one at a time while your code runs the colony.
+- `page` returns the page of a recording, `save_page` writes it, `frame` shows it in a notebook.
 """
 
 from taichi_ants.viewer.frames import Recording

@@ -1,31 +1,31 @@
 "use strict";
 
-/* What happened, moment by moment.
+/* The history of a world, moment by moment.
 
-   A source gives the page its header and its frames (see frames.py for their form):
+   A source provides a header and frames (frames.py defines their format):
 
-     source.header          what all frames are about, as `Recorder.header` in Python gives it
-     source.live            true if more frames may come
-     source.start(receive)  calls receive(bytes, whole) with each frame, in order: those of a recording
-                            at once, those of a simulation that runs as they arrive; whole is true
-                            if a frame holds all, not only what has changed
+     source.header          facts about all frames, from `Recorder.header` in Python
+     source.live            true if more frames may arrive
+     source.start(receive)  calls receive(bytes, whole) with each frame, in order: at once for a
+                            recording, as they arrive for a live simulation; whole is true for a
+                            complete frame, and false for a frame of changes
 
-   A simulation that runs may also give `player(history, changed)`, `stand(viewer)`, called once all
-   stands, `seen()`, called when what has arrived is drawn, and `keys`, more lines for the help.
+   A live source may also have `player(history, changed)`; `stand(viewer)`, called once the page is
+   complete; `seen()`, called after new frames are drawn; and `keys`, more lines for the help.
 
    A frame is an ArrayBuffer, or a view of one. */
 
-const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // what a cell holds, as in task/constants.py
+const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // contents of a cell, as in task/constants.py
 const N_ACTIONS = 5;
-const MOST_BYTES = 2 ** 27; // of frames; a simulation that runs for hours has more
+const MOST_BYTES = 2 ** 27; // bytes of stored frames; a live simulation has more after some hours
 const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered", "ticks", "trailClock"];
-const POINT = ["episode", "ticks", "delivered", "returns", "epsilon", "ended"]; // as in progress.py
+const POINT = ["episode", "ticks", "delivered", "returns", "epsilon", "ended"]; // as in frames.py
 const MOST_POINTS = 1500;
 const ARRAYS = {
   u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, i4: Int32Array, f4: Float32Array, f8: Float64Array,
 };
 
-/* A recording that lies in the page as compressed bytes in base64. */
+/* Return the source of a recording in the page, which is compressed and in base64. */
 async function recordingIn(text) {
   const packed = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
@@ -44,7 +44,7 @@ async function recordingIn(text) {
   };
 }
 
-/* Where the cells of a world lie: the same as grid/hexgrid.py. Lengths are in sizes of a hexagon. */
+/* The geometry of a world, as in grid/hexgrid.py. Lengths are in sizes of a hexagon. */
 class Grid {
   constructor([x, y, z]) {
     this.ranges = [x, y, z];
@@ -76,7 +76,7 @@ class Grid {
     const [x, y, z] = this.ranges, [i, j, k] = this.cube(cell);
     return i < x && j < y && k < z;
   }
-  /* The cell at a point, -1 outside of the world. */
+  /* The cell at a point, -1 outside the world. */
   at(x, y) {
     const r = x / 1.5, q = r / 2 - y / Math.sqrt(3);
     let a = Math.round(q), b = Math.round(r);
@@ -90,7 +90,7 @@ class Grid {
   }
 }
 
-/* All frames so far, and the world as it was at any of them. */
+/* All frames so far, from which the world at any moment is computed. */
 class History {
   constructor(header) {
     this.header = header;
@@ -100,17 +100,17 @@ class History {
     this.headBytes = 8 * Math.ceil((1 + this.names.length) / 2);
     this.dense = header.types.trail === "f4";
     this.frames = [];
-    this.first = 0; // the earliest moment that is still known
+    this.first = 0; // the earliest stored moment
     this.bytes = 0;
     this.events = []; // pick-ups and deliveries: {moment, kind, ant, cell}, in order
     this.within = []; // points for curves, within the first episode: objects of `POINT`
-    this.ends = []; // those at the ends of episodes
+    this.ends = []; // points at the ends of episodes
     this.values = new Map(); // entry of a table -> [moments, values] of its changes
-    // `stored` is the trail as kernels store it, `trail` its levels.
+    // `stored` is the trail in the form of the kernels, `trail` its levels.
     this.world = { moment: -1, ground: new Uint8Array(this.grid.size), stored: this.emptyTrail(), trail: this.emptyTrail() };
-    this.kept = []; // copies of the world now and then, so that seeking is quick
+    this.kept = []; // copies of the world at some moments, for fast seeking
     this.lastKept = -Infinity;
-    // At most 64 MiB of copies: large worlds are kept more rarely.
+    // At most 64 MiB of copies, so large worlds have fewer.
     this.keepEvery = 32;
     this.mostKept = Math.max(8, Math.floor(2 ** 26 / (5 * this.grid.size)));
   }
@@ -123,7 +123,7 @@ class History {
     return this.dense ? new Float32Array(this.grid.size) : new Int32Array(this.grid.size);
   }
 
-  /* Append a frame; views into its bytes are kept. One that is whole needs none before it. */
+  /* Append a frame; keeps views of its bytes. A whole frame does not depend on earlier ones. */
   add(bytes, whole = false) {
     const { header } = this, frame = this.read(bytes), moment = this.length, before = this.frames[moment - 1];
     if (!frame.numbers.length && frame.ants) frame.numbers = before.numbers;
@@ -150,16 +150,16 @@ class History {
     for (let at = 0; at < frame.progress.length; at += POINT.length) {
       const point = Object.fromEntries(POINT.map((name, i) => [name, frame.progress[at + i]]));
       if (point.ended) this.ends.push(point);
-      else if (!moment || whole) this.within.push(point); // later frames tell of it themselves
+      else if (!moment || whole) this.within.push(point); // later frames are points themselves
     }
     if (this.ends.length > 2 * MOST_POINTS) this.ends = this.ends.filter((_, i) => i % 2 === 0);
     if (this.bytes > MOST_BYTES) this.forget();
     return frame;
   }
 
-  /* Forget about half of what happened, from its beginning: of that only the numbers of its curves stay. */
+  /* Forget the earlier half of the history, except the numbers for curves. */
   forget() {
-    this.worldAt(this.length - 1); // so that there are copies from which to go on
+    this.worldAt(this.length - 1); // makes copies of the later half
     const { moment: first } = this.kept[this.kept.length >> 1];
     this.kept = this.kept.filter((copy) => copy.moment >= first);
     for (; this.first < first; this.first++) {
@@ -176,18 +176,18 @@ class History {
     }
   }
 
-  /* Whether there is more than one episode, so that what is of one differs from what is of all. */
+  /* Whether there is more than one episode. */
   get several() {
     const last = this.frames[this.length - 1];
     return this.ends.length > 0 || last.delivered !== last.deliveries || last.episode > this.frames[0].episode;
   }
 
-  /* Where curves begin, in ticks over all episodes. */
+  /* The start of curves, in ticks over all episodes. */
   get origin() {
     return Math.min(this.frames[0].ticks, ...this.within.slice(0, 1).map(({ ticks }) => ticks));
   }
 
-  /* The last moment of so many ticks over all episodes, or the one before. */
+  /* The last moment at or before a number of ticks over all episodes. */
   momentAt(ticks) {
     let low = this.first, high = this.length - 1;
     while (low < high) {
@@ -211,7 +211,7 @@ class History {
     return frame;
   }
 
-  /* A frame that holds all of a moment, see `pack` in frames.py: it needs none before it. */
+  /* A complete frame of a moment, see `pack` in frames.py. */
   wholeFrame(moment) {
     const frame = this.frames[moment], { ground, stored } = this.worldAt(moment);
     const since = moment > this.first ? this.frames[moment - 1].ticks : -1;
@@ -234,7 +234,7 @@ class History {
     return bytes;
   }
 
-  /* All that is still known, in the form that `recordingIn` reads: compressed, a Blob. */
+  /* The stored history as a compressed Blob, which `recordingIn` reads. */
   async packed() {
     const encoded = new TextEncoder().encode(JSON.stringify(this.header));
     const head = new Uint8Array(8 * Math.ceil((4 + encoded.length) / 8)).fill(32); // spaces
@@ -248,7 +248,7 @@ class History {
     return new Response(new Blob(parts).stream().pipeThrough(new CompressionStream("deflate"))).blob();
   }
 
-  /* The world at a moment: {ground, trail}, levels of the trail. Good until the next call. */
+  /* The world at a moment: {ground, trail}, where trail is levels. Valid until the next call. */
   worldAt(moment) {
     const world = this.world;
     if (moment === world.moment) return world;
@@ -290,10 +290,10 @@ class History {
     }
   }
 
-  /* Where an ant of a number stands in the lists of a frame, -1 if it does not live then. */
+  /* The index of an ant in the arrays of a frame, -1 if it does not live then. */
   place(moment, number) {
     const numbers = this.frames[moment]?.numbers ?? [];
-    if (numbers[number] === number) return number; // nobody has died yet
+    if (numbers[number] === number) return number; // no ant has died yet
     let low = 0, high = numbers.length - 1;
     while (low <= high) {
       const middle = (low + high) >> 1;
@@ -304,13 +304,13 @@ class History {
     return -1;
   }
 
-  /* An ant at a moment, with what it does next: null if it does not live then.
+  /* An ant at a moment, with its next action; null if it does not live then.
 
-     {number, cell, heading, loaded, state, values, act}; act is null if it is not known, else
-     {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}: why is
-     "best", "tie" (of so many) or "explored", by the values at the time of the choice, which is a
-     tick ago if it was made ahead; the TD error is the mean of so many sharers; before and after
-     are what the entry of the table was and is. */
+     {number, cell, heading, loaded, state, values, act}; act is null if unknown, else
+     {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}. why is
+     "best", "tie" (of `ties` actions) or "explored", by the values at the time of the choice, one
+     tick earlier if it was made `ahead`. tdError is a mean over `sharers`; before and after are
+     action values. */
   ant(moment, number) {
     const i = this.place(moment, number);
     if (i < 0) return null;
@@ -327,7 +327,7 @@ class History {
   act(moment, i, ant) {
     const { header } = this, frame = this.frames[moment], next = this.frames[moment + 1];
     const action = next.acts[i] & 15, event = header.events[next.acts[i] >> 4];
-    // Some learners draw an action one tick ahead, by the values of that time.
+    // Some learners draw an action one tick ahead, from the values at that time.
     const ahead = header.draws_ahead && frame.tick > 0 && frame.passed === 1;
     const values = ahead ? this.row(moment - 1, ant.number, ant.state) : ant.values;
     const best = Math.max(...values), ties = values.filter((value) => value === best).length;

@@ -1,4 +1,4 @@
-"""The page: markup, style, script and a recording, put together into one file."""
+"""Pages: markup, style, script and a recording in a single file."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from taichi_ants.rendering.writers import check_single, write
 from taichi_ants.viewer.frames import Recording
 from taichi_ants.viewer.recorder import record_colony, record_trace
 
-# The parts of one script, in this order: what a part uses stands in those before it.
+# The parts of the script, in this order: each part uses only those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
 STYLES = ("colours.css", "viewer.css")
 _NOTEBOOK_HEIGHT = 720  # pixels
-# Notebooks show what is larger as text: a page inside of them would be too slow, or too large.
+# Above these limits, notebooks show text, because a page would be too slow or too large.
 _MOST_CELLS, _MOST_ANTS, _MOST_STEPS = 200_000, 20_000, 10_000
 
 
 @cache
 def part(name: str) -> str:
-    """The text of a part of the page, also for other pages that play a recording."""
+    """Return the text of a part of the page, which is a file in this folder."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 def page(recording: Recording) -> str:
-    """The page that plays a recording, with all that it needs, as HTML; AntsError if it is none."""
+    """Return the HTML page that plays a recording; raise AntsError if it is not a recording."""
     expect("recording", recording, Recording)
     return assemble(
         recording.header["title"], recording=base64.b64encode(recording.to_bytes()).decode()
@@ -43,8 +43,8 @@ def page(recording: Recording) -> str:
 def content_policy(script: str, style: str, connect: str = "") -> str:
     """Return the Content-Security-Policy of a page with one inline script and one inline style.
 
-    Nothing else runs or loads, and it connects to the address `connect` alone, "" for none. Style
-    attributes are allowed, because bars and drawings have their places and colours there.
+    It forbids any other script, style, file or connection, except to the address `connect` ("" for
+    none). Style attributes are allowed, because they position and colour bars and drawings.
     """
     digests = [hashlib.sha256(text.encode()).digest() for text in (script, style)]
     scripts, styles = (f"'sha256-{base64.b64encode(one).decode()}'" for one in digests)
@@ -65,10 +65,10 @@ def assemble(
     script: str = "",
     connect: str = "",
 ) -> str:
-    """The page with a recording, or with what is needed besides to show what runs now.
+    """Return the page with a recording, or with the parts of the live page.
 
-    `recording` is in base64, `controls` the markup at the side of the world; `style` and `script`
-    stand behind those of the viewer, and `connect` is as in `content_policy`.
+    `recording` is in base64, `controls` is markup for the side of the world. `style` and `script`
+    follow those of the viewer; `connect` is as in `content_policy`.
     """
     styles = "\n".join([*map(part, STYLES), style])
     scripts = "\n".join([*map(part, SCRIPTS), script])
@@ -87,36 +87,36 @@ def assemble(
 
 
 def check_page(path: files.PathLike) -> Path:
-    """Make sure, before the work begins, that `save_page` can write a page there."""
+    """Return the path of a page after checking that `save_page` can write it."""
     return check_single(path, "a page", ".html", ".htm")
 
 
 def save_page(path: files.PathLike, recording: Recording) -> None:
-    """Write the page that plays a recording; a file that exists is replaced.
+    """Write the page that plays a recording; an existing file is replaced.
 
     Raises:
-        AntsError: The file does not end in .html, or cannot be written.
+        AntsError: The file does not end in .html, or is not writable.
     """
     write(check_page(path), page(recording).encode())
 
 
 def frame(recording: Recording) -> str:
-    """The page inside a frame, for notebooks; raises as `page` does."""
+    """Return the page inside an HTML frame, for notebooks; raises as `page` does."""
     whole, title = html.escape(page(recording)), html.escape(recording.header["title"])
     size = f'width="100%" height="{_NOTEBOOK_HEIGHT}" style="border: 0"'
     return f'<iframe title="{title}" {size} srcdoc="{whole}"></iframe>'
 
 
 def notebook(shown: Any) -> str | None:
-    """Return what notebooks show of a recording, trace or colony; None if they show text.
+    """Return HTML that shows a recording, trace or colony; None if it is too large.
 
-    IPython calls it, see `taichi_ants.__init__`.
+    IPython calls this function, see `taichi_ants.__init__`.
     """
     if isinstance(shown, Recording):
         return frame(shown)
     if isinstance(shown, Trace):
         small = shown.made is not None and len(shown) <= _MOST_STEPS
         return frame(record_trace(shown)) if small else None
-    expect("what is shown", shown, Colony)
+    expect("the object", shown, Colony)
     small = shown.grid.size <= _MOST_CELLS and shown.ants <= _MOST_ANTS
     return frame(record_colony(shown)) if small and shown.episode >= 0 else None

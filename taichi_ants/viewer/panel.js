@@ -1,4 +1,4 @@
-/* What stands beside the world: the world now, the followed ant, the chosen cell, and the legend. */
+/* The panel: facts about the world, the followed ant, the chosen cell, and the legend. */
 
 const HOLDS = { [EMPTY]: "nothing", [OBSTACLE]: "a rock", [FOOD]: "food", [QUEEN]: "the queen" };
 const CAME = {
@@ -24,7 +24,7 @@ const icon = (name) => `<svg viewBox="0 0 20 20" aria-hidden="true">${ICONS[name
 const button = (id, label, name, more = "") =>
   `<button type="button" class="icon" id="${id}" aria-label="${label}" title="${label}" ${more}>${icon(name)}</button>`;
 
-/* Small changes in what a number is worth are told with more digits. */
+/* Show small changes of a number with more digits. */
 function digitsFor(a, b) {
   const gap = Math.abs(a - b);
   return gap === 0 || gap >= 0.01 ? 2 : Math.min(6, 1 - Math.floor(Math.log10(gap)));
@@ -50,7 +50,7 @@ class Panel {
   }
 
   show(moment, followed, cell, aims) {
-    // What had the focus before keeps it.
+    // Restore the focus.
     const focused = document.activeElement?.closest?.(".panel") ? document.activeElement.id : "";
     this.showWorld(moment);
     this.showAnt(moment, followed, aims);
@@ -90,7 +90,7 @@ class Panel {
     card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>This ant is not alive at this tick.</p>");
   }
 
-  /* An ant as it was when it did what it did last, a few moments ago at most. */
+  /* The ant at its last known action, at most a few moments ago. */
   lastAct(moment, number) {
     for (let then = moment - 1; then >= Math.max(moment - 5, this.history.first); then--) {
       const ant = this.history.ant(then, number);
@@ -102,7 +102,7 @@ class Panel {
   viewOf(ant) {
     const { header, world } = this.history;
     const { task, rest, letters } = this.history.stateName(ant.state);
-    let hides = false; // a trail that is there
+    let hides = false; // whether the ant does not see a trail that exists
     const shapes = header.view.map((turn, i) => {
       const angle = (turn * Math.PI) / 3, x = 1.732 * Math.sin(angle), y = -1.732 * Math.cos(angle);
       const cell = ant.cell + this.history.grid.offsets[(ant.heading + turn + 6) % 6], letter = letters[i] ?? "";
@@ -125,7 +125,7 @@ class Panel {
       + `<small>${safe(meaning)}</small></div></div>`;
   }
 
-  /* The colour of a cell, without the trail where an ant does not see that. */
+  /* The colour of a cell, without a trail that the ant does not see. */
   fillOf(cell, world, hidden) {
     const held = world.ground[cell];
     if (held === FOOD) return "var(--food-floor)";
@@ -200,7 +200,7 @@ class Panel {
       + lines.map(([name, value]) => `<dt>${name}</dt><dd>${value}</dd>`).join("") + "</dl>";
   }
 
-  /* One sentence for those who hear the page. */
+  /* A summary for screen readers. */
   sentence(moment, followed) {
     const frame = this.history.frames[moment];
     let said = `Tick ${frame.tick}, ${frame.deliveries} delivered${this.history.several ? " this episode" : ""}.`;
@@ -212,7 +212,7 @@ class Panel {
     return said;
   }
 
-  /* What the colours mean, in small. */
+  /* Show the legend of colours. */
   showLegend() {
     const cell = (fill, more = "") =>
       `<svg viewBox="-1.1 -1 2.2 2" aria-hidden="true"><path d="${HEXAGON}" fill="${fill}"/>${more}</svg>`;
@@ -228,7 +228,7 @@ class Panel {
   }
 }
 
-/* An ant that looks up, as part of an SVG. */
+/* An ant with heading up, as part of an SVG. */
 function antShape(loaded) {
   const half = `<path d="${LIMBS}" fill="none" stroke="var(--ant)" stroke-width=".07" stroke-linecap="round"/>`;
   const crumb = loaded ? '<circle cy="-.7" r=".25" fill="var(--food)"/>' : "";

@@ -1,6 +1,6 @@
-"""Records a colony while it runs: a frame for each moment, of what has changed since the last.
+"""Recording of a running colony, as frames of changes.
 
-An episode of one ant is played once more by a colony of one.
+A colony of one ant replays the episode of a trace.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
 from taichi_ants.viewer.frames import Recording, pack, types_of
 
-_MOST_NAMES = 4096  # of states that a header holds, seen or not
+_MOST_NAMES = 4096  # states up to which a header names all states, seen or not
 _MOST = 1000  # points of curves of each kind
 
 Point = tuple[float, ...]  # see `frames.POINT`
 
 
 class Progress:
-    """Points of one world of a colony: at the end of each episode, and within the first one."""
+    """Points of the curves of one world: at the ends of episodes, and within the first episode."""
 
     def __init__(self, colony: Colony, world: int) -> None:
         self._colony, self._world, self._first = colony, world, colony.episode
-        self._before = 0  # ticks of episodes that have ended
-        # Within the first episode, and at ends: the points that are kept, the first of each so
-        # many, and how many there were.
+        self._before = 0  # ticks of the episodes that have ended
+        # For points within the first episode, and at ends of episodes: the points, the interval at
+        # which points are stored, and the number of points so far.
         self._kept: tuple[list[Point], list[Point]] = ([], [])
         self._every, self._seen = [1, 1], [0, 0]
         self._new: list[Point] = []
 
     @property
     def ticks(self) -> int:
-        """How many have passed in all episodes."""
+        """The number of ticks in all episodes."""
         return self._before + self._colony.ticks
 
     def note(self, ended: bool = False) -> None:
-        """Remember how the colony is now; tell it each time before another episode begins."""
+        """Add a point for the present; call it with `ended` before another episode begins."""
         colony = self._colony
         if not ended and colony.episode != self._first:
             return
@@ -65,22 +65,22 @@ class Progress:
             self._before = self.ticks
 
     def news(self) -> list[Point]:
-        """The points since this was asked last."""
+        """Return the points since the last call."""
         new, self._new = self._new, []
         return new
 
     def points(self) -> list[Point]:
-        """All points that are kept, those at the ends of episodes last."""
+        """Return all stored points, those at the ends of episodes last."""
         return [*self._kept[False], *self._kept[True]]
 
 
 class Recorder:
-    """Makes frames of one world of a colony: `snapshot` of how it is, `tick` while time passes.
+    """Makes frames of one world of a colony: `snapshot` of the present, `tick` over time.
 
     Args:
-        colony: In an episode.
-        world: Which of its worlds; AntsError if there is no such world.
-        title: What the page is called; "" for a name of the colony.
+        colony: A colony in an episode.
+        world: The number of the world; AntsError if there is no such world.
+        title: The title of the page; "" for a description of the colony.
         follow: The number of the ant that the page follows at first.
     """
 
@@ -98,20 +98,20 @@ class Recorder:
         learner = learners.get(colony.training.learner)
         self._has_td_errors = learner.td_error is not None and not learner.plans
         self._draws_ahead = self._learns and learner.draws_next_action
-        # What a page that has read all frames so far knows.
+        # The data of a page that has read all frames so far.
         self._numbers = np.zeros(0, np.int32)
         self._ground = np.zeros(self.grid.size, np.uint8)
         self._trail = np.zeros(self.grid.size, start.trail.dtype)  # as it is stored
         owners = colony.capacity if colony.one_a_slot else 1
-        self._known = np.zeros(owners * self._n_states, bool)  # rows of tables
+        self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
         self._table = np.full((owners * self._n_states, N_ACTIONS), np.nan, np.float32)
         self._owners = np.full(owners, -1 if colony.one_a_slot else 0)
         self._fixed: np.ndarray | None = None
-        self._fixed = None if self._learns else self._tables()  # read once where nobody learns
+        self._fixed = None if self._learns else self._tables()  # constant if no ant learns
         self.progress = Progress(colony, world)
 
     def header(self) -> dict[str, Any]:
-        """What all frames are about, as JSON can hold it."""
+        """Return facts about all frames, JSON-compatible."""
         colony, task = self.colony, self.colony.task
         changes = task.life.births or task.life.lifespan
         ants = "Ants" if changes else count(colony.ants, "ant")
@@ -136,25 +136,24 @@ class Recorder:
         }
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
-        """The `name_parts` of the states seen, of all if they are few, but not of those `known`."""
+        """Return the `name_parts` of states seen, or of all if they are few, except `known`."""
         few = self._n_states <= _MOST_NAMES
         seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
         named = range(self._n_states) if few else seen
         return {s: name_parts(self.colony.task.sees, s) for s in named if s not in known}
 
     def _about(self) -> list[tuple[str, str]]:
-        """Lines about the colony, names and values."""
         colony, config = self.colony, self.colony.training
         x, y, z = self.grid.ranges
         lines = {
             "world": f"{self.grid.count} cells, ranges {x}, {y}, {z}",
-            "ants at first": str(colony.ants),
+            "ants at the start": str(colony.ants),
             "seed": str(colony.seeds[self.world]),
-            "they see": f"{colony.task.sees.name}, {self._n_states} states",
+            "observation": f"{colony.task.sees.name}, {self._n_states} states",
         }
         if self._learns:
             lines["learner"] = learners.label(config.learner)
-            lines["table"] = "each has its own" if colony.one_a_slot else "one for all"
+            lines["table"] = "one per ant" if colony.one_a_slot else "shared"
             lines["learning rate"] = f"{config.learning_rate:g}"
             lines["discount"] = f"{config.discount:g}"
         else:
@@ -162,11 +161,11 @@ class Recorder:
         return [*lines.items()]
 
     def snapshot(self) -> bytes:
-        """A frame of the colony as it is now: the first one, or after an intervention."""
+        """Return a frame of the present: the first frame, or after an intervention."""
         return self._frame({})
 
     def whole(self) -> bytes:
-        """A frame of the colony as it was in the last one, for a page that has read none."""
+        """Return the last frame with all data, not only changes, for a page without frames."""
         late = copy.copy(self)
         late._numbers = self._numbers[:0]
         late._ground, late._trail = np.zeros_like(self._ground), np.zeros_like(self._trail)
@@ -175,9 +174,9 @@ class Recorder:
         return late._frame({"progress": self.progress.points()})
 
     def tick(self, n: int = 1, td_errors: np.ndarray | None = None) -> bytes:
-        """Let n ticks pass and return a frame; what ants did is in it only where n is 1.
+        """Return a frame after n more ticks; it has the actions of ants only if n is 1.
 
-        `td_errors` are of each ant, in the order of their numbers, if they are known.
+        `td_errors` are the TD errors of ants in the order of their numbers, if known.
         """
         if n > 1:
             self.colony.tick(n)
@@ -186,7 +185,7 @@ class Recorder:
         states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
         before = self._tables()
         colony.tick()
-        # The dead have left their slots, but all is still written there.
+        # Slots of ants that died still hold their data.
         after = colony.numbers[self.world]
         order = np.argsort(after, kind="stable")
         places = order[np.searchsorted(after, numbers, sorter=order)]
@@ -197,26 +196,26 @@ class Recorder:
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})
 
     def _living(self) -> np.ndarray:
-        """The slots of the living ants in the order of their numbers."""
+        """Return the slots of living ants in the order of their numbers."""
         (slots,) = np.nonzero(self.colony.living[self.world])
         return slots[np.argsort(self.colony.numbers[self.world, slots], kind="stable")]
 
     def _tables(self) -> np.ndarray:
-        """The rows of all tables, float32 (owners * n_states, 5)."""
+        """Return the rows of all tables, float32 (owners * n_states, 5)."""
         if self._fixed is not None:
             return self._fixed
         return self.colony.q_values[self.world].reshape(-1, N_ACTIONS)
 
     def _rows(self, slots: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """Where the states of ants stand in `_tables`."""
+        """Return the rows of `_tables` that hold the states of ants."""
         return slots * self._n_states + states if self.colony.one_a_slot else states
 
     def _td_errors(
         self, before: np.ndarray, slots: np.ndarray, states: np.ndarray, actions: np.ndarray
     ) -> np.ndarray:
-        """The TD errors by which the values of the pairs moved, the mean of all ants of a pair.
+        """Return the TD error of each ant; ants with the same state and action get their mean.
 
-        NaN for learners that do more than one update a step, and where the learning rate is 0.
+        NaN for learners with more than one update per step, and if the learning rate is 0.
         """
         if not self._has_td_errors:
             return np.full(len(slots), np.nan)
@@ -228,7 +227,7 @@ class Recorder:
         return np.divide(moved, weights, out=np.full(len(moved), np.nan), where=weights > 0)
 
     def _frame(self, sections: dict[str, Any]) -> bytes:
-        """What has changed since the last frame, with what the ants did."""
+        """Return a frame of the changes since the last one, added to `sections`."""
         colony, snapshot = self.colony, self.colony.snapshot(self.world)
         outcome, slots = colony.outcome(), self._living()
         numbers = colony.numbers[self.world, slots]
@@ -255,8 +254,8 @@ class Recorder:
     def _table_changes(
         self, slots: np.ndarray, numbers: np.ndarray, states: np.ndarray
     ) -> dict[str, np.ndarray]:
-        """The action values of states that ants came into so far, where they have changed."""
-        if self.colony.one_a_slot:  # of the ant that lives there now
+        """Return changed action values of the states that ants have visited."""
+        if self.colony.one_a_slot:  # a slot's table belongs to the ant that lives there now
             new = slots[self._owners[slots] != numbers]
             self._owners[slots] = numbers
             self._known.reshape(-1, self._n_states)[new] = False
@@ -272,7 +271,7 @@ class Recorder:
 
 
 def _changes(name: str, old: np.ndarray, new: np.ndarray) -> dict[str, np.ndarray]:
-    """Where an array has changed, and what it holds there."""
+    """Return the indices at which an array has changed, and its values there."""
     places = np.flatnonzero(old != new)
     return {f"{name}_at": places, name: new[places]}
 
@@ -287,13 +286,13 @@ def record_colony(
     follow: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
-    """What a colony does from now on, as a recording; other arguments are those of `Recorder`.
+    """Return a recording of a colony's next ticks; other arguments are those of `Recorder`.
 
     Args:
-        colony: In an episode; it is moved on by `ticks`.
-        ticks: How many; 0 gives the moment as it is.
-        frame_interval: Ticks from one moment to the next; at 1, what each ant did is known.
-        progress: Called after each moment with the share of the work that is done.
+        colony: A colony in an episode; it advances by `ticks`.
+        ticks: The number of ticks; 0 records only the present.
+        frame_interval: Ticks between frames; only 1 records the action of each ant.
+        progress: Called after each frame with the completed share of the work.
 
     Raises:
         AntsError: A number is not allowed, or no episode has begun.
@@ -311,25 +310,25 @@ def record_colony(
 
 
 def record_episode(episode: Episode, title: str = "") -> Recording:
-    """An episode in which one ant follows a policy."""
+    """Return a recording of an episode in which one ant follows a policy."""
     expect("episode", episode, Episode)
     return record_trace(episode.trace, title)
 
 
 def record_trace(trace: Trace, title: str = "") -> Recording:
-    """A trace of `rollout` or `trace_training`, with its TD errors; AntsError if it is another."""
+    """Return a recording of a `rollout` or `trace_training`; AntsError for any other trace."""
     expect("trace", trace, Trace)
     made = trace.made
     if made is None:
         raise AntsError(
-            "the trace does not say how it was made, so it cannot be played again; take one of "
+            "the trace does not say how it was made, so it cannot be replayed; use a trace of "
             "rollout or trace_training."
         )
     expect("title", title, str)
     if made.config is None:
         title = title or "One ant that follows a policy"
         return record_colony(colony_of_rollout(made), len(trace), title=title, follow=0)
-    # A colony of one ant with a table of its own learns as it did.
+    # A colony of one ant with an independent table repeats the training.
     options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
     colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
     colony.begin_episode(made.max_steps)

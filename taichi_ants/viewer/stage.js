@@ -1,16 +1,15 @@
-/* The picture of the world. The cells are pixels: which cell a pixel belongs to is worked out once for
-   a view, so that another moment only takes new colours. Ants, and what is said of the followed one,
-   are drawn on a second canvas above. The outlines are those of rendering/raster_kernels.py, the colours
-   are those of the style sheet. */
+/* The picture of the world. The cell of each pixel is computed once per view, so another moment needs
+   only new colours. Ants and marks are drawn on a second canvas above. Outlines are those of
+   rendering/raster_kernels.py, colours are those of the style sheet. */
 
-const DOTS_BELOW = 2.1, DRAWN_FROM = 9; // pixels, of an ant; between them it is an arrowhead
-const ANT = 0.83; // its radius in one of a cell
-const SEEN = 5.5; // pixels, of an ant that one sees at a glance
-const CROWDED = 0.06; // of the world, by ants that are larger than their cells
-const DRAWINGS_FROM = 6; // in smaller cells food is a dot; they are wholly coloured by the queen
-const CRUMB = 1.4, CRUMB_RING = 1.8; // pixels: the least radius of such a dot, and the width of its ring
-const MOST_PIXELS = 3e6; // of the cells; sharper screens get coarser ones
-const INSIDE = 7; // how much of a pixel its cell covers, in sevenths; the rest is a line
+const DOTS_BELOW = 2.1, DRAWN_FROM = 9; // radius of an ant in pixels; between them it is an arrowhead
+const ANT = 0.83; // radius of an ant as a share of its cell
+const SEEN = 5.5; // pixels, the radius of an ant that is easily visible
+const CROWDED = 0.06; // largest share of the world covered by ants that are larger than their cells
+const DRAWINGS_FROM = 6; // in smaller cells, food is a dot and the queen is a filled cell
+const CRUMB = 1.4, CRUMB_RING = 1.8; // pixels: minimum radius of such a dot, width of its ring
+const MOST_PIXELS = 3e6; // pixels of the cells, also on sharper screens
+const INSIDE = 7; // largest coverage of a pixel by its cell, in sevenths; the remainder is a line
 const COLOURS = [
   "page", "empty", "rock", "food", "queen", "food-floor", "queen-floor", "ant", "halo", "loaded-dot",
   "ink", "chosen", "mark",
@@ -23,28 +22,28 @@ class Stage {
     this.history = history;
     this.grid = history.grid;
     this.camera = { x: 0, y: 0, scale: 10 }; // the scale is in pixels of the page
-    this.fitted = true; // until somebody pans or zooms
-    this.covered = 0; // pixels at the top, by tools
-    this.shown = ""; // the moment and the view whose cells are drawn
+    this.fitted = true; // until the user pans or zooms
+    this.covered = 0; // pixels at the top that tools cover
+    this.shown = ""; // the moment and the view of the drawn cells
     this.laidOut = "";
     this.foods = [];
     this.queens = [];
     this.exists = Uint8Array.from({ length: this.grid.size }, (_, cell) => (this.grid.exists(cell) ? 1 : 0));
     this.count = this.exists.reduce((sum, one) => sum + one);
     this.fills = new Uint32Array(this.grid.size);
-    // It is written by this script alone, never by a graphics processor.
+    // Only this script writes pixels, so the canvas should not be on a graphics processor.
     this.context = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
     this.above = overlay.getContext("2d");
     this.readColours();
   }
 
-  /* Take the colours from the style sheet; to be called when the theme has changed. */
+  /* Read the colours from the style sheet; call it after a change of the theme. */
   readColours() {
     const style = getComputedStyle(document.documentElement);
     const read = (name) => style.getPropertyValue(`--${name}`).trim();
     this.colours = Object.fromEntries(COLOURS.map((name) => [name, read(name)]));
     this.words = Object.fromEntries(COLOURS.map((name) => [name, word(...bytesOf(this.colours[name]))]));
-    // The trail from just above 0 to the strongest that is shown.
+    // Colours of trails from just above 0 to the strongest one.
     const samples = read("trail").split(/\s+/).map(bytesOf), last = samples.length - 1;
     this.ramp = Array.from({ length: 256 }, (_, i) => {
       const place = (i / 255) * last, k = Math.min(Math.floor(place), last - 1);
@@ -60,14 +59,14 @@ class Stage {
     return Math.round(Math.min(level / this.history.header.strongest, 1) * 255);
   }
 
-  /* Take the size from the page; whether it has changed. */
+  /* Read the size from the page; return whether it has changed. */
   resize() {
     const width = Math.max(1, this.canvas.clientWidth), height = Math.max(1, this.canvas.clientHeight);
     const ratio = Math.min(window.devicePixelRatio || 1, 3), size = `${width} ${height} ${ratio}`;
     if (size === this.size) return false;
     Object.assign(this, { width, height, size });
     this.ratio = Math.min(ratio, Math.sqrt(MOST_PIXELS / (this.width * this.height)));
-    this.sharpness = Math.min(ratio, 2); // of what is drawn above the cells
+    this.sharpness = Math.min(ratio, 2); // of the second canvas
     this.canvas.width = Math.round(this.width * this.ratio);
     this.canvas.height = Math.round(this.height * this.ratio);
     this.overlay.width = Math.round(this.width * this.sharpness);
@@ -116,7 +115,7 @@ class Stage {
     camera.y = Math.min(Math.max(camera.y, grid.top), grid.bottom);
   }
 
-  /* Where a point of the world lies on the page, and the other way round. */
+  /* Convert a point of the world to the page, and back. */
   toPage([x, y]) {
     const { camera } = this;
     return [(x - camera.x) * camera.scale + this.width / 2, (y - camera.y) * camera.scale + this.height / 2];
@@ -126,7 +125,7 @@ class Stage {
     return this.grid.at((x - this.width / 2) / camera.scale + camera.x, (y - this.height / 2) / camera.scale + camera.y);
   }
 
-  /* Draw a moment, with ants a share of the way to the next one; marks are what is said of one. */
+  /* Draw a moment, with ants a share of the way to the next moment, and marks of the followed ant. */
   draw(moment, share, marks) {
     const { camera, above, sharpness } = this, view = `${camera.x} ${camera.y} ${camera.scale}`;
     if (this.shown !== `${moment} ${view}`) {
@@ -142,7 +141,7 @@ class Stage {
     this.drawMarks(share, marks);
   }
 
-  /* Find the cell of each pixel of a view, and how much of the pixel it covers. */
+  /* Find the cell of each pixel of a view, and its coverage of the pixel. */
   layOut(view) {
     if (this.laidOut === view) return;
     this.laidOut = view;
@@ -150,11 +149,11 @@ class Stage {
     if (this.image?.width !== width || this.image?.height !== height) {
       this.image = this.context.createImageData(width, height);
       this.pixels = new Uint32Array(this.image.data.buffer);
-      this.cells = new Int32Array(width * height); // 8 * cell + cover, -1 outside of the world
+      this.cells = new Int32Array(width * height); // 8 * cell + coverage, -1 outside the world
     }
     this.pixels.fill(this.words.page);
     const { cells } = this, scale = camera.scale * ratio, root = Math.sqrt(3);
-    // The lines between cells fade away where these are small, and do not grow for ever.
+    // The lines between cells vanish in small cells, and are at most 3 pixels wide.
     const line = Math.min(Math.max(0.09 * camera.scale - 0.25, 0), 3) * ratio;
     for (let j = 0, i = 0; j < height; j++) {
       const y = (j + 0.5 - height / 2) / scale + camera.y, up = y / root;
@@ -202,7 +201,7 @@ class Stage {
       const fill = fills[at >> 3], covered = at & 7;
       if (covered === INSIDE) pixels[i] = fill;
       else {
-        // Two of the four bytes at a time, in eighths.
+        // Blends two of the four bytes at a time, in eighths.
         const k = covered + (covered >> 2), rest = 8 - k;
         pixels[i] = ((((fill & 0xff00ff) * k + even * rest) >>> 3) & 0xff00ff)
           | ((((((fill >>> 8) & 0xff00ff) * k + odd * rest) >>> 3) & 0xff00ff) << 8);
@@ -212,7 +211,7 @@ class Stage {
     if (small) this.drawCrumbs();
   }
 
-  /* Food in small cells: dots with a ring. Some trails are as light as food, none is as light as both. */
+  /* Food in small cells: dots with a ring, which distinguishes them from trails as light as the dot. */
   drawCrumbs() {
     const { context, camera, grid, ratio, colours } = this;
     const radius = Math.max(0.6 * camera.scale, CRUMB);
@@ -230,7 +229,7 @@ class Stage {
     context.setTransform(1, 0, 0, 1, 0, 0);
   }
 
-  /* A drawing of a radius in pixels, made once; the same as a picture to copy. */
+  /* A drawing with a radius in pixels, cached as a canvas to copy. */
   sprite(name, radius, paint) {
     const key = `${name} ${radius.toFixed(2)}`;
     if (!this.sprites.has(key)) {
@@ -247,7 +246,7 @@ class Stage {
     return this.sprites.get(key);
   }
 
-  /* Whether a place on the page is in sight. */
+  /* Whether a point of the page is visible. */
   sees([x, y]) {
     const { scale } = this.camera;
     return x > -scale && y > -scale && x < this.width + scale && y < this.height + scale;
@@ -269,7 +268,7 @@ class Stage {
     }
   }
 
-  /* The radius of ants: where cells are small, larger than these, as long as the world stays in sight. */
+  /* The radius of ants; in small cells they are larger than these, unless they would hide the world. */
   antRadius(ants) {
     const { scale } = this.camera, cells = 2.6 * scale ** 2 * this.count; // square pixels
     return Math.max(ANT * scale, Math.min(SEEN, Math.sqrt((CROWDED * cells) / (2 * Math.max(ants, 1)))));
@@ -306,7 +305,7 @@ class Stage {
     }
     above.setTransform(sharpness, 0, 0, sharpness, 0, 0);
     if (!dots) return;
-    // Dots that would hide the world and each other become a shade.
+    // Crowded dots would hide the world, so they become transparent.
     const covered = (frame.cells.length * side ** 2) / (grid.size * 2.6 * camera.scale ** 2);
     above.globalAlpha = Math.min(1, 0.6 * Math.max(covered, 1e-9) ** -0.5);
     ["ant", "loaded-dot"].forEach((colour, loaded) => {
@@ -318,10 +317,10 @@ class Stage {
 
   antSprite(loaded, radius) {
     const { colours } = this;
-    // A line of the colour of the page sets ants apart from a dark trail.
+    // A line in the colour of the page separates ants from a dark trail.
     const large = radius >= DRAWN_FROM, edge = large ? Math.min(0.11, 2 / radius) : 2 / radius;
     const crumb = circle(0, -0.7, large ? 0.25 : 0.34), body = new Path2D(large ? BODY : DART);
-    const ink = loaded && !large ? colours["loaded-dot"] : colours.ant; // a crumb alone is too small to be seen
+    const ink = loaded && !large ? colours["loaded-dot"] : colours.ant; // food alone would be too small to see
     return this.sprite(`ant ${loaded}`, radius, (context) => {
       const legs = new Path2D(LIMBS), sides = large ? [1, -1] : [];
       for (const [colour, food, more] of [[colours.halo, colours.halo, edge], [ink, colours.food, 0]]) {
@@ -362,7 +361,7 @@ class Stage {
   drawMarks(share, { ant, next, letters, cell, cursor, tool = [] }) {
     const { above, grid, colours, camera } = this;
     above.lineJoin = "round";
-    // Where cells are small, a ring shows where the queen is.
+    // In small cells, a ring marks the queen.
     for (const queen of camera.scale < DRAWINGS_FROM ? this.queens : []) {
       this.outline(queen, 9);
       this.stroke("halo", 5);
@@ -384,7 +383,7 @@ class Stage {
     above.arc(...this.toPage([x0 + share * (x1 - x0), y0 + share * (y1 - y0)]), Math.max(1.02 * camera.scale, 9), 0, 2 * Math.PI);
     this.stroke("halo", 5.5);
     this.stroke("chosen", 2.5);
-    if (camera.scale < 7 || share > 0) return; // what it sees belongs to where it stands
+    if (camera.scale < 7 || share > 0) return; // the view belongs to the ant's cell, not to points between cells
     this.history.header.view.forEach((turn, i) => {
       const seen = ant.cell + grid.offsets[(ant.heading + turn + 6) % 6];
       this.outline(seen, 0.93 * camera.scale);
@@ -409,7 +408,7 @@ class Stage {
     places[0] = [x0 + away * (x1 - x0), y0 + away * (y1 - y0)]; // not over the ant itself
     const width = Math.min(Math.max(0.16 * this.camera.scale, 2), 5), parts = Math.min(24, places.length - 1);
     context.lineCap = "butt";
-    // A light edge, for dark trails, then the line; the older, the fainter.
+    // A light edge, for dark trails, then the line, which is fainter in older parts.
     for (const [colour, more] of [["halo", 2.5], ["chosen", 0]]) {
       context.strokeStyle = this.colours[colour];
       context.lineWidth = width + more;
@@ -426,8 +425,8 @@ class Stage {
   }
 }
 
-// The outlines within the unit circle; ants look up. Legs and antennae are those of the right side.
-const DOT = 1.3; // pixels, the radius of an ant in cells that are too small for it
+// Outlines within the unit circle, for ants with heading up. Legs and antennae are of the right side.
+const DOT = 1.3; // pixels, the radius of an ant that is a dot
 const LIMBS = "M.08-.16.42-.34.56-.66M.08-.06.48-.02.74.2M.08.04.44.26.58.7M.07-.48.17-.68.3-.86";
 const oval = (y, a, b) => `M${-a} ${y}a${a} ${b} 0 1 0 ${2 * a} 0a${a} ${b} 0 1 0 ${-2 * a} 0z`;
 const BODY = oval(-0.37, 0.19, 0.17) + oval(-0.06, 0.13, 0.2) + oval(0.45, 0.27, 0.39);
@@ -449,7 +448,7 @@ function bytesOf(hex) {
   return [number >> 16, (number >> 8) & 255, number & 255];
 }
 
-/* A colour as it lies in the pixels of an image. */
+/* A colour in the format of the pixels of an image. */
 function word(red, green, blue) {
   return ((255 << 24) | (blue << 16) | (green << 8) | red) >>> 0;
 }

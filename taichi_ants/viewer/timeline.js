@@ -1,13 +1,13 @@
-/* Time: where in the recording the page is, how fast it goes on, what happened when, and curves. */
+/* The timeline: position, speed, events and curves. */
 
-/* Name, name where there are several episodes, key of a frame or a point, digits. */
+/* Name, name if there are several episodes, key of a frame or a point, digits. */
 const CURVES = [
   ["delivered", "delivered in total", "delivered", 0],
   ["return", "return by episode", "returns", 0],
   ["epsilon", "epsilon", "epsilon", 3],
 ];
-const SLOWEST = 0.5, FASTEST = 200; // ticks a second
-const SMOOTH_BELOW = 24; // ticks a second: ants glide from cell to cell
+const SLOWEST = 0.5, FASTEST = 200; // ticks/s
+const SMOOTH_BELOW = 24; // ticks/s up to which ants glide from cell to cell
 
 class Player {
   constructor(history, changed) {
@@ -37,7 +37,7 @@ class Player {
   }
   step(n) {
     this.pause();
-    // Back from between two moments leads to the first of them.
+    // A step back from between two moments leads to the first of them.
     this.go(this.moment + n + (n < 0 && this.share > 0 ? 1 : 0));
   }
   play() {
@@ -51,7 +51,7 @@ class Player {
     this.share = 0;
     this.changed();
   }
-  /* Let some seconds pass; whether anything moves. */
+  /* Advance by some seconds; return whether anything moves. */
   pass(seconds) {
     if (!this.playing) return false;
     this.share += Math.min(seconds, 0.25) * this.speed;
@@ -87,7 +87,7 @@ class Timeline {
           <line class="cursor" y1="0" y2="100"/>
         </svg></div>`).join("");
     this.curves = [...document.querySelectorAll(".curve")];
-    // Who only follows a policy has no curve of epsilon.
+    // There is no curve of epsilon if it is always 0.
     const explores = history.live || history.frames.some((frame) => frame.epsilon > 0);
     this.curves.forEach((curve, number) => (curve.hidden = CURVES[number][0] === "epsilon" && !explores));
     for (const curve of this.curves) {
@@ -109,25 +109,25 @@ class Timeline {
     this.draw();
   }
 
-  /* Ticks over all episodes, of a moment: what lies left and right on the page. */
+  /* Ticks over all episodes at a moment, which the horizontal axis shows. */
   ticks(moment) {
     return this.history.frames[moment].ticks;
   }
 
-  /* Ticks between two moments, on average; a recording may leave most of them out. */
+  /* Mean ticks between two moments; a recording may skip most ticks. */
   get ticksAMoment() {
     const { history, player } = this;
     const passed = history.live ? 1 : (this.ticks(player.last) - this.ticks(0)) / Math.max(player.last, 1);
     return passed > 1.5 ? passed : 1;
   }
 
-  /* How far to the right so many ticks are, in percent. */
+  /* The horizontal position of a number of ticks, in percent. */
   across(ticks) {
     const { origin } = this.history;
     return (100 * (ticks - origin)) / Math.max(this.ticks(this.player.last) - origin, 1);
   }
 
-  /* Where the slider was put; a key that moves it by a tick leads to another moment in any case. */
+  /* Go to the position of the slider; a step forward always leads to another moment. */
   seek(ticks) {
     const { player, history } = this, moment = history.momentAt(ticks);
     const on = ticks > this.ticks(player.moment) && moment === player.moment;
@@ -151,7 +151,7 @@ class Timeline {
     this.speed.setAttribute("aria-valuetext", unlimited ? "as fast as possible" : `${shown.split(" ")[0]} ticks/s`);
   }
 
-  /* Draw the events and the curves, as far as the history goes. */
+  /* Draw the events and the curves of the history so far. */
   draw() {
     const { history, player } = this;
     this.drawn = history.length;
@@ -169,7 +169,7 @@ class Timeline {
     const every = Math.ceil(history.length / MOST_POINTS), picked = [];
     for (let i = 0; i < history.length; i += every) picked.push(i);
     if (picked[picked.length - 1] !== history.length - 1) picked.push(history.length - 1);
-    // A page that came late has points of what was before its first frame.
+    // A page opened later has points from before its first frame.
     const early = [...history.within, ...history.ends].filter(({ ticks }) => ticks < this.ticks(0));
     const known = [...early, ...picked.map((i) => history.frames[i])];
     this.curves.forEach((curve, number) => {

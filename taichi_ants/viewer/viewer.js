@@ -1,4 +1,4 @@
-/* The page: a source of frames, and what people do with mouse, fingers and keys. */
+/* The page: frames of a source, and input by mouse, touch and keys. */
 
 const KEYS = [
   ["Space", "play or pause"],
@@ -17,30 +17,30 @@ const KEYS = [
   ["Esc", "stop following; close"],
   ["?", "show this help"],
 ];
-const CURSOR = { u: 5, i: 0, o: 1, j: 4, k: 3, l: 2 }; // headings, as the keys lie
-const PANEL_SHARE = 0.5; // of the time, which the text beside the world may take while playing
+const CURSOR = { u: 5, i: 0, o: 1, j: 4, k: 3, l: 2 }; // headings, in the layout of the keys
+const PANEL_SHARE = 0.5; // largest share of time for updates of the panel while playing
 
 class Viewer {
   constructor(source) {
     this.source = source;
     this.history = new History(source.header);
     this.history.live = source.live;
-    this.closing = new AbortController(); // takes all listeners away
-    this.tool = null; // {down(cell), move(cell), up()}: what the mouse does besides looking
+    this.closing = new AbortController(); // removes all listeners
+    this.tool = null; // {down(cell), move(cell), up()}: a drawing tool
     this.followed = -1;
     this.cell = -1;
-    this.cursor = false; // whether the chosen cell is the one of the keyboard
+    this.cursor = false; // whether the chosen cell is the keyboard cursor
     this.aims = false;
     this.dirty = true;
-    this.frames = 0; // drawn so far, for measurements
-    this.panelTells = -1; // of which moment
+    this.frames = 0; // number of drawn frames, for measurements
+    this.panelTells = -1; // the moment that the panel shows
     this.panelDue = -Infinity; // milliseconds
     this.still = matchMedia("(prefers-reduced-motion: reduce)");
     source.start((bytes, whole) => this.receive(bytes, whole));
   }
 
-  /* Whether the page is out of date. If so, it is drawn in the next frame of the screen: a page on
-     which nothing changes does nothing. */
+  /* Whether the page is out of date. If so, it is drawn in the next frame of the screen. A page
+     without changes does nothing. */
   get dirty() {
     return this.asks;
   }
@@ -58,12 +58,12 @@ class Viewer {
     this.dirty = true;
   }
 
-  /* Leave the page to another one. */
+  /* Give up the page to another viewer. */
   close() {
     this.closing.abort();
   }
 
-  /* Build the page around the frames that are there; at least one is. */
+  /* Build the page from at least one frame. */
   open() {
     const { header } = this.history;
     document.title = byId("title").textContent = header.title;
@@ -96,7 +96,7 @@ class Viewer {
     if (this.closing.signal.aborted) return;
     const passed = (now - (this.before ?? now)) / 1000;
     const moved = this.player.pass(passed), goesOn = moved || this.player.playing;
-    this.before = goesOn ? now : null; // time stands still until the next change
+    this.before = goesOn ? now : null; // null pauses time until the next change
     if (moved || this.dirty) this.draw(now, moved);
     if (goesOn) this.wake();
   }
@@ -117,7 +117,7 @@ class Viewer {
     });
     this.frames++;
     this.source.seen?.();
-    // The text tells of the same moment, but where writing it takes too long while time goes on.
+    // The panel shows the same moment, unless its updates would take too long while playing.
     if (moved && player.playing) {
       if (moment === this.panelTells && !asked) return;
       if (now < this.panelDue) {
@@ -171,7 +171,7 @@ class Viewer {
     this.dirty = true;
   }
 
-  /* The ant nearest to a point of the page, if it is near enough for a finger; else the cell. */
+  /* Choose the ant nearest to a point of the page, if near enough for a finger, else the cell. */
   chooseAt(x, y) {
     const { numbers, cells } = this.history.frames[this.player.moment], { stage, history } = this;
     let nearest = -1, least = Math.max(0.85 * stage.camera.scale, 9);
@@ -201,7 +201,7 @@ class Viewer {
     const found = step > 0 ? events.find((one) => one.moment - 1 > moment) : events.findLast((one) => one.moment - 1 < moment);
     if (!found) return;
     this.player.pause();
-    this.player.go(found.moment - 1); // before it happens, so that one sees why
+    this.player.go(found.moment - 1); // the moment before, to show the reason
     if (this.history.frames[moment].ants > 1 || this.followed < 0) this.follow(found.ant);
   }
 
@@ -213,7 +213,7 @@ class Viewer {
     }
   }
 
-  /* "light", "dark", or "" for what the system wants. */
+  /* Set the theme to "light", "dark", or "" for that of the system. */
   setTheme(theme) {
     this.theme = theme;
     const dark = theme ? theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
@@ -234,7 +234,7 @@ class Viewer {
     try {
       localStorage.setItem("taichi-ants-theme", this.theme);
     } catch {
-      // It lasts as long as the page.
+      // Without storage, the theme lasts as long as the page.
     }
   }
 
@@ -245,7 +245,7 @@ class Viewer {
       act();
       this.dirty = true;
     };
-    // Drawn at once: a canvas is empty after its size has changed.
+    // Draw at once, because a canvas is empty after a change of its size.
     const observer = new ResizeObserver(() => stage.resize() && this.draw(performance.now(), false));
     observer.observe(world);
     on(signal, "abort", () => observer.disconnect());
@@ -254,10 +254,10 @@ class Viewer {
     on(byId("zoom-out"), "click", change(() => stage.zoom(1 / 1.4)));
     on(byId("fit"), "click", change(() => stage.fit()));
     on(byId("skip"), "click", () => byId("play").focus());
-    // Paper is light, and shows what the page shows; a canvas does not follow the style sheet by itself.
+    // Print in the light theme. A canvas does not follow the style sheet by itself.
     on(window, "beforeprint", () => {
       this.wear("light");
-      this.draw(performance.now(), false); // no frame of the screen comes before the print
+      this.draw(performance.now(), false); // there is no frame of the screen before the print
     });
     on(window, "afterprint", () => this.setTheme(this.theme));
     on(byId("theme"), "click", () => this.switchTheme());
@@ -268,8 +268,8 @@ class Viewer {
   }
 
   listenToPointers(world, on) {
-    const held = new Map(); // the fingers, or the mouse, that are down
-    let moved = 0, works = false; // whether the tool is at work
+    const held = new Map(); // fingers or mouse buttons that are down
+    let moved = 0, works = false; // whether the tool is drawing
     const place = (event) => {
       const box = world.getBoundingClientRect();
       return [event.clientX - box.left, event.clientY - box.top];
@@ -289,7 +289,7 @@ class Viewer {
     });
     on(world, "pointermove", (event) => {
       if (this.tool && (works || !held.size)) {
-        // All cells on the way, also where the mouse is quick.
+        // Include all cells on the way if the mouse is fast.
         for (const one of event.getCoalescedEvents?.() ?? [event]) this.tool.move(this.stage.cellAt(...place(one)), works);
         this.dirty = true;
       }
@@ -350,7 +350,7 @@ class Viewer {
     };
     Object.assign(acts, this.source.acts);
     for (const [letter, heading] of Object.entries(CURSOR)) acts[letter] = () => this.moveCursor(heading);
-    // Sliders keep the keys that move them, buttons the keys that press them, fields all.
+    // Leave keys that move sliders, keys that press buttons, and all keys in text fields.
     if (inside.closest?.("textarea, select, input:not([type=range], [type=checkbox])")) return;
     if (slider && /^(Arrow|Home|End|Page)/.test(event.key)) return;
     if (pressable && (event.key === "Enter" || event.key === " ")) return;
@@ -373,8 +373,8 @@ class Viewer {
   }
 }
 
-/* Show a source; the page's own recording if it holds one. For tests and for those who look inside,
-   the viewer is `window.viewer`, once it is ready. */
+/* Show a source, by default the recording in the page. For tests and debugging, `window.viewer` is
+   the viewer once it is ready. */
 function show(source) {
   const viewer = new Viewer(source);
   viewer.open();

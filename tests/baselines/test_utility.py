@@ -114,7 +114,7 @@ def test_moments_count_from_one() -> None:
     [
         ({"ticks": 0}, "`ticks` is 0"),
         ({"ants": 1.5}, "`ants` is 1.5"),
-        ({"colonies": 10**8}, "need too much memory; choose fewer"),
+        ({"colonies": 10**8}, "need too much memory; choose fewer colonies"),
         ({"capacity": 0}, "`capacity` is 0; it must be between 1"),
         ({"discount": 1}, "`discount` is 1; it must be above 0"),
         ({"discount": "0.9"}, "`discount` is '0.9'; it must be a number"),

@@ -280,7 +280,7 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
             "`task.pheromone.cap` is 5; leave it out",
         ),
         (["live", "--task", "running"], "invalid choice: 'running'"),
-        (["live", "--figure", "a.gif"], "'a.gif' is to hold one picture"),
+        (["live", "--figure", "a.gif"], "'a.gif' cannot hold one picture"),
         (["live", "--figure", "/proc/x/a.png"], "cannot write '/proc/x/a.png'"),
         (["live", "--resume", "x"], "cannot read 'x'"),
         (["study", "--world-kinds", "moon"], "--world-kinds: invalid choice: 'moon' (choose from"),
@@ -306,7 +306,10 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         # Told before what comes later, as the work does.
         (["live", "--save", "/dev/null", "--resume", "x"], "'/dev/null' is not a regular file"),
         (["live", "--render", "../a.png/", "--resume", "x"], "'../a.png/' is not a regular file"),
-        (["live", "--render", ".", "--resume", "x"], "'.' exists already and is no empty folder"),
+        (
+            ["live", "--render", ".", "--resume", "x"],
+            "'.' already exists and is not an empty folder",
+        ),
         (
             ["live", "--task.pheromone.diffusion", 2],
             "`task.pheromone.diffusion` is 2; it must be between 0 and 1",

@@ -143,7 +143,7 @@ def test_learning_and_a_colony(tmp_path, run) -> None:
 WRONG = {
     "nothing to show": ([], "episode|colony|learning|sheet"),
     "something else": (["movie"], "'movie'"),
-    "ending": (["episode", "--out", "{}/a.avi"], ".gif, .mp4"),
+    "ending": (["episode", "--out", "{}/a.avi"], ".gif or .mp4"),
     "ending of a sheet": (["sheet", "--out", "{}/a.gif"], ".png"),
     "ending of learning": (["learning", "--out", "{}/a.png"], ".gif"),
     "place": (["episode", "--out", "/proc/nope/a.gif"], "cannot write"),
@@ -172,23 +172,29 @@ WRONG = {
     "checkpoints": (["learning", "--checkpoints", "5", "1", "--out", "{}/a.gif"], "ascend"),
     "order of checkpoints": (
         ["learning", "--checkpoints", "5", "2", "--out", "{}/a.gif"],
-        "checkpoints are (5, 2); they must ascend",
+        "checkpoints is (5, 2); it must be ascending numbers",
     ),
     "steps": (["episode", "--max-steps", "0"], "from 1 to"),
-    "training of a policy": (["sheet", "--policy", "a.npz", "--episodes", "5"], "--episodes is of"),
+    "training of a policy": (
+        ["sheet", "--policy", "a.npz", "--episodes", "5"],
+        "--episodes configures",
+    ),
     "learner of a policy": (
         ["colony", "--training.learner=sarsa", "--policy", "a.npz"],
-        "--training.learner is of",
+        "--training.learner configures",
     ),
     "observation of a policy": (
         ["episode", "--policy", "a.npz", "--task.observation", "paper"],
-        "--task.observation is of training",
+        "--task.observation configures training",
     ),
     "view of a plain picture": (
         ["colony", "--no-overlay", "--follow", "0"],
-        "--no-overlay leaves out what --follow shows",
+        "--follow has no effect with --no-overlay",
     ),
-    "title of a plain picture": (["episode", "--no-overlay", "--title", "a"], "what --title shows"),
+    "title of a plain picture": (
+        ["episode", "--no-overlay", "--title", "a"],
+        "--title has no effect",
+    ),
     "wrong number": (
         ["sheet", "--training.discount", "y", "--out", "{}/a.png"],
         "is 'y'; it must be",
@@ -291,7 +297,7 @@ def test_help_needs_little(run, kernels) -> None:
 def test_a_seed_that_is_named_is_not_chosen(capsys) -> None:
     with pytest.raises(SystemExit):
         render.parse_arguments(["learning", "--seed", "7", "--seeds", "20"])
-    assert "--seeds chooses the seed that is shown, but --seed names it" in capsys.readouterr().err
+    assert "--seeds selects the seed to show, but --seed sets it" in capsys.readouterr().err
 
 
 def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many_ants(

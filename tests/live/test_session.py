@@ -289,7 +289,7 @@ def test_exports_are_files_of_the_project(edited, tmp_path):
     policy = load_policy(tmp_path / "x")
     assert np.array_equal(policy.q_values, session.colony.q_values[0])
     assert policy.task == session.colony.task
-    with pytest.raises(AntsError, match="a table of its own"):
+    with pytest.raises(AntsError, match="has its own table"):
         edited["paper"].policy_bytes()
     for name, one in edited.items():
         (tmp_path / name).write_bytes(one.colony_bytes())

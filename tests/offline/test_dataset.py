@@ -79,10 +79,10 @@ def changed(data, name, row, value):
         ("action", 3, -1, "action of a data set runs from -1"),
         ("run", -1, 3, "run of a data set runs from 0 to 3"),
         ("behaviour_probability", 3, 0.0, "behaviour_probability of a data set"),
-        ("next_state", 3, 90, "do not stand one after the other"),
-        ("truncated", -1, False, "do not stand one after the other"),
-        ("agent", 3, 1, "do not stand one after the other"),
-        ("episode", 3, 1, "do not stand one after the other"),
+        ("next_state", 3, 90, "are not in order"),
+        ("truncated", -1, False, "are not in order"),
+        ("agent", 3, 1, "are not in order"),
+        ("episode", 3, 1, "are not in order"),
     ],
 )
 def test_arrays_that_do_not_belong_together_are_refused(data, name, row, value, says):

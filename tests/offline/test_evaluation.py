@@ -84,7 +84,7 @@ def test_what_cannot_be_judged():
     data = random_data(worlds.paper(), 6)
     table = np.zeros((128, 5))
     unknown = replace(data, behaviour_probability=np.full(len(data), np.nan))
-    with pytest.raises(AntsError, match="with which probability"):
+    with pytest.raises(AntsError, match="behaviour_probability of the data contains nan"):
         importance_sampling(unknown, table)
     assert np.isfinite(model_based(unknown, table).value)
     with pytest.raises(AntsError, match="q_values has shape"):

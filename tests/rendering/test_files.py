@@ -203,7 +203,7 @@ def test_an_old_file_survives_a_failure(tmp_path, frames) -> None:
 
 @pytest.mark.parametrize("name", ["a.avi", "a.png", "a.webp", "a.gif.zip", "a.7"])
 def test_wrong_endings(tmp_path, name) -> None:
-    with pytest.raises(AntsError, match=r"\.gif, \.mp4"):
+    with pytest.raises(AntsError, match=r"\.gif or \.mp4"):
         check_animation(tmp_path / name, 8)
     assert leftovers(tmp_path) == []
 
@@ -244,7 +244,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_frames_are_drawn(
     (tmp_path / "dangling").symlink_to(tmp_path / "nowhere")
     monkeypatch.chdir(tmp_path / "empty")
     before, path = leftovers(tmp_path), place if place in (".", "..", "") else tmp_path / place
-    with pytest.raises(AntsError, match="is no empty folder; name a new folder"):
+    with pytest.raises(AntsError, match="is not an empty folder; choose a new folder"):
         check_animation(path)
     assert leftovers(tmp_path) == before
 
@@ -268,7 +268,7 @@ def test_frames_must_fit(tmp_path, frames) -> None:
 def test_pictures_too_large_for_a_kind_of_file_are_refused(name, shape, tmp_path) -> None:
     pytest.importorskip("av")
     frame = np.zeros((*shape, 3), np.uint8)
-    with pytest.raises(AntsError, match=r"this kind of file has from . to .*, so choose another"):
+    with pytest.raises(AntsError, match=r"must be from . to .* for this file type, so choose"):
         save_animation(tmp_path / name, [frame])
     assert leftovers(tmp_path) == []
     save_picture(tmp_path / "a.png", frame)

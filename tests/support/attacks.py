@@ -1,4 +1,4 @@
-"""Small files of sessions that would take much time or memory if nobody measured them first."""
+"""Small session files that would need much time or memory if their size were not checked."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _cells(facts: dict[str, Any]) -> str:
     return json.dumps({**facts, "edits": [[0, edit]] * 3000, "changes": [0]})
 
 
-# Name: its facts, from those of a session, and what the message says is allowed.
+# Name: a function that changes the facts of a session, and a part of the error message.
 ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
     "20 000 edits": (lambda facts: _edits(facts, 20_000), "at most 10000 edits"),
     "400 000 edits": (lambda facts: _edits(facts, 400_000), "5000000 are allowed"),
@@ -58,7 +58,7 @@ ATTACKS: dict[str, tuple[Callable[[dict[str, Any]], str], str]] = {
 
 
 def attack(name: str, session: Session, folder: Path) -> bytes:
-    """A file of `ATTACKS`, whose checksums are right."""
+    """Return a file of `ATTACKS` with valid checksums."""
     session.save(folder / "session.npz")
     arrays = archives.read(folder / "session.npz")
     facts, _ = ATTACKS[name]

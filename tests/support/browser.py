@@ -1,4 +1,4 @@
-"""A real Chromium without a display, for tests of pages."""
+"""A headless Chromium for tests of pages."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable
 
 
 def chromium() -> str | None:
-    """Where the browser is: that of the variable CHROMIUM, or one on the path."""
+    """Return the path of the browser: the variable CHROMIUM, or a command on the PATH."""
     return os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, _NAMES)), None)
 
 
 @contextmanager
 def started() -> Iterator[Any]:
-    """A browser of Playwright's; the test is skipped where there is none."""
+    """Yield a browser of Playwright; skip the test if there is none."""
     path = chromium()
     if path is None:
         pytest.skip("there is no Chromium here; install the package chromium")
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     with playwright.sync_playwright() as driver:
-        # As root it has no sandbox; and no machine of a test has a graphics processor.
+        # Chromium has no sandbox as root, and test machines have no graphics processor.
         browser = driver.chromium.launch(
             executable_path=path, args=["--no-sandbox", "--disable-gpu"]
         )
@@ -36,14 +36,14 @@ def started() -> Iterator[Any]:
 
 
 class Page:
-    """A page that was opened from a file, or from a server, and what went wrong on it."""
+    """A page opened from a file or a server, with the errors on it."""
 
     def __init__(
         self, browser: Any, path: Path | str, size: tuple[int, int] = (1280, 720), **options: Any
     ):
         width, height = size
         url = path if isinstance(path, str) else path.as_uri()
-        # The page allows no evaluation of text, which is how Playwright waits.
+        # `bypass_csp`, because the page forbids the evaluation of text, which Playwright needs.
         usual = {"viewport": {"width": width, "height": height}, "offline": url.startswith("file")}
         self.context = browser.new_context(**usual, bypass_csp=True, **options)
         self.tab = self.context.new_page()
@@ -55,15 +55,15 @@ class Page:
         self.settle()
 
     def settle(self) -> None:
-        """Wait until all is drawn."""
+        """Wait until the page has drawn everything."""
         self.tab.wait_for_function("!viewer.dirty && !viewer.player.playing")
 
     def read(self, script: str, argument: Any = None) -> Any:
-        """What a script gives."""
+        """Return the result of a script."""
         return self.tab.evaluate(script, argument)
 
     def text(self, selector: str) -> str:
-        """The text that one sees, in one line."""
+        """Return the visible text in one line."""
         self.settle()
         return " ".join(self.tab.inner_text(selector).split())
 

@@ -1,4 +1,4 @@
-"""Colonies for tests: set up from a drawing, with actions that the test decides."""
+"""Colonies for tests, made from a map, with actions that the test chooses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ GAMMA = 0x9E3779B97F4A7C15
 
 
 def training(learner: str = "q_learning", **settings: object) -> TrainingConfig:
-    """Learning rate and discount 1/2, so that values stay exact; greedy."""
+    """Return a greedy configuration with learning rate and discount 1/2, so values are exact."""
     defaults = {
         "learning_rate": 0.5,
         "discount": 0.5,
@@ -37,7 +37,7 @@ def begun(
     q_values: np.ndarray | None = None,
     **options: object,
 ) -> ReferenceColony:
-    """A colony in its first episode; as many ants as the world lists, unless options say more."""
+    """Return a colony in its first episode, by default with the ants that the world lists."""
     world = from_text(world) if isinstance(world, str) else world
     names = {field.name for field in fields(Life)}
     life = Life(**{name: options.pop(name) for name in names & options.keys()})
@@ -58,7 +58,7 @@ def begun(
 
 
 def act(colony: ReferenceColony, *actions: int) -> None:
-    """One tick in which the ants, by ascending slot, do these actions."""
+    """Advance by a tick with the given actions, by ascending slot."""
     ants = [colony.ants[slot] for slot in sorted(colony.ants)]
     for ant, action in zip(ants, actions, strict=True):
         ant.chosen = action
@@ -66,7 +66,7 @@ def act(colony: ReferenceColony, *actions: int) -> None:
 
 
 def load(colony: ReferenceColony, *slots: int) -> None:
-    """Let the ants in these slots carry food that comes from nowhere."""
+    """Give food to the ants in these slots, without taking it from the world."""
     for slot in slots:
         ant = colony.ants[slot]
         ant.carries = True
@@ -74,15 +74,15 @@ def load(colony: ReferenceColony, *slots: int) -> None:
 
 
 def cells_of(colony: ReferenceColony) -> list[Cell]:
-    """Where the ants stand, by ascending slot."""
+    """Return the cells of the ants, by ascending slot."""
     return [colony.ants[slot].cell for slot in sorted(colony.ants)]
 
 
 def foods_of(colony: ReferenceColony) -> set[Cell]:
-    """The cells with food on the ground."""
+    """Return the cells with food."""
     return {cell for cell, held in colony.world.ground.items() if held == FOOD}
 
 
 def n_draws(state: int, start: int) -> int:
-    """How many draws lead from one state of a stream to another, at most 99."""
+    """Return the number of draws between two states of a stream, at most 99."""
     return next(n for n in range(100) if (start + n * GAMMA) % 2**64 == state)

@@ -1,4 +1,4 @@
-"""Runs the command lines of `experiments/` for tests: as a process, or within this one."""
+"""Command lines of `experiments/`, run for tests in a new process or in this one."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ EXPERIMENTS = ROOT / "experiments"
 
 
 def crowding() -> float:
-    """How many processes have wanted each core of late, at least 1; what is timed takes as long."""
+    """Return the recent number of runnable processes per core, at least 1, to scale time limits."""
     return max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
 
 
 def promptly() -> float:
-    """Seconds in which a process ends that is stopped; alone it takes one or two."""
+    """Return the seconds in which a stopped process must end; it needs one or two if idle."""
     return 4.0 * crowding()
 
 
 def environment(kernels: Path, **changes: str | None) -> dict[str, str]:
-    """The environment of a process that keeps compiled kernels in a folder; None removes a name."""
+    """Return environment variables that cache kernels in a folder; changes to None remove names."""
     paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
     wanted = {
         **os.environ,
@@ -41,14 +41,14 @@ def environment(kernels: Path, **changes: str | None) -> dict[str, str]:
 
 
 def command(name: str, arguments: Sequence[object]) -> list[str]:
-    """The command line of an experiment."""
+    """Return the command line of an experiment."""
     return [sys.executable, str(EXPERIMENTS / f"{name}.py"), *map(str, arguments)]
 
 
 def run(
     name: str, arguments: Sequence[object], kernels: Path, folder: Path, **changes: str | None
 ) -> subprocess.CompletedProcess[str]:
-    """Run an experiment in a process of its own, in a folder, to its end."""
+    """Return the completed process of an experiment that ran in a folder."""
     return subprocess.run(
         command(name, arguments),
         cwd=folder,
@@ -62,7 +62,7 @@ def run(
 def start(
     name: str, arguments: Sequence[object], kernels: Path, folder: Path, **settings: object
 ) -> subprocess.Popen[str]:
-    """Start an experiment in a process of its own, in a folder; what it writes can be read."""
+    """Return the running process of an experiment in a folder, with its output as pipes."""
     return subprocess.Popen(
         command(name, arguments),
         cwd=folder,
@@ -75,7 +75,7 @@ def start(
 
 
 def load(name: str) -> ModuleType:
-    """A command as a module."""
+    """Return the module of a command."""
     return importlib.import_module(f"taichi_ants.commands.{name}")
 
 
@@ -83,7 +83,7 @@ Outcome = tuple[int, str, str]
 
 
 def call(name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[str]) -> Outcome:
-    """Run an experiment within this process; exit status, standard output and error."""
+    """Return exit status, standard output and standard error of a command run in this process."""
     capsys.readouterr()
     with pytest.raises(SystemExit) as exit_:
         load(name).main([str(argument) for argument in arguments])
@@ -94,7 +94,7 @@ def call(name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[s
 def call_script(
     name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[str]
 ) -> Outcome:
-    """Run a script of an experiment, which is no command, within this process."""
+    """Return the outcome of a script of `experiments/` run in this process."""
     capsys.readouterr()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sys, "argv", [f"{name}.py", *map(str, arguments)])
@@ -105,7 +105,7 @@ def call_script(
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files below a folder by their path, with what is in them."""
+    """Return the contents of all files below a folder, by path."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))
@@ -114,7 +114,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def assert_one_sentence(stderr: str) -> None:
-    """One line that says what is wrong: no traceback, no usage."""
+    """Assert that an error is a single line, without traceback or usage."""
     assert stderr.startswith("error: ")
     assert stderr.endswith(".\n")
     assert stderr.count("\n") == 1

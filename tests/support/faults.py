@@ -1,7 +1,7 @@
-"""Commands that are killed, or find the disk full, at each of their file operations in turn.
+"""Fault injection: commands that are killed, or find the disk full, at a file operation.
 
-A command runs in forked processes, which cannot run kernels. They need not: what the engines give
-is remembered from the first time, see `remember`.
+Commands run in forked processes, which cannot run kernels. Instead they use the engines' results of
+the first run, see `remember`.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from taichi_ants.files.results import ResultFolder
 from taichi_ants.report import results
 from taichi_ants.studies import colony_study, result_folder, runner
 
-KILLED, WENT_ON = 77, 78  # how processes end
+KILLED, WENT_ON = 77, 78  # exit statuses
 
 
 def remember(patch: pytest.MonkeyPatch) -> None:
-    """Let the same work give the same at once, and let all results be made at the same time."""
+    """Cache the results of the engines, and remove times from results."""
     for owner, name in (
         *((runner.RunPoint, "do"), (runner.ColonyPoint, "do"), (results, "what_policies_do")),
         *((baselines, "bound_rows"), (baselines, "policy_rows")),
@@ -45,7 +45,7 @@ def remember(patch: pytest.MonkeyPatch) -> None:
 
 
 def _remembered(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function that is called once for each of the things that tell its calls apart."""
+    """Return a function that caches results by its first argument and a task or tuple."""
     known: dict[Any, Any] = {}
 
     def remembering(first: Any, *others: Any) -> Any:
@@ -58,10 +58,10 @@ def _remembered(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def run(name: str, arguments: Sequence[object], out: io.StringIO | None = None) -> tuple[int, str]:
-    """Run a command here; its exit status, and what it has said on standard error.
+    """Return exit status and standard error of a command run in this process.
 
     Args:
-        out: Takes what it prints.
+        out: A stream for its standard output.
     """
     said = io.StringIO()
     with contextlib.redirect_stdout(out or io.StringIO()), contextlib.redirect_stderr(said):
@@ -73,7 +73,7 @@ def run(name: str, arguments: Sequence[object], out: io.StringIO | None = None) 
 
 
 def everything(folder: Path) -> dict[str, bytes | None]:
-    """All files and folders below a folder, with what is in the files."""
+    """Return all files with their contents, and all folders as None, below a folder."""
     return {
         str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
         for path in sorted(folder.rglob("*"))
@@ -86,15 +86,17 @@ def assert_it_survives(
     arguments: Sequence[object],
     out: Path,
 ) -> int:
-    """After a fault at every third file operation, a command ends as if there had been none.
+    """Assert that a command gives the same results if it is rerun after a fault.
+
+    Tests a fault at every third file operation.
 
     Args:
         fault: `killed` or `full`.
-        name, arguments: The command, which writes to the folder `out` alone.
-        out: A new folder; others are made beside it.
+        name, arguments: The command, which writes only to the folder `out`.
+        out: A new folder; the function makes others in the same folder.
 
     Returns:
-        How many operations there were, up to two more.
+        The number of file operations, or up to two more.
     """
     assert run(name, [*arguments, "--out", out]) == (0, "")
     expected = everything(out)
@@ -125,7 +127,7 @@ def _end_with_a_fault(
     place: Path,
     said: Path,
 ) -> NoReturn:
-    """Run a command in a process that was forked for it, to its end."""
+    """Run a command with a fault, then exit this forked process."""
     status = 1
     try:
         has_come = fault(number, place)
@@ -137,8 +139,12 @@ def _end_with_a_fault(
 
 
 def killed(number: int, place: Path) -> Callable[[], bool]:
-    """Kill this process before it changes something in a place, counted from 0."""
-    tempfile._O_TMPFILE_WORKS = False  # type: ignore[attr-defined]  # as where all files have names
+    """Kill this process before change `number`, from 0, below `place`.
+
+    Returns:
+        A function that returns False, because the process would not be alive after the fault.
+    """
+    tempfile._O_TMPFILE_WORKS = False  # type: ignore[attr-defined]  # give every file a name
     done = [0]
 
     def hook(event: str, details: tuple) -> None:
@@ -152,7 +158,11 @@ def killed(number: int, place: Path) -> Callable[[], bool]:
 
 
 def full(number: int, place: Path) -> Callable[[], bool]:
-    """Let nothing be written in a place from one time on, counted from 0; whether it has come."""
+    """Refuse all writes below `place` after the first `number` of them.
+
+    Returns:
+        A function that returns whether a write has been refused.
+    """
     done = [0]
 
     def is_full() -> bool:
@@ -165,7 +175,7 @@ def full(number: int, place: Path) -> Callable[[], bool]:
                 raise OSError(28, os.strerror(28))
 
     def opened(path: Any, mode: str, **others: Any) -> Any:
-        file = open(path, mode, **others)  # it can be made, but nothing goes into it  # noqa: SIM115
+        file = open(path, mode, **others)  # the file appears, but remains empty  # noqa: SIM115
         return open("/dev/full", "wb") if is_full() and mode == "wb" else file
 
     files.open = opened  # type: ignore[attr-defined]
@@ -174,7 +184,7 @@ def full(number: int, place: Path) -> Callable[[], bool]:
 
 
 def _makes(event: str, details: tuple, place: Path) -> bool:
-    """Whether an audit event is of a file or folder that is made or moved in a place."""
+    """Return whether an audit event makes or moves a file or folder below `place`."""
     path = str(details[0]) if event in ("open", "os.mkdir", "os.rename") else ""
     if not path.startswith(str(place)):
         return False
@@ -183,8 +193,8 @@ def _makes(event: str, details: tuple, place: Path) -> bool:
 
 
 def _removes(event: str, details: tuple, place: Path) -> bool:
-    """Whether an audit event is of something that is removed from a place."""
+    """Return whether an audit event removes a file or folder below `place`."""
     if event not in ("os.remove", "os.rmdir"):
         return False
-    in_a_tree = details[1] != -1  # its path is told from there on
+    in_a_tree = details[1] != -1  # the path is relative to this folder
     return in_a_tree or (str(details[0]).startswith(str(place)) and os.path.exists(details[0]))

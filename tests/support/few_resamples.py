@@ -1,4 +1,4 @@
-"""Bootstrap intervals of fewer resamples, for tests that ask what is said, not how exactly."""
+"""Bootstrap intervals with fewer resamples, for tests that do not need exact intervals."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _RESAMPLES = 2000
 
 @pytest.fixture(scope="module", autouse=True)
 def few_resamples() -> Iterator[None]:
-    """For a whole module; its `conftest.py` imports it."""
+    """Limit the resamples in all tests of a module whose `conftest.py` imports this fixture."""
     all_of_them = statistics._resampled_means
 
     def fewer(deviations: np.ndarray, resamples: int, iqm: bool = False) -> np.ndarray:

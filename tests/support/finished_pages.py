@@ -1,4 +1,4 @@
-"""Pages of made-up studies, for tests that read them and for tests in a browser."""
+"""Pages of synthetic studies, for tests of their text and in a browser."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ BASELINES = [Baseline("shortest delivery", None, 45.0, 34.0, 1.0)]
 
 @cache
 def results() -> Results:
-    """A comparison in which all claims hold with one kind of delivery, not with the other."""
+    """Return a comparison in which all claims hold if delivery truncates, but not otherwise."""
     edits = {"truncates": unchanged, "terminates": change(DYNA_P5, late_return=200)}
     return Results.of(build(edits, seeds=6), BASELINES)
 
 
 @cache
 def comparison_html() -> str:
-    """Its page."""
+    """Return the page of `results`."""
     recording = record_episode(Episode.play(worlds.paper(), trail_follower()))
     sheet = Picture("a <policy>", np.full((20, 30, 3), 200, np.uint8))
     return comparison_page(
@@ -53,7 +53,7 @@ def comparison_html() -> str:
 
 @cache
 def study_results() -> StudyResults:
-    """A study in which all three rules double what ants deliver."""
+    """Return a study in which the three rules double the deliveries."""
 
     def truth(rules: str, regime: str, ants: int) -> float:
         return 20.0 * ants * (2 if rules in ("foraging", "queueing") and ants > 1 else 1)
@@ -64,7 +64,7 @@ def study_results() -> StudyResults:
 
 @cache
 def colony_html() -> str:
-    """Its page."""
+    """Return the page of `study_results`."""
     steady = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
     colony = Colony(
         worlds.paper(), Task(), steady, 3, ants=9, sharing="frozen", q_values=trail_follower()

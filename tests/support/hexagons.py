@@ -1,4 +1,4 @@
-"""Steps between cells, for arrays of cells."""
+"""Geometry of arrays of cells."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from taichi_ants.grid.hexgrid import AxialGrid, cube, normal_form
 
 
 def neighbours(cells: object) -> np.ndarray:
-    """The six neighbours (..., 6, 3) of cells (..., 3), in the order of the headings."""
+    """Return the six neighbours (..., 6, 3) of cells (..., 3), in the order of the headings."""
     return normal_form(np.asarray(cells)[..., None, :] + np.array(HEADING_STEPS))
 
 
 def distance(cells: object, others: object) -> np.ndarray:
-    """The number of steps between cells (..., 3), obstacles ignored."""
+    """Return the number of steps between cells (..., 3), without regard to obstacles."""
     return normal_form(np.asarray(cells) - np.asarray(others)).max(axis=-1)
 
 
 def cell_at(pixels: object, size: float) -> np.ndarray:
-    """The cells (normal form, (..., 3), int64) whose hexagons hold pixel coordinates (..., 2).
+    """Return the cells at pixel coordinates (..., 2), int64 (..., 3), in normal form.
 
-    The inverse of `centre_of`; on a border of two hexagons, one of the two.
+    This is the inverse of `centre_of`. A point on a border belongs to either cell.
     """
     points = np.asarray(pixels, dtype=np.float64)
     r = points[..., 0] / (1.5 * size)
     q = 0.5 * r - points[..., 1] / (np.sqrt(3.0) * size)
-    # Cube rounding: q, -r and r - q sum to zero; after rounding, the coordinate that moved most is
-    # the one that gives way to restore the sum.
+    # Cube rounding: q, -r and r - q sum to zero. After rounding, the coordinate with the largest
+    # rounding error is recomputed from the other two.
     exact = np.stack([q, -r, r - q], axis=-1)
     near = np.rint(exact)
     moved = np.abs(near - exact)
@@ -39,5 +39,5 @@ def cell_at(pixels: object, size: float) -> np.ndarray:
 
 
 def exist(grid: AxialGrid, cells: object) -> np.ndarray:
-    """bool (...): whether cells (..., 3) lie in the world."""
+    """Return whether cells (..., 3) are in the world, bool (...)."""
     return np.all(normal_form(cells) < np.array(grid.ranges), axis=-1)

@@ -1,4 +1,4 @@
-"""States by their names."""
+"""Indices of states by name."""
 
 from taichi_ants.task.constants import N_STATES
 from taichi_ants.task.states import state_name
@@ -7,5 +7,5 @@ _NAMES = [state_name(index) for index in range(N_STATES)]
 
 
 def parse_state(name: str) -> int:
-    """The index of a state, such as "foraging E T O"."""
+    """Return the index of a state from its name, for example "foraging E T O"."""
     return _NAMES.index(name)

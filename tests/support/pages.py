@@ -1,4 +1,4 @@
-"""Reads pages: tables as text, and what a page asks for."""
+"""Readers of HTML pages: tables and links."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ class _Tables(HTMLParser):
 
 
 def tables(page: str) -> dict[str, list[list[str]]]:
-    """The rows of each table, the headers first, by its caption; "" for the one without."""
+    """Return the rows of each table, headers first, by caption; "" if a table has none."""
     parser = _Tables()
     parser.feed(page)
     return dict(parser.tables)
 
 
 def addresses(page: str) -> set[str]:
-    """All that the page links to or asks for."""
+    """Return all addresses that the page links to or loads."""
     markup = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
     return set(re.findall(r"""(?:href|src|action)=["']?([^"'\s>]+)""", markup))

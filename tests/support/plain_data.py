@@ -1,4 +1,4 @@
-"""Data sets as lists of episodes, as the reference takes them."""
+"""Data sets as lists of episodes, the form that the reference uses."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ COLUMNS = ("state", "action", "reward", "next_state", "terminated")
 
 
 def episodes_of(data: Dataset) -> list[list[tuple]]:
-    """Steps (state, action, reward, next state, terminated) by episode."""
+    """Return steps (state, action, reward, next state, terminated) by episode."""
     rows = list(zip(*(getattr(data, name).tolist() for name in COLUMNS), strict=True))
     return [rows[a:b] for a, b in zip(data.begins, data.begins[1:], strict=False)]
 
 
 def behaviour_of(data: Dataset) -> list[list[float]]:
-    """The probabilities of the actions by episode."""
+    """Return the probabilities of the actions by episode."""
     chances = data.behaviour_probability.tolist()
     return [chances[a:b] for a, b in zip(data.begins, data.begins[1:], strict=False)]
 
 
 def random_data(world: World, seed: int, episodes: int = 6, runs: int = 2) -> Dataset:
-    """What epsilon-greedy ants do by random tables; some of their episodes end by delivery."""
+    """Return data of ants that follow random tables; some of their episodes end by delivery."""
     rng = np.random.default_rng(seed)
     tables = rng.normal(size=(runs, 128, 5))
     delivery = "truncates" if seed % 2 else "terminates"

@@ -1,4 +1,4 @@
-"""Runs of one ant in the reference, with what tests ask about."""
+"""Runs of one ant in the reference, in the form that tests need."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from taichi_ants.reference.ants import Transition
 
 
 class Run:
-    """A run so far: the colony of one, and each of its steps."""
+    """A run: the colony of one ant, and its steps so far."""
 
     def __init__(self, colony: ReferenceColony, trace: list[Transition]) -> None:
         self.colony, self.trace = colony, trace
@@ -24,7 +24,7 @@ class Run:
 
 
 def train(world, config, seed, episodes, max_steps, task=None, start_from=None) -> Run:
-    """Train one ant, or let a run go on; that one is left as it is."""
+    """Return the training of one ant, or the continuation of a run, which does not change."""
     colony, trace = beginner(world, config, seed, task), []
     if start_from is not None:
         colony, trace = copy.deepcopy((start_from.colony, start_from.trace))
@@ -32,7 +32,7 @@ def train(world, config, seed, episodes, max_steps, task=None, start_from=None) 
 
 
 def train_with_tables(world, config, seed, episodes, max_steps, task=None):
-    """A run, and the ant's table after each of its steps."""
+    """Return a run, and the ant's table after each step."""
     colony, trace, tables = beginner(world, config, seed, task), [], []
     for _ in range(episodes):
         for [step] in colony.run_episode(max_steps):
@@ -42,6 +42,6 @@ def train_with_tables(world, config, seed, episodes, max_steps, task=None):
 
 
 def rollout(world, q_values, seed=0, number=0, max_steps=600, task=None, epsilon=0.0) -> Run:
-    """One episode by a table."""
+    """Return an episode that follows a table."""
     colony = follower(world, q_values, seed, number, task, epsilon)
     return Run(colony, colony.run(1, max_steps))

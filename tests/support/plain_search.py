@@ -1,4 +1,4 @@
-"""Plain searches for the tests of the exact bounds, in a simulator written only for them."""
+"""Plain searches that test the exact bounds, in a separate simulator."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from taichi_ants.worlds.world import World
 STEPS = [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
 
 # A state is (cell, heading, taken): `taken` is the cell of the carried food, None without food.
-# After the delivery it is None as a whole.
+# The state after the delivery is None.
 DELIVERED = None
 
 
@@ -21,7 +21,7 @@ PAPERS = Rewards(empty=0, failed=-1, shaping=1, pick_up=3, deliver=10)
 
 
 class PlainWorld:
-    """The rules for one ant without evaporation, with no thought of speed."""
+    """A slow simulator of one ant without evaporation."""
 
     def __init__(self, world: World, paid: Rewards = PAPERS) -> None:
         self.paid = paid
@@ -33,7 +33,7 @@ class PlainWorld:
         self.start = ((x, y, z), heading, None)
 
     def outcomes(self, state: tuple, action: int) -> list[tuple[tuple | None, int]]:
-        """The next states and rewards that an action can have, all equally probable."""
+        """Return the possible next states and rewards of an action, all equally probable."""
         cell, heading, taken = state
         seen = [self._neighbour(cell, heading + turn) for turn in (-1, 0, 1)]
         foods = self.foods - {taken}
@@ -70,7 +70,7 @@ class PlainWorld:
         return max(difference) - min(difference)
 
     def all_states(self) -> dict[tuple, list[list[tuple[tuple | None, int]]]]:
-        """Every state that can be reached, with the outcomes of its five actions."""
+        """Return all reachable states, with the outcomes of the five actions."""
         found, todo = {}, [self.start]
         while todo:
             state = todo.pop()
@@ -82,7 +82,7 @@ class PlainWorld:
 
 
 def search_all_sequences(plain: PlainWorld, max_steps: int) -> tuple:
-    """The shortest (return, steps, deliveries) of all sequences of actions, then the best."""
+    """Return (return, steps, deliveries) of the shortest delivery, the best one on a tie."""
     delivered = []
     for actions in product(range(5), repeat=max_steps):
         state, reward = plain.start, 0
@@ -96,7 +96,7 @@ def search_all_sequences(plain: PlainWorld, max_steps: int) -> tuple:
 
 
 def search_shortest(plain: PlainWorld) -> Outcome | None:
-    """Breadth first, with the best return of each state where it is first reached."""
+    """Return the outcome of the shortest delivery with the best return, by breadth-first search."""
     layer, seen, steps = {plain.start: 0}, set(), 0
     while layer:
         if DELIVERED in layer:
@@ -114,7 +114,7 @@ def search_shortest(plain: PlainWorld) -> Outcome | None:
 
 
 def search_optimal(plain: PlainWorld, discount: float, max_steps: int) -> tuple[float, Outcome]:
-    """Value iteration, then the expected outcome of the first of the best actions."""
+    """Return the optimal value by value iteration, and the expected outcome of that policy."""
     states = plain.all_states()
 
     def action_value(outcomes: list) -> float:

@@ -1,4 +1,4 @@
-"""Plays recordings in Python: the world at each moment, from the frames alone."""
+"""Playback of recordings in Python: the world at each moment, computed from the frames."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from taichi_ants.viewer import Recording
 
 
 def unpack(types: Mapping[str, str], frame: bytes) -> dict[str, np.ndarray]:
-    """The sections of a frame, see `taichi_ants.viewer.frames`."""
+    """Return the sections of a frame, see `taichi_ants.viewer.frames`."""
     lengths = np.frombuffer(frame, "<u4", 1 + len(types)).tolist()[1:]
     sections, at = {}, 8 * -(-(1 + len(types)) // 2)
     for (name, kind), length in zip(types.items(), lengths, strict=True):
@@ -26,13 +26,13 @@ def unpack(types: Mapping[str, str], frame: bytes) -> dict[str, np.ndarray]:
 
 @dataclass
 class Played:
-    """The world at a moment, and what the ants of the moment before have done since.
+    """The world at a moment, and the last actions of ants.
 
     Attributes:
-        clock: Episode, tick, deliveries, return, epsilon, learning rate, number of ants.
-        numbers, cells, headings, loaded, states: Of the living ants, by ascending number.
-        actions, events, td_errors: Of the ants of the moment before.
-        ground, trail: Of all cells.
+        clock: See `taichi_ants.viewer.frames.CLOCK`.
+        numbers, cells, headings, loaded, states: The living ants, by ascending number.
+        actions, events, td_errors: The last step of the ants of the previous moment.
+        ground, trail: The contents and trail levels of all cells.
         values: Changed action values, by entry.
     """
 
@@ -50,13 +50,13 @@ class Played:
     values: dict[int, float] = field(default_factory=dict)
 
     def row(self, state: int, n_states: int, owner: int = 0) -> np.ndarray:
-        """The action values of a state, float32 (5,)."""
+        """Return the action values of a state, float32 (5,)."""
         first = (owner * n_states + state) * N_ACTIONS
         return np.array([self.values[first + a] for a in range(N_ACTIONS)], np.float32)
 
 
 def played(recording: Recording) -> Iterator[Played]:
-    """Every moment of a recording."""
+    """Yield every moment of a recording."""
     grid = AxialGrid(tuple(recording.header["ranges"]))
     ground = np.zeros(grid.size, np.uint8)
     stored = np.zeros(
@@ -92,7 +92,7 @@ def played(recording: Recording) -> Iterator[Played]:
 
 
 def unpacked(data: bytes) -> Recording:
-    """What `Recording.to_bytes` gave, read as a page reads it."""
+    """Return a recording from the result of `Recording.to_bytes`, read as a page reads it."""
     whole = zlib.decompress(data)
     at = 4 + int(np.frombuffer(whole, "<u4", 1)[0])
     header, frames = json.loads(whole[4:at]), []

@@ -1,4 +1,4 @@
-"""Colonies drawn at random: crowded micro-worlds, all options, learners and ways of sharing."""
+"""Random colonies: small crowded worlds with all options, learners and ways of sharing."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LEARNERS = ("q_learning", "sarsa", "expected_sarsa", "dyna_q")  # ants can share
 
 @dataclass(frozen=True)
 class RandomColony:
-    """What makes a colony."""
+    """The arguments of a colony."""
 
     world: World
     task: Task
@@ -44,10 +44,10 @@ def random_colony(
     view: str = "half",
     changes: bool = False,
 ) -> RandomColony:
-    """The same seed gives the same colony.
+    """Return the random colony of a seed.
 
-    `sharing`, `learner` and whether the trail is dense may be given instead of drawn. If all
-    `changes`, ants are born or die and food grows back or wanders: these take kernels of their own.
+    `sharing`, `learner` and `dense` (trails as real numbers) are random unless they are given. With
+    `changes`, ants are born or die and food grows back or wanders, which uses separate kernels.
     """
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
@@ -76,7 +76,7 @@ def random_colony(
 
 
 def forager(observation: str = "paper") -> np.ndarray:
-    """A table that takes food in view, gives to a queen in view, and follows what lures."""
+    """Return a table that picks up, delivers, and follows trails or the way to the queen."""
     sees = observations.get(observation)
     ahead = [sees.cells.index(cell) for cell in (-1, 0, 1)]
     worth = {"E": 0.5, "-": 0.5, "T": 1.25, "S": 1.25, "1": 0.75, "2": 1.0, "3": 1.25}
@@ -93,7 +93,7 @@ def forager(observation: str = "paper") -> np.ndarray:
 def _rules(
     rng: np.random.Generator, most_ants: int, dense: bool | None, changes: bool
 ) -> tuple[dict[str, Any], Task]:
-    # One ant, any number, or as many as there is room for.
+    # One ant, a random number, or the largest number.
     ants = int(rng.choice([1, rng.integers(1, most_ants + 1), most_ants]))
     births = bool(rng.random() < 0.5)
     capacity = ants + int(rng.integers(0, 6)) if rng.random() < 0.5 else None
@@ -137,7 +137,7 @@ def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
 
 
 def _training(rng: np.random.Generator, learner: str | None) -> tuple[TrainingConfig, str]:
-    """Values far from each other and from round ones."""
+    """Return a random training configuration, with extreme values, and a random `delivery`."""
     drawn = LEARNERS[rng.integers(len(LEARNERS))]
     learner = drawn if learner is None else learner
     config = TrainingConfig(

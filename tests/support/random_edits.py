@@ -1,4 +1,4 @@
-"""Edits drawn at random, and the same edits done to the plain reference."""
+"""Random edits, and their application to the plain reference."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ KINDS = (*("ground",) * 4, "trail", "add_ants", "remove_ants", "queen", *("set",
 
 
 def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[str, Any]:
-    """An edit of the right form; there may be no room for it."""
+    """Return a random valid edit, which the world may not allow."""
     grid, ground = interventions.colony.grid, interventions.colony.arrays["ground"]
     there = np.flatnonzero(grid.exists)
     some = rng.choice(there, rng.integers(1, min(9, len(there)) + 1)).tolist()
@@ -47,7 +47,7 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
 def apply_to_both(
     edit: dict[str, Any], interventions: Interventions, plain: PlainInterventions
 ) -> None:
-    """Do an edit to a colony, and then to its twin; raises AntsError where there is no room."""
+    """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it."""
     grid = interventions.colony.grid
     edits.apply(edits.checked(edit, interventions), interventions, None)
     cells: list[Cell] = []

@@ -1,4 +1,4 @@
-"""Tables of rewards drawn at random."""
+"""Random tables of rewards."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from taichi_ants.task.constants import MOST_REWARD
 from taichi_ants.task.rewards import Rewards
 
-# Tables in which something that is recognised by its reward would be mistaken.
+# Tables that reveal code which recognises an event by its reward.
 TELLING = (
     Rewards(pick_up=10),
     Rewards(failed=10, empty=10, shaping=10),
@@ -19,7 +19,7 @@ TELLING = (
 
 
 def random_rewards(seed: int) -> Rewards:
-    """The paper's rewards, one of those above, or any whole numbers from -1000 to 1000."""
+    """Return the paper's rewards, one of `TELLING`, or random numbers from -1000 to 1000."""
     rng = np.random.default_rng([seed, 5])
     drawn = Rewards(*rng.integers(-MOST_REWARD, MOST_REWARD + 1, 5).tolist())
     return (Rewards(), TELLING[seed % len(TELLING)], drawn)[rng.integers(3)]

@@ -1,4 +1,4 @@
-"""Small worlds drawn at random: several foods, rocks, trails of all strengths, one ant or none."""
+"""Small random worlds with food, rocks, trails of all strengths, and at most one ant."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taichi_ants.worlds import World
 
 
 def random_world(seed: int, largest_range: int = 5) -> World:
-    """A world in which an ant can start; the same seed gives the same world."""
+    """Return the random world of a seed, in which an ant can start."""
     rng = np.random.default_rng(seed)
     while True:
         world = _draw(rng, largest_range)
@@ -51,5 +51,5 @@ def _draw(rng: np.random.Generator, largest_range: int) -> World | None:
     return world if len(world.foods) else None
 
 
-# Shares of empty cells, foods and rocks: open country, a pantry, a maze.
+# Shares of empty cells, food and rocks: open, full of food, full of rocks.
 _SHARES = np.array([[0.9, 0.08, 0.02], [0.5, 0.45, 0.05], [0.55, 0.1, 0.35]])

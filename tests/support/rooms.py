@@ -1,4 +1,4 @@
-"""A room that runs while tests are its pages."""
+"""A running server of the live page, and test clients in the place of pages."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from taichi_ants.live.choices import Choices
 from taichi_ants.live.server import Room
 from taichi_ants.live.session import Session
 
-SECONDS = 60.0  # until a page that hears nothing gives up
+SECONDS = 60.0  # timeout of a client that waits for a message
 
-# A small session: ants that learn in a paper's world.
+# A small session: ants that learn in the paper's world.
 CHOSEN: dict[str, Any] = {
     **{"world": "paper", "map": "", "world_seed": 0, "size": 30},
     **{
@@ -39,7 +39,7 @@ CHOSEN: dict[str, Any] = {
 
 @contextmanager
 def running(choices: Choices, chosen: dict[str, Any] | None = None) -> Iterator[Room]:
-    """A room with a session, whose time passes in another thread."""
+    """Yield a server whose session runs in another thread."""
     session = Session(choices.setup(chosen or CHOSEN))  # starts Taichi, in this thread
     session.advance()
     room = Room(session, choices)
@@ -52,17 +52,17 @@ def running(choices: Choices, chosen: dict[str, Any] | None = None) -> Iterator[
 
 
 class Guest:
-    """A page that a test plays: it asks, and hears what it is told."""
+    """A client that sends requests and receives messages as a page does."""
 
     def __init__(self, room: Room, **given: Any) -> None:
         self.room = room
         address = room.url.replace("http", "ws").replace("/?", "/socket?")
         usual = {"origin": f"http://127.0.0.1:{room.port}", "max_size": None, "proxy": None}
-        usual["close_timeout"] = 1  # so long it waits where it has not read all
+        usual["close_timeout"] = 1  # seconds, if there are unread messages
         self.socket: ClientConnection = connect(address, **{**usual, **given}).__enter__()
         self.header: dict[str, Any] = {}
         self.chosen: dict[str, Any] = {}
-        self.frames: list[bytes] = []  # since the last one that was whole, with that
+        self.frames: list[bytes] = []  # the last complete frame, and all later ones
         self.state: dict[str, Any] = {}
         self.errors: list[str] = []
         self.strokes = 0
@@ -71,12 +71,12 @@ class Guest:
         self.socket.send(json.dumps({"do": what, **more}))
 
     def edit(self, edit: dict[str, Any]) -> None:
-        """Ask for a change of its own."""
+        """Send an edit as a separate change."""
         self.strokes += 1
         self.ask("edit", edit=edit, stroke=self.strokes)
 
     def hear(self) -> tuple[str, Any]:
-        """The next that it is told: its kind, and a message or bytes."""
+        """Return the kind and the content of the next message."""
         message = self.socket.recv(SECONDS)
         if isinstance(message, bytes):
             self.frames.append(message)
@@ -96,14 +96,14 @@ class Guest:
         return said["say"], said
 
     def until(self, kind: str) -> Any:
-        """What it is told of a kind next."""
+        """Return the content of the next message of a kind."""
         while True:
             heard, message = self.hear()
             if heard == kind:
                 return message
 
     def until_cut_off(self) -> None:
-        """Hear all until the room closes the socket."""
+        """Receive messages until the server closes the socket."""
         with pytest.raises(ConnectionClosed):
             self.until("the end")
 

@@ -1,4 +1,4 @@
-"""Whether a world of a colony and a plain one are the same, in all that both hold."""
+"""Comparison of a colony with its plain reference."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from taichi_ants.reference import ReferenceColony
 
 
 def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None:
-    """Compare all that both hold between two ticks; of the colony world number `world`."""
+    """Assert that world number `world` of a colony equals the reference, between two ticks."""
     ours = colony.snapshot(world)
     grid, arrays = ours.grid, colony.arrays
     of_world = slice(world * colony.capacity, (world + 1) * colony.capacity)
@@ -40,7 +40,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
 
 
 def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) -> None:
-    """Compare the counters of the episode, the store, the places of food, the size of the model."""
+    """Compare the episode's counters, the store, the food sources, and the size of the model."""
     outcome, record, row = colony.outcome(), plain.record, colony.arrays["worlds"][:, world]
     assert outcome.returns[0, world] == record.episode_return
     for name in ("ticks", "deliveries", "first_delivery", "moves", "blocked", "births", "deaths"):

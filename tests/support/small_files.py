@@ -1,4 +1,4 @@
-"""One small file of each kind that is read, and the reader that users have of it."""
+"""One small file of each kind, with the function that reads it."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ training.discount = [0.8, 0.9]
 
 
 class SmallFile(NamedTuple):
-    """A file, and a reader that gives something that can be compared.
+    """A file, and a function that returns its content in a comparable form.
 
     Attributes:
         path: The file.
-        read: What `path` holds.
-        checked: Whether its reader notices everything that was altered.
+        read: Returns the content of `path`.
+        checked: Whether the reader detects every change of the file.
     """
 
     path: Path
@@ -64,7 +64,7 @@ class SmallFile(NamedTuple):
 
 
 def small_files(folder: Path) -> dict[str, SmallFile]:
-    """A file of each kind, by its name, written into a folder."""
+    """Return one file of each kind, by name, in a folder."""
 
     def of(name: str, read: Callable[[Path], Any]) -> SmallFile:
         return SmallFile(folder / name, lambda: read(folder / name))
@@ -103,14 +103,14 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Whether two things that were read are the same."""
+    """Return whether two contents are equal."""
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(same(one[name], other[name]) for name in one)
     return np.array_equal(one, other) if isinstance(one, np.ndarray) else bool(one == other)
 
 
 def outcome(file: SmallFile) -> Any:
-    """What is read, or the error, if that is one sentence."""
+    """Return the content of a file or the error, which must be a single short line."""
     try:
         return file.read()
     except AntsError as error:
@@ -123,7 +123,7 @@ def outcome(file: SmallFile) -> Any:
 
 @contextmanager
 def restored(file: SmallFile) -> Iterator[bytes]:
-    """The content of a file, which has it again in the end."""
+    """Yield the content of a file, and restore it at the end."""
     content = file.path.read_bytes()
     try:
         yield content
@@ -150,11 +150,11 @@ def _dataset() -> Dataset:
 
 
 def _block(path: Path, first: bool = False) -> dict[str, np.ndarray]:
-    """A block; AntsError where it would be made anew."""
+    """Return a block; raise AntsError if its file is missing or not valid, unless `first`."""
 
     def make() -> dict[str, np.ndarray]:
         if not first:
-            raise AntsError(f"{str(path)!r} is done anew.")
+            raise AntsError(f"{str(path)!r} has to be computed again.")
         return {"steps": np.arange(6).reshape(2, 3), "q_values": Q_VALUES[:2]}
 
     return kept(path, {"seeds": [0, 1]}, make)

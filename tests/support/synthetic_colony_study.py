@@ -1,4 +1,4 @@
-"""Made-up studies of the colony: what each condition delivers is given, seeds add noise."""
+"""Synthetic studies of colonies: given deliveries in each condition, with noise over seeds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Truth = Callable[[str, str, int], float]
 
 
 def proportional(rules: str, regime: str, ants: int) -> float:
-    """Every ant delivers 20, whatever it shares and smells."""
+    """Return deliveries if each ant delivers 20 in all conditions."""
     return 20.0 * ants
 
 
@@ -32,15 +32,13 @@ def build(
     reward: Truth = lambda rules, regime, ants: 500.0,
     world_kinds: Sequence[str] = ("paper",),
 ) -> Measured:
-    """A study in which all is as the truth says, but for noise of the given standard deviation.
-
-    No colony delivers more than 25 for each ant.
+    """Return a study with the given deliveries and noise; the bound is 25 per ant.
 
     Args:
         truth: Deliveries per 1000 ticks.
-        seeds, sizes, regimes, rules, kinds of world: The conditions.
-        noise: Standard deviation over seeds, as a share of the truth in percent.
-        first: Ticks to the first delivery by number of ants.
+        seeds, sizes, regimes, rules, world_kinds: The conditions.
+        noise: Standard deviation over seeds, in percent of the truth.
+        first: Ticks to the first delivery, by number of ants.
         reward: Reward per ant and 1000 ticks.
     """
     random = np.random.default_rng(0)

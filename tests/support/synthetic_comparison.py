@@ -1,7 +1,6 @@
-"""Comparisons made up from a known truth, on which the analysis must find that truth.
+"""Synthetic comparisons from a known truth, which the analysis must find.
 
-Every number is set by hand for each configuration. By default all that the paper claims is true,
-each claim clearly.
+Each configuration has explicit numbers. By default all claims of the paper are clearly true.
 """
 
 from __future__ import annotations
@@ -18,25 +17,23 @@ from taichi_ants.analysis.paper.figures import curves_of
 from taichi_ants.analysis.paper.measures import measures_of_runs
 from taichi_ants.analysis.paper.published import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
 
-# What rows of baselines are held against, in the paper's protocol.
-
-EARLY = 50  # episodes before the late level is reached
+EARLY = 50  # number of early episodes
 EPISODES = ("returns", "steps", "deliveries")
 ROLLOUTS = tuple(f"greedy_{name}" for name in EPISODES)
 
 
 @dataclass(frozen=True)
 class Truth:
-    """What the runs of one configuration are drawn around.
+    """The means around which the runs of one configuration vary.
 
     Attributes:
-        early_return, late_return: Reward in the first `EARLY` episodes and after them.
-        swing: Odd episodes return so much more than the mean, even ones so much less.
+        early_return, late_return: Return in the first `EARLY` episodes and after them.
+        swing: Added to the return of odd episodes, subtracted in even ones.
         early_steps, late_steps: Lengths of episodes.
-        steps_swing: As `swing`.
+        steps_swing: The same as `swing`, for steps.
         deliveries: Probability of a delivery in an episode.
-        greedy_return, greedy_steps, greedy_deliveries: Of every greedy rollout; a run without
-            deliveries in them walks the trail.
+        greedy_return, greedy_steps, greedy_deliveries: Results of each greedy rollout; without a
+            delivery, the ant walks the trail.
         greedy_varies: Whether rollouts of one run differ.
     """
 
@@ -57,9 +54,9 @@ Edit = Callable[[Variant, GridPoint, Truth], Truth]
 
 
 def paper_truth(variant: Variant, point: GridPoint) -> Truth:
-    """A world in which every claim of the paper holds."""
+    """Return a truth for which all claims of the paper hold."""
     fast = point.learning_rate == 0.01
-    # Effects of the discount that differ between configurations, and cancel over all.
+    # Effects of the discount that differ between configurations, with a mean of zero.
     twist = 3 if (point.epsilon == 0.3) == (point.epsilon_decay == 0.99) else -3
     twist = twist if point.discount == 0.99 else 0
     if variant == Q_LEARNING:
@@ -77,7 +74,7 @@ def paper_truth(variant: Variant, point: GridPoint) -> Truth:
 
 
 def level_truth(variant: Variant, point: GridPoint) -> Truth:
-    """A world in which nothing makes a difference."""
+    """Return a truth in which nothing has an effect."""
     return Truth(45, 45, 0, 100, 100, 0)
 
 
@@ -90,7 +87,7 @@ def change(
     where: Callable[[GridPoint], bool] = lambda point: True,
     **amounts: float,
 ) -> Edit:
-    """An edit that adds amounts to fields of the truth of some configurations."""
+    """Return an edit that adds amounts to fields of the truth of some configurations."""
     chosen = [variants] if isinstance(variants, Variant) else variants
 
     def edit(variant: Variant, point: GridPoint, truth: Truth) -> Truth:
@@ -115,14 +112,14 @@ def build(
     truth: Callable[[Variant, GridPoint], Truth] = paper_truth,
     random_seed: int = 7,
 ) -> Made:
-    """A comparison drawn from the truth.
+    """Return a random comparison around the truth.
 
     Args:
-        edits: For each delivery setting what to change in the truth.
+        edits: A change of the truth for each delivery setting.
         seeds, episodes, rollouts: Sizes.
         variants, grid: The configurations.
         noise: Standard deviation of every episode's return and length.
-        shared: Standard deviation over seeds of what a seed adds to the returns of all rows.
+        shared: Standard deviation of the effect of a seed on the returns of all rows.
         truth: The truth before the edits.
         random_seed: Seed of the noise.
     """
@@ -142,7 +139,7 @@ def build(
 
 
 def comparison_of(arrays: dict[str, np.ndarray], rows: tuple[Row, ...], **fields: Any) -> Made:
-    """The comparison of these episodes and rollouts, arrays (rows, seeds, ...) by name."""
+    """Return the comparison of given episodes and rollouts, arrays (rows, seeds, ...) by name."""
     returns, greedy = arrays["returns"], arrays["greedy_returns"]
     delivers = arrays["greedy_deliveries"][..., 0] > 0
     usual: dict[str, Any] = {
@@ -163,7 +160,7 @@ def comparison_of(arrays: dict[str, np.ndarray], rows: tuple[Row, ...], **fields
 
 
 def remeasured(made: Made) -> Made:
-    """The same with the measures and learning curves of its episodes, which may have changed."""
+    """Return a comparison with measures and learning curves recomputed from its episodes."""
     made = replace(made, measures=measures_of_runs(made.arrays))
     each = ({n: made.arrays[n][row] for n in EPISODES} for row in range(len(made.rows)))
     return replace(made, curves=curves_of(made, enumerate(each)))
@@ -171,7 +168,7 @@ def remeasured(made: Made) -> Made:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Made(Comparison):
-    """A comparison that keeps its episodes."""
+    """A comparison with its episodes."""
 
     arrays: dict[str, np.ndarray]
 
@@ -183,7 +180,7 @@ def _runs(
     episodes: int,
     noise: float,
 ) -> np.ndarray:
-    """Returns, steps and deliveries of one configuration, int32 (3, seeds, episodes)."""
+    """Return returns, steps and deliveries of a configuration, int32 (3, seeds, episodes)."""
     shape = len(seed_effects), episodes
     early = np.arange(episodes) < EARLY
     sign = np.where(np.arange(episodes) % 2, 1, -1)
@@ -196,7 +193,7 @@ def _runs(
 
 
 def _rollouts(row: Truth, seeds: int, rollouts: int) -> np.ndarray:
-    """The same for greedy rollouts, int32 (3, seeds, rollouts)."""
+    """Return the same for greedy rollouts, int32 (3, seeds, rollouts)."""
     figures = [row.greedy_return, row.greedy_steps, row.greedy_deliveries]
     values = np.broadcast_to(np.array(figures)[:, None, None], (3, seeds, rollouts)).copy()
     if row.greedy_varies:
@@ -205,7 +202,7 @@ def _rollouts(row: Truth, seeds: int, rollouts: int) -> np.ndarray:
 
 
 def subset(comparison: Made, rows: Sequence[int], seeds: int, episodes: int) -> Made:
-    """Some rows, the first seeds and the first episodes of a comparison."""
+    """Return some rows, the first seeds and the first episodes of a comparison."""
     rows = list(rows)
     arrays = {name: comparison.arrays[name][rows, :seeds, :episodes] for name in EPISODES}
     arrays |= {name: comparison.arrays[name][rows, :seeds] for name in ROLLOUTS}

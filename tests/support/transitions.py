@@ -1,4 +1,4 @@
-"""Steps for learners, made by hand."""
+"""Transitions with explicit values, for tests of learners."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from taichi_ants.task.events import Event
 def transition(
     state: int, action: int, reward: int, next_state: int, number: int = 0, **given: object
 ) -> Transition:
-    """What an ant did; its slot is its number, and nothing ends, unless more is given."""
+    """Return a transition of an ant; by default its slot is its number, and no episode ends."""
     facts = {
         "slot": number,
         "next_action": None,

@@ -206,7 +206,7 @@ def test_what_cannot_be_recorded_says_why():
     colony.begin_episode()
     with pytest.raises(AntsError, match="ticks is -1"):
         record_colony(colony, -1)
-    with pytest.raises(AntsError, match="follow is 3; the 1 ants have numbers from 0"):
+    with pytest.raises(AntsError, match="follow is 3; it must be from 0 to 0"):
         record_colony(colony, 1, follow=3)
     with pytest.raises(AntsError, match="episode is None"):
         record_episode(None)
