@@ -1,4 +1,4 @@
-"""`python -m taichi_ants` is the command `taichi-ants`."""
+"""Run the command `taichi-ants` as `python -m taichi_ants`."""
 
 from taichi_ants.commands import main
 

@@ -155,5 +155,5 @@ def compare(settings: argparse.Namespace) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """The command line."""
-    again = "Stopped; finished runs are kept, and the same command goes on from there."
+    again = "Stopped; finished runs are saved. Run the same command again to resume."
     run_command(lambda: compare(parse_arguments(arguments)), again)

@@ -183,7 +183,7 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, capsys):
     status, out, _ = call("colony", [*SMALL, "--out", folder], capsys)
     assert status == 0
     assert out.startswith((folder / "report.txt").read_text("utf-8"))
-    assert "holds these results already" in out
+    assert "already has these results" in out
     other = [*SMALL, "--out", folder, "--training.learner", "q_learning"]
     status, _, err = call("colony", other, capsys)
     assert status == 2
@@ -233,7 +233,7 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["--ants", 2], "invalid choice: '2'"),
         (["study", "--task.life.births"], "unrecognized arguments: --task.life.births"),
         (["study", "--world.piles", 2], "unrecognized arguments: --world.piles 2"),
-        (["study", "--training.initial-q", 2], "--training.initial-q is chosen by this command"),
+        (["study", "--training.initial-q", 2], "this command sets --training.initial-q itself"),
         (["live", "--quick"], "unrecognized arguments: --quick"),
         (["study", "--save", "x"], "unrecognized arguments: --save x"),
         (
@@ -495,7 +495,7 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(sent, status, kernels, tmp_pa
         ("live", command, "new_colony", "Stopped.\n"),
         (
             *("study", colony_study, "plan"),
-            "Stopped; finished parts are kept, and the same command goes on from there.\n",
+            "Stopped; finished parts are saved. Run the same command again to resume.\n",
         ),
     ],
 )

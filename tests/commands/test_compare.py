@@ -95,7 +95,7 @@ def finished(tmp_path_factory, kernels):
     report = (folder / "report.txt").read_text("utf-8")
     assert done.stdout.startswith(report)
     assert re.fullmatch(
-        r"\n\d+\.\d s; everything is in deep/out/\ndeep/out/report.html\n",
+        r"\n\d+\.\d s; all results are in deep/out/\ndeep/out/report.html\n",
         done.stdout.removeprefix(report),
     )
     return folder
@@ -362,7 +362,7 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
     status, out, err = compare(*SMALL, "--out", copy)
     report = before["report.txt"].decode("utf-8")
     assert (status, err) == (0, "")
-    already = f"{copy}/ holds these results already; --force makes them again."
+    already = f"{copy}/ already has these results; use --force to compute them again."
     assert out == f"{report}\n{already}\n{copy}/report.html\n"
     assert contents(copy) == before
 

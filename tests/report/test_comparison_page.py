@@ -55,7 +55,7 @@ def test_the_mean_is_told_with_its_own_difference(page: str) -> None:
 def test_both_deliveries_are_explained_before_the_answer(page: str) -> None:
     above = page[: page.index('<section id="answer">')]
     for setting in results().comparison.delivery_settings:
-        assert f"Where delivery {setting}, " in above
+        assert f"If delivery {setting}, " in above
 
 
 def test_table_2_stands_beside_the_papers(page: str) -> None:
