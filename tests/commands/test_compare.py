@@ -398,7 +398,7 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     ):
         assert after[name] == before[name], name
     assert after["manifest.json"] != before["manifest.json"]
-    left_out = "made with --no-figures; to have figures, too, give --force."
+    left_out = "no figures because of --no-figures; use --force to draw figures."
     assert left_out in compare(*SMALL, "--out", copy)[1]
     assert left_out not in compare(*SMALL, "--out", copy, "--no-figures")[1]
 
