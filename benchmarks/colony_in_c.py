@@ -24,7 +24,6 @@ from throughput import FLAGS, compiler
 from taichi_ants import Task, TrainingConfig, runtime, worlds
 from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.stepping import kernel_numbers
 from taichi_ants.errors import AntsError
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
@@ -124,10 +123,9 @@ def check_same(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) -
     colony.begin_episode()
     lived = live_in_c(library, colony, ticks, threads)
     colony.tick(ticks)
-    counted = colony.arrays["worlds"][:, 0]
-    ours = [int(counted[row]) for row in (WorldRow.DELIVERIES, WorldRow.MOVES, WorldRow.BLOCKED)]
-    same = [int(colony.arrays["returns"][0]), *ours] == list(lived[1:])
-    if not (same and np.array_equal(colony.q_values[0], lived.q_values)):
+    done = colony.outcome()
+    ours = [int(one[0, 0]) for one in (done.returns, done.deliveries, done.moves, done.blocked)]
+    if not (ours == list(lived[1:]) and np.array_equal(colony.q_values[0], lived.q_values)):
         raise AntsError("colony.c gives other results than the package; compare the two.")
 
 

@@ -100,7 +100,7 @@ def _show_pages_in_notebooks() -> None:
     formatter = shell.display_formatter.formatters["text/html"]
     formatter.for_type_by_name("taichi_ants.engines.colony.colony", "Colony", page_of)
     formatter.for_type_by_name("taichi_ants.engines.runs.traces", "Trace", page_of)
-    formatter.for_type_by_name("taichi_ants.viewer.recording", "Recording", page_of)
+    formatter.for_type_by_name("taichi_ants.viewer.frames", "Recording", page_of)
 
 
 prepare_for_taichi()

@@ -11,6 +11,7 @@ import io
 import math
 import os
 import threading
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -23,6 +24,7 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
+_LONGEST_LOCK = 60.0  # seconds
 
 # What tells a quota and the period that it is for: cgroups of version 2, or of version 1.
 _QUOTAS = (
@@ -88,9 +90,18 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
         wanted = Runtime(arch or "cpu", threads or available_threads())
     else:
         wanted = Runtime(arch or running.arch, threads or running.threads)
-    if wanted != running:
-        _check_restart(ti, running, wanted)
-        _init(ti, wanted)
+    if wanted == running:
+        return wanted
+    if running is not None:
+        ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
+        if not ours or holds_data():
+            why = "holds fields or arrays" if ours else "was not started by taichi_ants"
+            raise AntsError(
+                f"arch {wanted.arch!r} with threads {wanted.threads} needs a restart of Taichi, "
+                f"which runs with {running.arch!r} and {running.threads} and {why}; leave out "
+                "threads and arch, or call ti.reset() first, which destroys all fields and arrays."
+            )
+    _init(ti, wanted)
     return wanted
 
 
@@ -172,21 +183,6 @@ def _running(ti: ModuleType) -> Runtime | None:
     return Runtime(arch, int(config.cpu_max_num_threads))
 
 
-def _check_restart(ti: ModuleType, running: Runtime | None, wanted: Runtime) -> None:
-    """Refuse to restart what somebody else has started, or what holds somebody else's data."""
-    if running is None:
-        return
-    ours = getattr(ti.lang.impl.get_runtime(), "is_ours", False)
-    if ours and not holds_data():
-        return
-    why = "holds fields or arrays" if ours else "was not started by taichi_ants"
-    raise AntsError(
-        f"arch {wanted.arch!r} with threads {wanted.threads} needs a restart of Taichi, which runs "
-        f"with {running.arch!r} and {running.threads} and {why}; leave out threads and arch, or "
-        "call ti.reset() first, which destroys all fields and arrays."
-    )
-
-
 def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
     settings = {
         "fast_math": False,  # no reordering of floats: the same bits everywhere
@@ -217,4 +213,9 @@ def _cache_folder() -> Path:
     folder = Path(chosen) if chosen else Path(base) / "taichi_ants" / "kernels"
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
+        # Taichi holds this lock for moments. One that a killed process has left stops all others
+        # from adding kernels.
+        lock = folder / "ticache.lock"
+        if time.time() - lock.stat().st_mtime > _LONGEST_LOCK:
+            lock.unlink()
     return folder if is_writable_folder(str(folder)) else Path(fallback_folder()) / "kernels"

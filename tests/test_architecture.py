@@ -113,21 +113,25 @@ def test_every_module_belongs_to_a_layer():
     assert sorted(parts) == sorted(listed)
 
 
-@pytest.mark.parametrize("path", PACKAGE, ids=name)
-def test_imports_point_one_way(path):
-    own = part_of(module_of(path))
-    if not own:  # the package itself names all of its parts
-        return
-    modules = {module_of(path) for path in PACKAGE}
-    for module in imported(path):
-        # A name of the package itself, such as `taichi_ants.train`, comes from any of its parts;
-        # only what stands on top of all of them may take it from there.
-        owner = module if module in modules else module.rpartition(".")[0]
-        other = part_of(owner)
-        if not module.startswith("taichi_ants.") or other == own or module.endswith("__version__"):
+def test_imports_point_one_way():
+    for path in PACKAGE:
+        own = part_of(module_of(path))
+        if not own:  # the package itself names all of its parts
             continue
-        assert layer(other or "commands") <= layer(own), f"{name(path)} imports {module}"
-        assert layer(other or "commands") < layer(own) or not other, f"{name(path)}: {module}"
+        modules = {module_of(path) for path in PACKAGE}
+        for module in imported(path):
+            # A name of the package itself, such as `taichi_ants.train`, comes from any of its
+            # parts; only what stands on top of all of them may take it from there.
+            owner = module if module in modules else module.rpartition(".")[0]
+            other = part_of(owner)
+            if (
+                not module.startswith("taichi_ants.")
+                or other == own
+                or module.endswith("__version__")
+            ):
+                continue
+            assert layer(other or "commands") <= layer(own), f"{name(path)} imports {module}"
+            assert layer(other or "commands") < layer(own) or not other, f"{name(path)}: {module}"
 
 
 def test_no_imports_go_round_in_a_circle():
@@ -141,34 +145,34 @@ def test_no_imports_go_round_in_a_circle():
     TopologicalSorter(graph).prepare()
 
 
-@pytest.mark.parametrize("path", PACKAGE, ids=name)
-def test_only_parts_with_kernels_import_taichi(path):
-    own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
-    if own not in PARTS_WITH_TAICHI:
-        for module in imported(path):
-            assert module.split(".")[0] != "taichi", name(path)
+def test_only_parts_with_kernels_import_taichi():
+    for path in PACKAGE:
+        own = part_of(".".join(path.relative_to(ROOT).with_suffix("").parts))
+        if own not in PARTS_WITH_TAICHI:
+            for module in imported(path):
+                assert module.split(".")[0] != "taichi", name(path)
 
 
-@pytest.mark.parametrize("path", FILES, ids=name)
-def test_taichi_is_started_in_one_place(path):
-    starts = [
-        ast.unparse(node)
-        for node in ast.walk(tree(path))
-        if isinstance(node, ast.Attribute) and ast.unparse(node) in ("ti.init", "taichi.init")
-    ]
-    starts += [module for module in imported(path) if module == "taichi.init"]
-    assert bool(starts) == (name(path) == "taichi_ants/runtime.py")
+def test_taichi_is_started_in_one_place():
+    for path in FILES:
+        starts = [
+            ast.unparse(node)
+            for node in ast.walk(tree(path))
+            if isinstance(node, ast.Attribute) and ast.unparse(node) in ("ti.init", "taichi.init")
+        ]
+        starts += [module for module in imported(path) if module == "taichi.init"]
+        assert bool(starts) == (name(path) == "taichi_ants/runtime.py")
 
 
 # Parts that no other part needs.
 EXTRAS = {"baselines", "offline", "envs"}
 
 
-@pytest.mark.parametrize("path", PACKAGE, ids=name)
-def test_the_core_does_not_import_extras(path):
-    if part_of(module_of(path)) in {"", *EXTRAS}:  # the package itself names all of its parts
-        return
-    assert not {part_of(module) for module in imported(path)} & EXTRAS, name(path)
+def test_the_core_does_not_import_extras():
+    for path in PACKAGE:
+        if part_of(module_of(path)) in {"", *EXTRAS}:  # the package itself names all of its parts
+            continue
+        assert not {part_of(module) for module in imported(path)} & EXTRAS, name(path)
 
 
 def test_ants_learn_without_the_extras(tmp_path):
@@ -193,13 +197,15 @@ assert Colony(worlds.paper(), None, config, ants=5).run(2, 20).ticks.tolist() ==
 LAYOUT = "taichi_ants.engines.colony.layout"
 
 
-@pytest.mark.parametrize("path", PACKAGE, ids=name)
-def test_only_the_colony_knows_its_layout(path):
+def test_only_the_colony_knows_its_layout():
     """Others use its views, and the engine of runs has arrays of its own."""
-    if path.name != "__init__.py" and not module_of(path).startswith("taichi_ants.engines.colony."):
-        assert not any(module.startswith(LAYOUT) for module in imported(path))
-        texts = {ast.unparse(n) for n in ast.walk(tree(path)) if isinstance(n, ast.Attribute)}
-        assert not [text for text in texts if text.endswith("colony.arrays")]
+    for path in PACKAGE:
+        if path.name != "__init__.py" and not module_of(path).startswith(
+            "taichi_ants.engines.colony."
+        ):
+            assert not any(module.startswith(LAYOUT) for module in imported(path))
+            texts = {ast.unparse(n) for n in ast.walk(tree(path)) if isinstance(n, ast.Attribute)}
+            assert not [text for text in texts if text.endswith("colony.arrays")]
 
 
 def test_analysis_runs_without_taichi(tmp_path):
@@ -219,35 +225,34 @@ def test_analysis_runs_without_taichi(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("path", EXPERIMENTS, ids=name)
-def test_experiments_use_public_names_only(path):
-    every = imported(path, types_too=True)
-    modules = [module for module in every if module.startswith("taichi_ants")]
-    aliases = {module.split(".")[-1] for module in modules}
-    for module in modules:
-        private = [piece for piece in module.split(".") if piece.startswith("_")]
-        assert not private, f"{name(path)}: {module}"
-    for node in ast.walk(tree(path)):
-        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-            private = node.attr.startswith("_") and not node.attr.startswith("__")
-            assert not (private and node.value.id in aliases), f"{name(path)}: {ast.unparse(node)}"
+def test_experiments_use_public_names_only():
+    for path in EXPERIMENTS:
+        every = imported(path, types_too=True)
+        modules = [module for module in every if module.startswith("taichi_ants")]
+        aliases = {module.split(".")[-1] for module in modules}
+        for module in modules:
+            private = [piece for piece in module.split(".") if piece.startswith("_")]
+            assert not private, f"{name(path)}: {module}"
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+                private = node.attr.startswith("_") and not node.attr.startswith("__")
+                assert not (private and node.value.id in aliases), (
+                    f"{name(path)}: {ast.unparse(node)}"
+                )
 
 
-@pytest.mark.parametrize("path", [path for path in FILES if path.stat().st_size], ids=name)
-def test_files_say_what_they_are(path):
-    assert ast.get_docstring(tree(path))
+def test_files_say_what_they_are():
+    mute = [name(path) for path in FILES if path.stat().st_size]
+    assert not [one for one in mute if not ast.get_docstring(tree(ROOT / one))]
 
 
-@pytest.mark.parametrize("public", taichi_ants.__all__)
-def test_public_names_exist_and_are_explained(public):
-    value = getattr(taichi_ants, public)
-    if public == "__version__":
-        assert isinstance(value, str)
-        return
-    text = inspect.getdoc(value)
-    assert text
-    # Dataclasses without a docstring get their signature as one.
-    assert not text.startswith(f"{public}(")
+def test_public_names_exist_and_are_explained():
+    assert isinstance(taichi_ants.__version__, str)
+    for public in set(taichi_ants.__all__) - {"__version__"}:
+        text = inspect.getdoc(getattr(taichi_ants, public))
+        assert text, public
+        # Dataclasses without a docstring get their signature as one.
+        assert not text.startswith(f"{public}(")
 
 
 def test_public_names_are_listed_once_and_found():

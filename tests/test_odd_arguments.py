@@ -27,7 +27,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
 from taichi_ants.rendering import learning_checkpoints, policy_sheet, save_animation
 from taichi_ants.studies.command_line import Parser, notice
-from taichi_ants.viewer import frame, is_page, notebook, record_colony
+from taichi_ants.viewer import check_page, frame, notebook, record_colony
 
 WORLD = places.paper()
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.9)
@@ -81,7 +81,7 @@ ODD = {
     "by run": lambda _: offline.fitted_q_iteration(data(), by_run=np.zeros(0)),
     "a penalty": lambda _: offline.pessimistic_q_iteration(data(), penalty=HUGE),
     "a label": lambda _: learners.label(["sarsa"]),
-    "a page's path": lambda _: is_page(None),
+    "a page's path": lambda _: check_page(None),
     "a frame": lambda _: frame(SCALAR),
     "what a notebook shows": lambda _: notebook(RAGGED),
     "data of a model": lambda _: offline.EmpiricalModel.of(None, SCALAR),

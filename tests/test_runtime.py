@@ -6,10 +6,11 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import pytest
-from command_lines import environment
+from command_lines import ROOT
 
 from taichi_ants import AntsError, runtime
 from taichi_ants.environment import fallback_folder, is_writable_folder, prepare_for_taichi
@@ -41,7 +42,7 @@ def python(script, folder, **changes):
     done = subprocess.run(
         [sys.executable, "-c", script],
         cwd=folder,
-        env=environment(folder / "kernels", **changes),
+        env={**os.environ, "PYTHONPATH": str(ROOT), **changes},
         capture_output=True,
         text=True,
         timeout=120,
@@ -69,7 +70,7 @@ assert config.arch in (ti.x64, ti.arm64)
 assert not config.fast_math
 assert runtime.start() == runtime.Runtime("cpu", runtime.available_threads())
 """
-    python(BEGINNING + script, tmp_path)
+    python(BEGINNING + script, tmp_path, XDG_CACHE_HOME=str(tmp_path / "kernels"))
     assert list((tmp_path / "kernels" / "taichi_ants" / "kernels").iterdir())
 
 
@@ -92,9 +93,22 @@ assert dict(os.environ) == before
         TI_LOG_LEVEL="debug",
         TI_CPU_MAX_NUM_THREADS="17",
         TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path / "chosen"),
+        XDG_CACHE_HOME=str(tmp_path / "kernels"),
     )
     assert list((tmp_path / "chosen").iterdir())
     assert not (tmp_path / "kernels").exists()
+
+
+@pytest.mark.parametrize(("age", "keeps_kernels"), [(3600, True), (0, False)])
+def test_a_lock_that_a_killed_process_left_is_removed(tmp_path, age, keeps_kernels):
+    folder = tmp_path / "taichi_ants" / "kernels"
+    folder.mkdir(parents=True)
+    lock = folder / "ticache.lock"
+    lock.touch()
+    os.utime(lock, (time.time() - age,) * 2)
+    python(BEGINNING + "trained()", tmp_path, XDG_CACHE_HOME=str(tmp_path))
+    assert lock.exists() != keeps_kernels  # one that is in use stays
+    assert bool(list(folder.glob("*.tic"))) == keeps_kernels
 
 
 def test_beside_a_taichi_of_the_callers(tmp_path):
@@ -330,7 +344,6 @@ trained()
 def test_the_import_of_taichi_warns_of_nothing(tmp_path):
     """Python 3.11 and later have a warning for a function that Taichi calls."""
     for first in (
-        "from taichi_ants import learners",
         "from taichi_ants import runtime as r; r.start()",
         # As in a notebook, of which Taichi would tell.
         "import io, sys; sys.stdout = io.StringIO(); from taichi_ants import learners",

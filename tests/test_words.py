@@ -42,7 +42,9 @@ PATTERNS = {
 _CODE = re.compile(r"```.*?```|<!--.*?-->", re.DOTALL)
 _INLINE = re.compile(r"`[^`]*`|https?://\S+|\$[^$]+\$")
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)]*\)")
-_END = re.compile(r"(?<=[.!?])(?<!e\.g\.)(?<!i\.e\.)(?<!cf\.)(?<!vs\.)(?<! al\.)[)\"']?\s+(?=[\"'(`*A-Z0-9])")
+_END = re.compile(
+    r"(?<=[.!?])(?<!e\.g\.)(?<!i\.e\.)(?<!cf\.)(?<!vs\.)(?<! al\.)[)\"']?\s+(?=[\"'(`*A-Z0-9])"
+)
 
 
 class Text(NamedTuple):
@@ -98,7 +100,11 @@ class Docstring(NamedTuple):
     def returns(self) -> bool:
         """Whether it is that of a public function that returns something, and no property."""
         node = self.node
-        if not isinstance(node, ast.FunctionDef) or node.name.startswith("_") or node.returns is None:
+        if (
+            not isinstance(node, ast.FunctionDef)
+            or node.name.startswith("_")
+            or node.returns is None
+        ):
             return False
         names = " ".join(ast.unparse(one) for one in node.decorator_list)
         return "property" not in names and ast.unparse(node.returns) not in ("None", "NoReturn")
@@ -108,7 +114,9 @@ class Docstring(NamedTuple):
         body = re.sub(r"::\n\n(?:[ ]{4,}.*\n?)+", "\n\n", self.text)
         for block in re.split(r"\n\s*\n", body):
             item = r"\n(?=[ ]{4}[`*\w][\w.`*, ]*: )|\n\s*(?:-|\d+\.)\s"
-            for one in re.split(item, re.sub(r"^(Args|Attributes|Raises|Returns):\s*", "\n", block)):
+            for one in re.split(
+                item, re.sub(r"^(Args|Attributes|Raises|Returns):\s*", "\n", block)
+            ):
                 yield Text(self.place, plain(re.sub(r"^\s*[`*\w][\w.`*, ]*: ", "", one)))
 
 
@@ -134,7 +142,9 @@ def messages(path: Path) -> Iterator[Text]:
     for node in ast.walk(ast.parse(path.read_text("utf-8"))):
         if not isinstance(node, ast.Call):
             continue
-        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        called = (
+            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        )
         if called in named:
             for value in (*node.args, *(one.value for one in node.keywords)):
                 text = "".join(_literal(value))

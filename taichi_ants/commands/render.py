@@ -53,42 +53,38 @@ def _size(text: str) -> tuple[int, int]:
     return int(width), int(height)
 
 
+_FILE = {"metavar": "FILE"}
 _SEED: dict[str, Any] = {"type": whole_number(), "default": 0, "metavar": "N"}
 _LENGTH: dict[str, Any] = {"type": whole_number(1, 100_000), "default": 600, "metavar": "N"}
 _COUNT: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
 _NUMBER: dict[str, Any] = {"type": float, "metavar": "X"}
 _SEEDS: dict[str, Any] = {"type": whole_number(1, 10_000), "default": 200, "metavar": "N"}
 _CHECKPOINTS = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
+_PLAIN = {"action": "store_false", "dest": "overlay"}
 
 # Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
 # it is read.
-_TRAINING: dict[str, tuple[str, str, dict[str, Any]]] = {  # of no use beside --policy
-    "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
-    "--checkpoints": ("l", "looks at the ant after so many episodes of training", _CHECKPOINTS),
-}
-_OPTIONS = {
+_OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
     "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
     "--world": ("ecls", WORLDS, {"default": "paper"}),
     "--seed": ("ecls", "seed of training and of what is shown", _SEED),
     "--seeds": ("l", "train seeds 0 to N - 1, show the median run and count the others", _SEEDS),
-    "--plugin": ("ecls", "a Python file with learners, worlds, observations", {"metavar": "FILE"}),
+    "--plugin": ("ecls", "a Python file with learners, worlds, observations", _FILE),
     "--ants": ("c", "how many", {**_COUNT, "default": 80}),
     "--follow": ("c", "number of an ant whose view is shown", {**_SEED, "default": None}),
     "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
     "--ticks": ("c", "length of an episode", _LENGTH),
     "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
-    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", {"metavar": "FILE"}),
-    **_TRAINING,
+    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", _FILE),
+    "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
+    "--checkpoints": ("l", "looks at the ant after so many episodes of training", _CHECKPOINTS),
     "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
     "--frame-interval": ("c", "ticks from one picture to the next", {**_COUNT, "default": None}),
-    "--no-overlay": (
-        "ec",
-        "the world alone, without text and marks",
-        {"action": "store_false", "dest": "overlay"},
-    ),
+    "--no-overlay": ("ec", "the world alone, without text and marks", _PLAIN),
 }
+_OF_TRAINING = ("--episodes", "--checkpoints", "--training.", "--task.")  # of no use to a policy
 # Where a kind has defaults of its own.
 _DEFAULTS: dict[str, dict[str, Any]] = {
     "episode": {"out": "results/renders/episode.gif", "size": "1280x720"},
@@ -120,8 +116,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         add_settings(one, TRAINING)
     settings, given = parser.parse_given(arguments)
     for flag in given.values():
-        of_training = flag in _TRAINING or flag.startswith(("--training.", "--task."))
-        if of_training and getattr(settings, "policy", None):
+        if flag.startswith(_OF_TRAINING) and getattr(settings, "policy", None):
             parser.error(f"{flag} is of training, but --policy is trained, so leave one out")
         if flag in ("--follow", "--title") and not getattr(settings, "overlay", True):
             parser.error(f"--no-overlay leaves out what {flag} shows, so leave out one of them")
@@ -132,9 +127,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         if flag in ("--size", "--fps", "--no-overlay") and is_page(settings):
             parser.error(f"{flag} is of pictures, but --out names a page, so leave {flag} out")
     if settings.kind == "colony" and settings.frame_interval is None:
-        settings.frame_interval = (
-            1 if is_page(settings) else 4
-        )  # a page tells what each ant does in a tick
+        # A page tells what each ant does in a tick.
+        settings.frame_interval = 1 if is_page(settings) else 4
     return settings
 
 
@@ -160,10 +154,11 @@ def show(settings: argparse.Namespace) -> None:
         check_size(settings.size)
     load_plugin(settings.plugin)
     kinds = (show_episode, show_colony, show_learning, show_sheet)
-    dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, given_world(settings))
+    told = dict(zip(KINDS, kinds, strict=True))[settings.kind](settings, given_world(settings))
+    print(f"{settings.out}: {told}")
 
 
-def show_episode(settings: argparse.Namespace, world: World) -> None:
+def show_episode(settings: argparse.Namespace, world: World) -> str:
     """Write an episode as a page or an animation, or its end as a picture."""
     from taichi_ants.errors import count
     from taichi_ants.rendering import Episode
@@ -178,10 +173,10 @@ def show_episode(settings: argparse.Namespace, world: World) -> None:
         _save_snapshots(settings, episode.snapshots(), len(episode), title, task)
     outcome = "delivered" if episode.delivered else "not delivered"
     rewards = int(episode.trace.rewards.sum())
-    print(f"{settings.out}: {count(len(episode.trace), 'step')}, return {rewards}, {outcome}")
+    return f"{count(len(episode.trace), 'step')}, return {rewards}, {outcome}"
 
 
-def show_colony(settings: argparse.Namespace, world: World) -> None:
+def show_colony(settings: argparse.Namespace, world: World) -> str:
     """Let a colony learn together, then write an episode in which it follows what it has learned.
 
     As a single picture, the episode is shown at its last tick.
@@ -196,23 +191,20 @@ def show_colony(settings: argparse.Namespace, world: World) -> None:
     who = (config, settings.seed, settings.ants)
     colony = Colony(world, task, *who, sharing="frozen", q_values=q_values)
     colony.begin_episode()
-    times = settings.ticks, settings.frame_interval
+    ticks, every, follow = settings.ticks, settings.frame_interval, settings.follow
     if is_page(settings):
         with progress_bar("Recording") as progress:
-            more: dict[str, Any] = {"follow": settings.follow, "progress": progress}
-            recording = record_colony(colony, *times, title=title, **more)
+            more: dict[str, Any] = {"title": title, "follow": follow, "progress": progress}
+            recording = record_colony(colony, ticks, every, **more)
         save_page(settings.out, recording)
     else:
-        snapshots = colony_snapshots(colony, *times, settings.follow)
-        _save_snapshots(
-            settings, snapshots, 1 + -(-settings.ticks // settings.frame_interval), title, task
-        )
+        snapshots = colony_snapshots(colony, ticks, every, follow)
+        _save_snapshots(settings, snapshots, 1 + -(-ticks // every), title, task)
     delivered = count(int(colony.outcome().deliveries.sum()), "delivery")
-    ants, ticks = count(settings.ants, "ant"), count(colony.ticks, "tick")
-    print(f"{settings.out}: {ants}, {ticks}, {delivered}")
+    return f"{count(settings.ants, 'ant')}, {count(colony.ticks, 'tick')}, {delivered}"
 
 
-def show_learning(settings: argparse.Namespace, world: World) -> None:
+def show_learning(settings: argparse.Namespace, world: World) -> str:
     """Write the same ant after more and more episodes, side by side."""
     from taichi_ants import learners
     from taichi_ants.errors import count
@@ -220,21 +212,21 @@ def show_learning(settings: argparse.Namespace, world: World) -> None:
 
     seed, checkpoints = noted_checkpoints(settings, world)
     ant = "an ant" if settings.seed is not None else f"the median of {count(settings.seeds, 'ant')}"
-    config = training_config(settings)
-    title = settings.title or f"{learners.label(config.learner)}: {ant} before and after learning"
+    learner = learners.label(training_config(settings).learner)
+    title = settings.title or f"{learner}: {ant} before and after learning"
     longest = max(len(checkpoint.episode) for checkpoint in checkpoints)
     _save(settings, learning_frames(checkpoints, settings.size, title), longest)
     told = [f"{one.title}{f' ({one.among})' if one.among else ''}" for one in checkpoints]
-    print(f"{settings.out}: seed {seed}, {', '.join(told)}")
+    return f"seed {seed}, {', '.join(told)}"
 
 
-def show_sheet(settings: argparse.Namespace, world: World) -> None:
+def show_sheet(settings: argparse.Namespace, world: World) -> str:
     """Write what a policy does in each state."""
     from taichi_ants.rendering import policy_sheet, save_picture
 
     q_values, task, title = find_policy(settings, world)
     save_picture(settings.out, policy_sheet(q_values, title, task=task))
-    print(f"{settings.out}: the best action in each state")
+    return "the best action in each state"
 
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, Task, str]:
@@ -245,14 +237,13 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
     if settings.policy:
         policy = load_policy(settings.policy)
         title = settings.title or f"Following {Path(settings.policy).name}"
-        task = policy.task
-        if settings.kind == "episode":  # of one ant: nothing comes and goes
-            task = replace(task, life=Life())
-        return policy.q_values, task, title
+        # An episode is of one ant: nothing comes and goes.
+        alone = settings.kind == "episode"
+        return policy.q_values, replace(policy.task, life=Life()) if alone else policy.task, title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
     title = settings.title or f"{learners.label(config.learner)} after {count(episodes, 'episode')}"
     with progress_bar("Training") as progress:
-        task = TASK.but(**given_settings(settings).get("task", {}))
+        task = _task(settings)
         if settings.kind != "colony":
             result = train(world, config, seed, episodes, task=task, progress=progress)
             return result.q_values[0, 0], task, title
@@ -260,6 +251,11 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
         colony = Colony(world, task, config, seed, settings.ants)
         colony.run(episodes, settings.ticks, progress)
     return colony.q_values[0], task, title
+
+
+def _task(settings: argparse.Namespace) -> Task:
+    """The task with what options change."""
+    return TASK.but(**given_settings(settings).get("task", {}))
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
@@ -273,29 +269,22 @@ def noted_checkpoints(settings: argparse.Namespace, world: World) -> tuple[int, 
     from taichi_ants.rendering import learning_checkpoints, typical_seed
 
     seed, among = settings.seed, [""] * len(settings.checkpoints)
-    what: dict[str, Any] = {
-        "checkpoints": settings.checkpoints,
-        "max_steps": settings.max_steps,
-        "task": TASK.but(**given_settings(settings).get("task", {})),
-        "epsilon": settings.epsilon,
-    }
+    given = (world, training_config(settings))
+    what: dict[str, Any] = {"checkpoints": settings.checkpoints, "task": _task(settings)}
+    what |= {"max_steps": settings.max_steps, "epsilon": settings.epsilon}
     with progress_bar("Training") as progress:
-        what |= {"progress": progress}
+        what["progress"] = progress
         if seed is None:
-            several = range(settings.seeds)
-            seed, deliver = typical_seed(world, training_config(settings), seeds=several, **what)
+            seed, deliver = typical_seed(*given, seeds=range(settings.seeds), **what)
             if settings.seeds > 1:
                 among = [f"{n} of {settings.seeds} ants deliver{'s' * (n == 1)}" for n in deliver]
-        checkpoints = learning_checkpoints(world, training_config(settings), seed=seed, **what)
-    numbers = [
-        classify(checkpoint.episode.trace, settings.max_steps)[0][0] for checkpoint in checkpoints
-    ]
-    notes = [
-        checkpoint.note if number in (DELIVERS, OTHER) else BEHAVIOURS[number]
-        for checkpoint, number in zip(checkpoints, numbers, strict=True)
-    ]
-    noted = zip(checkpoints, notes, among, strict=True)
-    return seed, [replace(checkpoint, note=note, among=other) for checkpoint, note, other in noted]
+        checkpoints = learning_checkpoints(*given, seed=seed, **what)
+    noted = []
+    for checkpoint, others in zip(checkpoints, among, strict=True):
+        number = classify(checkpoint.episode.trace, settings.max_steps)[0][0]
+        note = checkpoint.note if number in (DELIVERS, OTHER) else BEHAVIOURS[number]
+        noted.append(replace(checkpoint, note=note, among=others))
+    return seed, noted
 
 
 def _save_snapshots(
@@ -312,8 +301,8 @@ def _save_snapshots(
     look: dict[str, Any] = {"size": settings.size, "title": title, "overlay": settings.overlay}
     look["strongest"] = task.pheromone.level
     if is_picture(settings.out):
-        (last,) = deque(snapshots, maxlen=1)
-        save_picture(settings.out, next(frames([last], **look)))
+        last = deque(snapshots, maxlen=1)
+        save_picture(settings.out, next(frames(last, **look)))
     else:
         _save(settings, frames(snapshots, **look), n)
 

@@ -1,11 +1,11 @@
-"""Argument packs: all arrays and numbers of a kernel as one argument, declared by what they are."""
+"""Launches of kernels on argument packs: arrays and numbers as one argument."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
-from weakref import WeakKeyDictionary, finalize, ref
+from weakref import finalize, ref
 
 import numpy as np
 import taichi as ti
@@ -14,110 +14,73 @@ from taichi.lang.argpack import ArgPack
 from taichi_ants import runtime
 
 
-class Arguments:
-    """Arrays and numbers, as the one argument by which kernels find them by their names.
-
-    It takes over a millisecond to make a pack, so that it is kept until its Taichi ends.
-    """
-
-    def __init__(self) -> None:
-        self._pack: Any = None
-        self._values: dict[str, Any] = {}
-        self._taichi: Any = lambda: None  # that the pack was made in, as a weak reference
-
-    @staticmethod
-    def type_of(values: Mapping[str, Any]) -> Any:
-        """The type of the pack of these values, to annotate the kernel's argument.
-
-        NumPy arrays, on which kernels work in place; whole numbers, for kernels i32, or u64 if they
-        are `np.uint64`; and floats, for kernels f32.
-        """
-        return _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
-
-    def pack(self, values: Mapping[str, Any]) -> Any:
-        """The pack of these values; names and types are the same in each call."""
-        kind = self.type_of(values)
-        taichi = ti.lang.impl.get_runtime()
-        if self._taichi() is not taichi:
-            self._values, self._taichi = dict(values), ref(taichi)
-            # As `kind(**values)`, which makes two packs.
-            self._pack = _Pack(kind.members, kind.dtype, dict(values))
-            memory = self._pack._ArgPack__argpack
-            finalize(self._pack, _delete, self._taichi, memory).atexit = False
-        for name, value in values.items():
-            known = self._values[name]
-            # Each number that is told again would cost Taichi some bytes for good.
-            if known is not value and (isinstance(value, np.ndarray) or known != value):
-                self._pack[name] = self._values[name] = value
-        return self._pack
-
-
 class Launch:
-    """A kernel of one argument pack, launched again and again.
+    """A kernel whose one argument is a pack, in which it finds values by their names.
 
     For each launch Taichi looks at every array anew, 10 microseconds each; here, on the CPU, once.
+    It takes over a millisecond to make a pack, so that it is kept until its Taichi ends.
+
+    `kernel_of` returns the kernel of a type of pack: with NumPy arrays, on which kernels work in
+    place; whole numbers, i32, or u64 if they are `np.uint64`; and floats, f32.
     """
 
-    def __init__(self, kernel: Callable[[Any], None]) -> None:
-        self._kernel, self._arguments = kernel, Arguments()
+    def __init__(self, kernel_of: Callable[[Any], Callable[[Any], None]]) -> None:
+        self._kernel_of = kernel_of
         self._taichi: Any = lambda: None  # in which the launch was prepared
         # No reference to its program, which would outlive a reset of Taichi.
         self._compiled: Any = None
-        self._context: Any = None
-        self._known: dict[str, Any] = {}  # the values that it has
+        self._kernel: Any
+        self._context: Any
+        self._pack: Any
+        self._known: dict[str, Any] = {}  # the values that the pack and the context have
 
     def __call__(self, values: Mapping[str, Any]) -> None:
         """Launch on these values, arrays C-contiguous; names and types stay the same."""
         if self._taichi() is not ti.lang.impl.get_runtime():
             runtime.start()  # somebody may have reset Taichi
             self._prepare(values)
-        known = self._known
         for name, value in values.items():
-            if known[name] is not value:
-                self._set(values)
-                break
+            if self._known[name] is not value:
+                self._set(name, value)
         if self._compiled is None:
-            self._kernel(self._arguments.pack(values))
+            self._kernel(self._pack)
         else:
             ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Compile the kernel, as Taichi would; elsewhere than on the CPU Taichi launches it."""
+        kind = _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
+        self._kernel = self._kernel_of(kind)
         taichi = ti.lang.impl.get_runtime()
-        kernel, program = self._kernel._primal, taichi.prog  # type: ignore[attr-defined]
-        pack = self._arguments.pack(values)
+        program, kernel = taichi.prog, self._kernel._primal
+        # As `kind(**values)`, which makes two packs.
+        self._pack = pack = _Pack(kind.members, kind.dtype, dict(values))
+        memory = pack._ArgPack__argpack
+        finalize(pack, _delete, ref(taichi), memory).atexit = False
         with runtime.quiet():
             one = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
             compiled = program.compile_kernel(program.config(), program.get_device_caps(), one)
         self._context = one.make_launch_context()
-        self._context.set_arg_argpack((0,), pack._ArgPack__argpack)
+        self._context.set_arg_argpack((0,), memory)
         on_cpu = program.config().arch in (ti.x64, ti.arm64)
         self._compiled = compiled if on_cpu else None  # else arrays move for each launch
-        self._taichi, self._known = ref(taichi), dict.fromkeys(values)
-
-    def _set(self, values: Mapping[str, Any]) -> None:
-        """Tell what has changed; the arrays of a pack are arguments of their own behind it."""
-        self._arguments.pack(values)
+        # Arrays of a pack are arguments of their own behind it, which the context lacks.
         arrays = [name for name, value in values.items() if isinstance(value, np.ndarray)]
-        for number, name in enumerate(arrays):
-            array = values[name]
-            if self._known[name] is not array:
-                self._context.set_arg_external_array_with_shape(
-                    (1 + number,), array.ctypes.data, array.nbytes, array.shape, 0
-                )
-        self._known = dict(values)
+        self._places = {name: (1 + number,) for number, name in enumerate(arrays)}
+        self._known = dict.fromkeys(values)
+        self._taichi = ref(taichi)
 
-
-_LAUNCHED: WeakKeyDictionary[Any, set] = WeakKeyDictionary()
-
-
-def compile_once(kernel: Callable[[Any], None], nothing: Callable[[], Any]) -> None:
-    """Launch a kernel on arguments that are no work, unless the Taichi that runs has done so."""
-    launched = _LAUNCHED.setdefault(ti.lang.impl.get_runtime(), set())
-    if kernel not in launched:
-        with runtime.quiet():
-            kernel(nothing())
-        launched.add(kernel)
+    def _set(self, name: str, value: Any) -> None:
+        """Tell Taichi of a value that may have changed."""
+        # Each value that is told again would cost Taichi some bytes for good.
+        known = self._pack[name]
+        if known is not value and (isinstance(value, np.ndarray) or known != value):
+            self._pack[name] = value
+        if isinstance(value, np.ndarray):
+            self._context.set_arg_external_array_with_shape(
+                self._places[name], value.ctypes.data, value.nbytes, value.shape, 0
+            )
+        self._known[name] = value
 
 
 class _Pack(ArgPack):

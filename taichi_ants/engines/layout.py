@@ -1,6 +1,22 @@
-"""Names of the columns and rows of arrays that engines and kernels share; no Taichi here."""
+"""The memory layout that engines and kernels share: names of columns and rows, and cells packed.
 
+A packed cell is one i32, so that one load tells all of it: the stored trail (0 or more) if it is
+empty, else its ground less 16, which is negative; its lower four bits still show how the cell
+looks. No Taichi here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
 from enum import IntEnum, auto
+
+import numpy as np
+
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.learners.learner import Memory
+from taichi_ants.task.constants import EMPTY, N_ACTIONS
+from taichi_ants.worlds.world import World
 
 # The settings of a run, columns in front of the hyperparameters of its learner.
 SETTINGS = (
@@ -27,3 +43,39 @@ class Command(IntEnum):
     STEP = 0
     BEGIN = auto()  # an episode
     WAIT = auto()
+
+
+_OCCUPIED = 16
+
+
+def pack_cells(world: World) -> np.ndarray:
+    """The cells of a world at the start of an episode, i32 (grid.size,)."""
+    ground = world.ground()
+    packed = np.where(ground == EMPTY, world.trail_levels(), ground.astype(np.int32) - _OCCUPIED)
+    return np.ascontiguousarray(packed, dtype=np.int32)
+
+
+def unpack_cells(packed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What packed cells (n,) hold, uint8 (n,), and the trails that are stored there, int32 (n,)."""
+    ground = np.where(packed >= 0, EMPTY, packed + _OCCUPIED).astype(np.uint8)
+    return ground, np.maximum(packed, 0)
+
+
+def compass_of(grid: AxialGrid) -> np.ndarray:
+    """Index steps and turns by heading, and set bits, i32 (294,); laid out as `rules.actions`."""
+    headings = np.arange(N_HEADINGS)
+    steps = grid.offsets[(np.arange(N_HEADINGS + 2) - 1) % N_HEADINGS]
+    turns = [(headings + by) % N_HEADINGS for by in (-1, 0, 1, 0, 0)]
+    bits = np.zeros((1 << N_ACTIONS, 8), np.int64)
+    for mask in range(1 << N_ACTIONS):
+        (numbers,) = np.nonzero(mask >> np.arange(N_ACTIONS) & 1)
+        bits[mask, : len(numbers)] = numbers
+    return np.concatenate([steps, *turns, bits.reshape(-1)]).astype(np.int32)
+
+
+def padded(memory: Memory) -> Memory:
+    """A memory of which kernels can address many, one behind the other.
+
+    Counted by 8: compilers then know that neighbouring addresses differ in their last bits alone.
+    """
+    return replace(memory, floats=-(-memory.floats // 8) * 8, integers=-(-memory.integers // 8) * 8)

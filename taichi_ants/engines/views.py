@@ -54,11 +54,6 @@ def judge(half: ti.template(), view: ti.template(), observation: ti.template()):
     )
 
 
-def is_percept(observation: Observation) -> bool:
-    """Whether the state index is the percept itself, so that no view is needed: the paper's."""
-    return observation.name == "paper"
-
-
 @cache
 def encode_function(observation: Observation) -> Callable[..., Any]:
     """`encode` of an observation for kernels; AntsError if Taichi cannot compile it."""

@@ -103,20 +103,17 @@ class Choices:
         }
 
     def setup(self, chosen: Any) -> Setup:
-        """The session that a page has chosen.
+        """The session that a page has chosen; AntsError if something is missing or not allowed.
 
         Args:
             chosen: {"world": of `WORLDS`, "map": text, "world_seed", "size": of a world that is
                 drawn, "settings": values by the paths of `fields`, "policy": "learn sarsa",
                 "file NAME" or "by hand", "ants", "seed", "ticks": of an episode, 0 for one without
                 end}.
-
-        Raises:
-            AntsError: Something is not allowed, or is not there.
         """
         expect("the choice", chosen, dict)
-        needed = {"world", "map", "world_seed", "size", "settings", "policy"}
-        for name in sorted({*needed, "ants", "seed", "ticks"}):
+        needed = ("ants", "map", "policy", "seed", "settings", "size", "ticks")
+        for name in (*needed, "world", "world_seed"):
             if name not in chosen:
                 raise AntsError(f"{name} is not chosen; choose it.")
         world, policy, table, name = chosen["world"], chosen["policy"], None, ""
@@ -125,6 +122,10 @@ class Choices:
         if policy.startswith(LEARNS):
             name = policy.removeprefix(LEARNS)
             check_one_of("the learner", name, learners.names())
+        if world == "map":  # never the name of a world or of a file
+            expect("the map", chosen["map"], str)
+            if "\n" not in chosen["map"]:
+                raise AntsError(f"the map is {shown(chosen['map'])}; it must have several lines.")
         settings = _settings(chosen["settings"], world, name)
         task = Task.from_dict(settings.get("task", {}))
         if policy == BY_HAND:
@@ -138,12 +139,12 @@ class Choices:
         training = {**_LEARNING, **settings.get("training", {})}
         ranges = {"ranges": [size] * 3} if worlds.is_drawn(world) else {}
         return Setup(
-            world=_map(chosen["map"]) if world == "map" else world,
+            world=chosen["map"] if world == "map" else world,
             task=task,
             policy=TrainingConfig(name, **training) if table is None else table,
-            ants=checked_whole("how many ants", chosen["ants"], 1, MOST_ANTS),
+            ants=chosen["ants"],
             seed=checked_whole("the seed", chosen["seed"], 0),
-            ticks_per_episode=checked_whole("ticks an episode", chosen["ticks"], 0, 1_000_000),
+            ticks_per_episode=chosen["ticks"],
             sharing="shared" if shares else "independent",
             world_seed=checked_whole("the seed of the world", chosen["world_seed"], 0),
             world_settings={**settings.get("world", {}), **ranges},
@@ -155,12 +156,13 @@ class Choices:
         settings = flat(setup.task.as_dict(), "task")
         settings |= {f"world.{n}": v for n, v in setup.world_settings.items() if n != "ranges"}
         if isinstance(table, TrainingConfig):
-            policy, more = LEARNS + table.learner, dict(table.hyperparameters)
-            numbers = {**asdict(table), **more}
+            policy, numbers = (
+                LEARNS + table.learner,
+                {**asdict(table), **dict(table.hyperparameters)},
+            )
             settings |= {f"training.{n}": v for n, v in numbers.items() if type(v) in (int, float)}
         else:
-            named = self.policies.items()
-            same = (name for name, one in named if np.array_equal(one.q_values, table))
+            same = (n for n, one in self.policies.items() if np.array_equal(one.q_values, table))
             policy = next((FOLLOWS + name for name in same), BY_HAND)
         return {
             "world": "map" if is_map else setup.world,
@@ -187,14 +189,3 @@ def _settings(given: Any, world: str, learner: str) -> dict[str, Any]:
         if path not in offered:
             raise AntsError(f"{shown(path)} is not a setting of this form; leave it out.")
     return nested(given)
-
-
-def _map(text: Any) -> str:
-    """The text of a map, never the name of a world or of a file."""
-    expect("the map", text, str)
-    if len(text) > MOST_TEXT or "\n" not in text:
-        raise AntsError(
-            f"the map is {shown(text)}; it must have several lines, of at most {MOST_TEXT} "
-            "characters together."
-        )
-    return text

@@ -16,7 +16,6 @@ food move ants aside. See `taichi_ants.engines.colony.interventions` for how, an
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -24,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
@@ -94,7 +93,7 @@ def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pherom
 
 
 def checked(edit: object, interventions: Interventions) -> Edit:
-    """A copy of an edit, if it is one; whether there is room for it tells `apply`.
+    """A copy of an edit; `apply` finds out whether there is room for it.
 
     Raises:
         AntsError: It is none; the message says why.
@@ -109,10 +108,8 @@ def checked(edit: object, interventions: Interventions) -> Edit:
             f"an edit of kind {kind!r} has {shown(sorted(map(str, given)))}; it must have "
             f"{', '.join(sorted(wanted))}."
         )
-    plain: Edit = {"kind": kind}
-    for name in _FIELDS[kind]:
-        plain[name] = _checked(name, edit[name], edit, interventions)
-    return plain
+    fields = {name: _checked(name, edit, interventions) for name in _FIELDS[kind]}
+    return {"kind": kind, **fields}
 
 
 def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
@@ -121,21 +118,22 @@ def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
     Raises:
         AntsError: There is no room for it; nothing has changed.
     """
-    kind = edit["kind"]
-    if kind == "ground":
-        interventions.put(np.array(edit["cells"]), _GROUNDS[edit["what"]])
-    elif kind == "trail":
-        interventions.lay_trail(np.array(edit["cells"]), edit["level"])
-    elif kind == "add_ants":
-        interventions.add_ants(np.array(edit["cells"]), edit["heading"])
-    elif kind == "remove_ants":
-        interventions.remove_ants(np.array(edit["cells"]))
-    elif kind == "queen":
-        interventions.move_queen(edit["cell"])
-    elif kind == "set":
-        _set(edit["name"], edit["value"], interventions)
-    else:
-        interventions.begin_episode(length)
+    cells = np.array(edit.get("cells"))
+    match edit["kind"]:
+        case "ground":
+            interventions.put(cells, _GROUNDS[edit["what"]])
+        case "trail":
+            interventions.lay_trail(cells, edit["level"])
+        case "add_ants":
+            interventions.add_ants(cells, edit["heading"])
+        case "remove_ants":
+            interventions.remove_ants(cells)
+        case "queen":
+            interventions.move_queen(edit["cell"])
+        case "set":
+            _set(edit["name"], edit["value"], interventions)
+        case "episode":
+            interventions.begin_episode(length)
 
 
 def _set(name: str, value: Any, interventions: Interventions) -> None:
@@ -156,32 +154,32 @@ def _set(name: str, value: Any, interventions: Interventions) -> None:
     interventions.set_task(replace(task, pheromone=pheromone))
 
 
-def _checked(name: str, given: Any, edit: Mapping, interventions: Interventions) -> Any:
+def _checked(name: str, edit: Mapping, interventions: Interventions) -> Any:
     """The value of a field of an edit."""
-    if name == "cells":
-        return _checked_cells(given, interventions)
-    if name == "cell":
-        return _checked_cells([given], interventions)[0]
-    if name == "level":
-        return _number(name, given, Value(0, 0, MAX_DEPOSIT, 1))
-    if name == "heading":
-        allowed = Value(0, 0, N_HEADINGS - 1, 1)
-        return None if given is None else _number(name, given, allowed, ", or None")
-    if name == "value":
-        return _number(edit["name"], given, values(interventions)[edit["name"]])
-    if name == "what":
-        check_one_of(name, given, tuple(_GROUNDS))
-    else:
-        check_one_of("the name of a value", given, tuple(values(interventions)))
+    given = edit[name]
+    match name:
+        case "cells":
+            return _checked_cells(given, interventions)
+        case "cell":
+            return _checked_cells([given], interventions)[0]
+        case "level":
+            return checked_whole(name, given, 0, MAX_DEPOSIT)
+        case "heading" if given is not None:
+            return checked_whole(name, given, 0, N_HEADINGS - 1, ", or None")
+        case "value":  # of a name that was checked before
+            return _number(edit["name"], given, values(interventions)[edit["name"]])
+        case "what":
+            check_one_of(name, given, tuple(_GROUNDS))
+        case "name":
+            check_one_of("the name of a value", given, tuple(values(interventions)))
     return given
 
 
 def _checked_cells(cells: Any, interventions: Interventions) -> list[int]:
     """Cells of the world, in the order given, each once."""
-    most = interventions.colony.grid.count
+    most, exists = interventions.colony.grid.count, interventions.colony.grid.exists
     if not isinstance(cells, list) or not 1 <= len(cells) <= most:
         raise AntsError(f"cells is {shown(cells)}; it must be a list of 1 to {most} cells.")
-    exists = interventions.colony.grid.exists
     for cell in cells:
         if type(cell) is not int or not 0 <= cell < len(exists) or not exists[cell]:
             raise AntsError(
@@ -190,13 +188,10 @@ def _checked_cells(cells: Any, interventions: Interventions) -> list[int]:
     return list(dict.fromkeys(cells))
 
 
-def _number(name: str, value: Any, allowed: Value, otherwise: str = "") -> float:
-    whole = isinstance(allowed.step, int)
-    if type(value) not in ((int,) if whole else (int, float)) or not (
-        allowed.least <= value <= allowed.most and math.isfinite(value)
-    ):
-        raise AntsError(
-            f"{name} is {shown(value)}; it must be a {'whole ' * whole}number from "
-            f"{allowed.least:g} to {allowed.most:g}{otherwise}."
-        )
-    return value if whole else float(value)
+def _number(name: str, value: Any, allowed: Value) -> float:
+    if isinstance(allowed.step, int):
+        return checked_whole(name, value, int(allowed.least), int(allowed.most))
+    if type(value) not in (int, float) or not allowed.least <= value <= allowed.most:
+        least, most = f"{allowed.least:g}", f"{allowed.most:g}"
+        raise AntsError(f"{name} is {shown(value)}; it must be a number from {least} to {most}.")
+    return float(value)

@@ -5,30 +5,27 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from multiprocessing.connection import Connection
-from pathlib import Path
+from typing import Any
 
 from taichi_ants.errors import AntsError
-from taichi_ants.live.log import Log
-from taichi_ants.live.session import Session
+from taichi_ants.live.session import Log, Session, bytes_of
 from taichi_ants.viewer import Recording, page
 
 Progress = Callable[[int], None]  # called with the number of ticks that have passed
 
 _PROGRESS_EVERY = 0.1  # seconds
+_SLICE = 0.05  # seconds of undoing at each turn
 
 
 def recording(log: Log, most_frames: int = 1000, progress: Progress | None = None) -> Recording:
     """The session as a page plays it without a server, see `Session.snapshots`."""
-    snapshots = _snapshots(log, most_frames, progress)
-    session, first = next(snapshots)
-    frames = [first, *(frame for _, frame in snapshots)]
-    return Recording(session.header(), frames)
+    (*_, session), frames = zip(*_snapshots(log, most_frames, progress), strict=True)
+    return Recording(session.header(), list(frames))
 
 
 def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300) -> bytes:
@@ -38,10 +35,7 @@ def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300
     passed = _snapshots(log, most_frames, progress)
     shown = (one for session, _ in passed for one in colony_snapshots(session.colony))
     pictures = frames(shown, strongest=log.setup.task.pheromone.level)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "session.gif")
-        save_animation(path, pictures, fps=12.0)
-        return path.read_bytes()
+    return bytes_of("session.gif", lambda path: save_animation(path, pictures, fps=12.0))
 
 
 def _snapshots(log: Log, most: int, progress: Progress | None) -> Iterator[tuple[Session, bytes]]:
@@ -52,6 +46,7 @@ def _snapshots(log: Log, most: int, progress: Progress | None) -> Iterator[tuple
 
 
 # What pages call it, the name of the file, and what makes it: at once, or from the beginning.
+LOAD = "load"  # what they call the replay of an uploaded file, or of a session in part undone
 QUICK: dict[str, tuple[str, Callable[[Session], bytes]]] = {
     "session": ("session.npz", Session.to_bytes),
     "policy": ("policy.npz", Session.policy_bytes),
@@ -63,29 +58,42 @@ SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
 }
 
 
-def replayed(log: Log, progress: Progress) -> Session:
-    """The session of a file, as it is at its end."""
-    for session in Session.replay(log):
-        progress(session.steps)
-    return session
+class Undoing:
+    """A session that is made once more without its last change; attributes as of `Making`."""
 
+    page = None
 
-LOAD = "load"
-_MAKES: dict[str, Callable[[Log, Progress], bytes | Session]] = {
-    **{kind: make for kind, (_, make) in SLOW.items()},
-    LOAD: replayed,
-}
+    def __init__(self, session: Session) -> None:
+        self._pieces, self._last = session.undone(), session
+        self.done, (self.total, _) = 0, session.edits[session.changes[-1]]
+        self.made: Session | str | None = None
+
+    def go_on(self) -> None:
+        """Undo for a moment; AntsError and MemoryError become words in `made`."""
+        until = time.monotonic() + _SLICE
+        try:
+            for session in self._pieces:
+                self._last, self.done = session, session.steps
+                if time.monotonic() > until:
+                    return
+            self.made = self._last
+        except AntsError as error:
+            self.made = str(error)
+        except MemoryError:
+            self.made = "undoing needs more memory than there is."
+
+    def cancel(self) -> None:
+        """Nothing to do: the session is as it was."""
 
 
 class Making:
     """A file of `SLOW` that a worker process makes, or a session that it replays (`LOAD`).
 
     `content` is the session as its file holds it, `total` its ticks, `prepare` what the process
-    calls first, as to load a plugin. `end` is called in a new thread with `made`, unless cancelled.
+    calls first, as to load a plugin; `page` is who asked.
 
     Attributes:
         done: How many of the ticks have passed.
-        over: Whether it has ended.
         made: What was made, or why there is nothing; None before the end.
     """
 
@@ -95,19 +103,22 @@ class Making:
         content: bytes,
         total: int,
         prepare: Callable[[], None] | None,
-        end: Callable[[bytes | str | Session], None] = lambda made: None,
+        page: Any = None,
     ) -> None:
-        self.kind, self.done, self.total, self.over = kind, 0, total, False
+        self._kind, self.done, self.total, self.page = kind, 0, total, page
         self.made: bytes | str | Session | None = None
-        self._cancelled, self._end = False, end
+        self._cancelled = False
         context = multiprocessing.get_context("spawn")
         self._answers, answers = context.Pipe(duplex=False)
         given = (kind, content, prepare, answers)
         self._process = context.Process(target=_make, args=given, daemon=True)
         threading.Thread(target=self._run, args=(answers,), daemon=True).start()
 
+    def go_on(self) -> None:
+        """Nothing to do: the process goes on by itself."""
+
     def cancel(self) -> None:
-        """End it now; for any thread."""
+        """End it now."""
         self._cancelled = True
         if self._process.pid is not None:
             self._process.terminate()
@@ -123,9 +134,8 @@ class Making:
                 self.done = answer
         if isinstance(answer, int):
             answer = "the process that was to do this has ended early, as for lack of memory."
-        self.made, self.over = answer, True
-        if not self._cancelled:
-            self._end(answer)
+        faulty = isinstance(answer, str) and self._kind == LOAD
+        self.made = _of_page(answer) if faulty else answer
 
 
 def _make(
@@ -146,6 +156,25 @@ def _make(
     try:
         if prepare is not None:
             prepare()
-        answers.send(_MAKES[kind](Log.from_bytes(content), progress))
+        log = Log.from_bytes(content)
+        if kind == LOAD:
+            for session in Session.replay(log):
+                progress(session.steps)
+            answers.send(session)
+        else:
+            answers.send(SLOW[kind][1](log, progress))
     except AntsError as error:
         answers.send(str(error))
+
+
+def uploaded(content: bytes) -> Log:
+    """The log in a file that a page has sent; AntsError with the way out that a page has."""
+    try:
+        return Log.from_bytes(content)
+    except AntsError as error:
+        raise AntsError(_of_page(error)) from None
+
+
+def _of_page(fault: object) -> str:
+    what = str(fault).partition("; ")[0].rstrip(".").replace("'the loaded file'", "the loaded file")
+    return f"{what}; load a session that Save has made."

@@ -1,11 +1,11 @@
 """The room in which people watch a session: its pages, and the thread in which time passes.
 
 The room serves one page, and a socket for each page that is open. It listens on this machine alone,
-and only a page of its own that knows its token gets a socket. A page asks for things in JSON,
-see `REQUESTS`; it is told what happens in JSON and in frames, see `taichi_ants.viewer.frames`.
+and only a page of its own that knows its token gets a socket. A page asks for things in JSON, see
+`Room._do`; it is told what happens in JSON and in frames, see `taichi_ants.viewer.frames`.
 
-Two threads: one serves the sockets, the other, which calls `Room.run`, has the session. Requests
-of pages go through a queue; messages to pages go back to the thread of the sockets. Files that
+Two threads: one serves the sockets, the other, which calls `Room.run`, has the session. What pages
+ask for goes through a queue; messages to pages go back to the thread of the sockets. Files that
 pages upload are checked in further threads and replayed by processes, see `exports.Making`.
 """
 
@@ -22,17 +22,16 @@ import secrets
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
 from taichi_ants.errors import AntsError
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.exports import LOAD, QUICK, SLOW, Making
-from taichi_ants.live.log import Log
-from taichi_ants.live.session import Session
+from taichi_ants.live.exports import LOAD, QUICK, SLOW, Making, Undoing, uploaded
+from taichi_ants.live.session import Log, Session
 from taichi_ants.viewer.page import assemble
 
 if TYPE_CHECKING:
@@ -55,7 +54,6 @@ _FEW = 4  # frames of an episode, below which each shows another one
 _PHASES = 24  # frames that such episodes make one of
 _STATE_EVERY = 0.5  # seconds
 _PROGRESS_EVERY = 0.2  # seconds
-_SLICE = 0.05  # seconds of undoing, after which requests are answered
 _BREATH = 0.004  # seconds after each frame, in which the thread of the sockets gets its turn
 _LONGEST_WAIT = 0.2  # seconds, for a request, before it looks whether it is to end
 _QUIET = logging.getLogger("taichi_ants.live")  # what strangers send is no news for the terminal
@@ -63,18 +61,28 @@ _QUIET.addHandler(logging.NullHandler())
 _QUIET.propagate = False
 
 
+# What would be lost, or would take away the session that is to go on if a replay is cancelled.
+_CHANGES = ("play", "step", "edit", "undo", "back", "begin", "restart")
+
+_HEADERS = {
+    "Allow": "GET, HEAD",
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "frame-ancestors 'none'",  # the page has its other rules in itself
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
 @cache
 def live_page(server: str) -> str:
     """The viewer with controls beside the world, as HTML; it connects to `server` alone."""
     folder = resources.files(__package__)
     controls, style, *scripts = (folder.joinpath(name).read_text("utf-8") for name in PARTS)
-    return assemble(
-        "Taichi Ants, live",
-        controls=controls,
-        style=style,
-        script="\n".join(scripts),
-        connect=server,
-    )
+    more = {"controls": controls, "style": style, "script": "\n".join(scripts)}
+    return assemble("Taichi Ants, live", **more, connect=server)
 
 
 class Closed(Exception):  # noqa: N818
@@ -106,6 +114,11 @@ class Page:
             self.unseen += 1
             self.tell(frame)
 
+    def has_seen(self, frames: int) -> bool:
+        """Count frames that it has drawn; whether it is behind and has drawn all that it got."""
+        self.unseen = max(0, self.unseen - frames)
+        return self.behind and self.unseen == 0
+
     def begin(self, *messages: str | bytes) -> None:
         """Send a frame that holds all, and what stands before it."""
         self.unseen, self.behind = 1, False
@@ -115,14 +128,9 @@ class Page:
 class Room:
     """A session that people watch and change together.
 
-    Args:
-        session: That begins.
-        choices: What pages can choose from.
-        port: On which it listens; 0 for one that is free.
-        prepare: Called first in processes that replay the session, as to load a plugin.
-
-    Raises:
-        AntsError: The library `websockets` is not installed, or the port cannot be used.
+    Pages can choose from `choices`. It listens on `port`, 0 for one that is free; `prepare` is
+    called first in processes that replay the session, as to load a plugin. AntsError if the library
+    `websockets` is not installed, or the port cannot be used.
     """
 
     def __init__(
@@ -151,21 +159,19 @@ class Room:
         self._shown = secrets.token_hex(8)  # by which pages that come back know the session
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, a page or not yet
-        self._requests: queue.Queue[tuple[Page, Any, asyncio.Future[None]]] = queue.Queue()
+        # Who asks, what is to be done, and what is set when it is done.
+        self._requests: queue.Queue[tuple[Page, Callable[[], None], asyncio.Future[None]]]
+        self._requests = queue.Queue()
         self._loop = asyncio.new_event_loop()
         self._over, self._leave = threading.Event(), asyncio.Event()
         self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
         self._prepare = prepare
         self._former: Session | None = None  # whose place the present one has taken
-        # Steps and edits, where it is one in part undone.
-        self._undone: tuple[int, int] | None = None
+        self._undone: tuple[int, int] | None = None  # steps and edits, if it is in part undone
         self._stroke: tuple[Page, float] | None = None  # by whom, and which, of the last edit
-        self._replay: _Replay | None = None  # of a session that is in part undone
-        self._loading: Making | None = None  # of a session that somebody has sent
-        self._loaded: Session | None = None  # which has not gone on yet
-        self._making: Making | None = None
+        self._works: dict[str, Making | Undoing] = {}  # what takes long: LOAD, or a file of SLOW
+        self._loaded: Session | None = None  # by another process, and has not gone on yet
         self._compiles = False  # whether the first step of the session goes on
-        self._for: Page | None = None  # who is given the file
         self._tells = 0.0  # when pages are told next how things stand
 
     @property
@@ -200,72 +206,50 @@ class Room:
                 self._turn()
         finally:
             self._over.set()
-            for making in (self._making, self._loading):
-                if making is not None:
-                    making.cancel()
+            for work in self._works.values():
+                work.cancel()
             with contextlib.suppress(RuntimeError):  # it has ended by itself
                 self._loop.call_soon_threadsafe(self._leave.set)
             sockets.join(2)
 
+    @property
+    def _runs(self) -> bool:
+        """Whether time passes; not while another session is replayed to take the place of this."""
+        return self.playing and LOAD not in self._works
+
     def _turn(self) -> None:
         """Let a frame's time pass if it is due, and do what a page asks for."""
         runs = self._runs and bool(self._pages)  # time stands still while nobody looks on
-        if self._loading is not None and self._loading.over:
-            self._end_loading(self._loading)
-        if self._replay is not None:
-            self._go_on(self._replay)
-        elif runs and time.monotonic() >= self._due:
+        for kind, work in [*self._works.items()]:
+            work.go_on()
+            if work.made is not None:
+                self._end_work(kind, work)
+        if runs and time.monotonic() >= self._due:
             self._pass()
         now = time.monotonic()
         if now >= self._tells:
-            every = _PROGRESS_EVERY if self._works() else _STATE_EVERY if runs else math.inf
+            every = _PROGRESS_EVERY if self._works else _STATE_EVERY if runs else math.inf
             self._tells = now + every
-            self._tell_all(self._state())
-        due = now if self._replay is not None else self._due if runs else math.inf
+            self._tell(self._state())
+        undoes = isinstance(self._works.get(LOAD), Undoing)
+        due = now if undoes else self._due if runs else math.inf
         wait = min(due - now, self._tells - now, _LONGEST_WAIT)
         with contextlib.suppress(queue.Empty):
             for _ in range(1 + len(self._pages)):  # all have their turn
-                page, request, answered = self._requests.get(timeout=max(wait, _BREATH))
-                self._answer(page, request, answered)
+                self._answer(*self._requests.get(timeout=max(wait, _BREATH)))
                 wait = 0.0
 
-    @property
-    def _runs(self) -> bool:
-        """Whether time passes."""
-        return self.playing and not self._replays
-
-    @property
-    def _replays(self) -> bool:
-        """Whether another session is being replayed, to take the place of the present one."""
-        return self._replay is not None or self._loading is not None
-
-    def _go_on(self, replay: _Replay) -> None:
-        """Undo for a moment; at the end, the new session takes the place of the present one."""
-        until = time.monotonic() + _SLICE
-        try:
-            for session in replay.pieces:
-                replay.session = session
-                if time.monotonic() > until:
-                    return
-            assert replay.session is not None
-            self._begin(replay.session, undoes=True)
-        except (AntsError, MemoryError) as error:
-            self._tell_all(_say("error", words=_words(error)))
-        self._replay, self._tells = None, 0.0
-
-    def _works(self) -> list[dict[str, Any]]:
-        """What goes on that takes long: what it is, and how many of its ticks are done."""
-        works, replay, loading, making = [], self._replay, self._loading, self._making
-        if replay is not None:
-            done = 0 if replay.session is None else replay.session.steps
-            works.append({"kind": LOAD, "done": done, "total": replay.steps})
-        if loading is not None:
-            works.append({"kind": LOAD, "done": loading.done, "total": loading.total})
-        if self._compiles:
-            works.append({"kind": "kernels", "done": 0, "total": 0})
-        if making is not None and not making.over:
-            works.append({"kind": making.kind, "done": making.done, "total": making.total})
-        return works
+    def _end_work(self, kind: str, work: Making | Undoing) -> None:
+        """Begin the session that was made, give its file to a page, or tell the fault."""
+        del self._works[kind]
+        self._tells = 0.0
+        if isinstance(work.made, Session):
+            self._begin(work.made, undoes=isinstance(work, Undoing))
+            self._loaded = work.made if isinstance(work, Making) else None
+        elif isinstance(work.made, bytes):
+            self._tell(_say("file", name=SLOW[kind][0]), work.made, to=work.page)
+        else:
+            self._tell(_say("error", words=work.made), to=work.page)
 
     def _pass(self) -> None:
         """Let the ticks of one frame pass, and show it."""
@@ -277,11 +261,10 @@ class Room:
             ticks = int(self._pace)
             self._pace -= ticks
         try:
-            self._show(self.session.advance() if ticks == 1 else self.session.leap(ticks))
+            self._advance(ticks)
         except AntsError as error:  # as of a learner whose values are no longer finite
             self.playing = False
-            self._tell_all(_say("error", words=str(error)))
-        self._end_preparing()
+            self._tell(_say("error", words=str(error)))
         took, passed = time.monotonic() - began, self.session.steps - before
         if passed == ticks and took > 0:
             self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
@@ -300,18 +283,29 @@ class Room:
         cycle = length + 1  # with the step that begins the next one
         return max(1, round(steps / cycle)) * cycle + max(1, length // _PHASES)
 
-    def _answer(self, page: Page, request: Any, answered: asyncio.Future[None]) -> None:
+    def _advance(self, ticks: int) -> None:
+        """Let ticks pass, and show them. The first ones compile kernels, which takes seconds."""
+        if self.session.steps == 0 or self.session is self._loaded:
+            self._compiles, self._loaded = True, None
+            self._tell(self._state())
+            time.sleep(_BREATH)  # in which the thread of the sockets tells it
+        try:
+            self._show(self.session.advance() if ticks == 1 else self.session.leap(ticks))
+        finally:
+            if self._compiles:
+                self._compiles, self._tells = False, 0.0  # as soon as that is so
+
+    def _answer(self, page: Page, act: Callable[[], None], answered: asyncio.Future[None]) -> None:
         """Do what a page asks for, or tell it why not; all are told soon how things stand then."""
         refused = None
         try:
-            what = request["do"]
-            if self._replays and what in _CHANGES:
-                raise AntsError("a session is being replayed; wait for its end, or cancel it.")
-            REQUESTS[what](self, page, request)
+            act()
         except Closed as error:
             refused = error
         except (AntsError, MemoryError) as error:
-            self._tell(page, _say("error", words=_words(error)))
+            no_memory = isinstance(error, MemoryError)
+            words = "this needs more memory than there is." if no_memory else str(error)
+            self._tell(_say("error", words=words), to=page)
 
         def answer() -> None:
             if not answered.done():  # as where the page has gone
@@ -320,53 +314,79 @@ class Room:
         self._post(answer)
         self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
 
-    def _load(self, page: Page, request: dict[str, Any]) -> None:
-        """Replay a session in a worker process, which can be ended at any time."""
-        log = request["log"]
-        if isinstance(log, AntsError):
-            raise _of_page(log) from log
-        self._loading = Making(LOAD, request["content"], log.steps, self._prepare)
+    def _do(self, page: Page, request: dict[str, Any]) -> None:
+        """Do what a page asks for in JSON."""
+        if request["do"] in _CHANGES:
+            self._check_free()
+        match request["do"]:
+            case "play":
+                self.playing, self._due = True, time.monotonic()
+            case "pause":
+                self.playing = False
+            case "step":  # {"ticks": 1 to 100}
+                self.playing = False
+                for _ in range(int(_number(request, "ticks", 1, 100))):
+                    self._advance(1)
+            case "speed":  # {"value": ticks a second, 1 to FASTEST}
+                self.speed, self._due = _number(request, "value", 1, FASTEST), time.monotonic()
+            case (
+                "edit"
+            ):  # {"edit": see taichi_ants.live.edits, "stroke": same in those of a stroke}
+                if not isinstance(request.get("edit"), dict):
+                    raise Closed("an edit has to be an object")
+                stroke = page, _number(request, "stroke", 0, 2**53)
+                self._show(self.session.apply(request["edit"], goes_on=stroke == self._stroke))
+                self._stroke = stroke
+            case "undo":
+                self._works[LOAD] = Undoing(self.session)
+            case "back":  # go on with the session whose place the present one has taken
+                if self._former is None:
+                    raise AntsError("there is no session before this one.")
+                self._begin(self._former, comes_back=True)
+            case "begin":  # {"chosen": see taichi_ants.live.choices}
+                self._begin(Session(self.choices.setup(request.get("chosen"))))
+            case "restart":
+                self._begin(Session(self.session.setup))
+            case "export":  # {"kind": of `QUICK` or `SLOW`}
+                self._export(page, str(request.get("kind")))
+            case "cancel":  # {"kind": of what takes long}; it may have ended meanwhile
+                kind = str(request.get("kind"))
+                if kind in self._works:
+                    self._works.pop(kind).cancel()
+                    self._tell(_say("cancelled", kind=kind))
+            case "quit":
+                self.end()
+            case _:
+                raise Closed("there is no such request")
 
-    def _end_loading(self, loading: Making) -> None:
-        """Let a session that was replayed take the place of the present one."""
-        self._loading, made = None, loading.made
-        if isinstance(made, Session):
-            self._begin(made)
-            self._loaded = made
+    def _check_free(self) -> None:
+        if LOAD in self._works:
+            raise AntsError("a session is being replayed; wait for its end, or cancel it.")
+
+    def _load(self, log: Log, content: bytes) -> None:
+        """Replay a session that was uploaded."""
+        self._check_free()
+        self._works[LOAD] = Making(LOAD, content, log.steps, self._prepare)
+
+    def _forget(self, page: Page) -> None:
+        """Cancel the file of a page that has gone."""
+        for kind, work in [*self._works.items()]:
+            if work.page is page:
+                self._works.pop(kind).cancel()
+
+    def _export(self, page: Page, kind: str) -> None:
+        if kind in QUICK:
+            name, make = QUICK[kind]
+            self._tell(_say("file", name=name), make(self.session), to=page)
+        elif kind not in SLOW:
+            raise Closed("there is no file of this kind")
+        elif self._works.keys() & SLOW.keys():
+            raise AntsError("another file is being made; wait for it, or cancel it.")
         else:
-            self._tell_all(_say("error", words=str(_of_page(made))))
-        self._tells = 0.0
+            content, ticks = self.session.to_bytes(), self.session.ticks
+            self._works[kind] = Making(kind, content, ticks, self._prepare, page)
 
-    def _undo(self, page: Page, request: dict[str, Any]) -> None:
-        """Go back to the moment before the last change."""
-        self._replay = _Replay(self.session)
-
-    def _go_back(self, page: Page, request: dict[str, Any]) -> None:
-        """Go on with the session whose place the present one has taken."""
-        if self._former is None:
-            raise AntsError("there is no session before this one.")
-        former, self._former = self._former, self.session
-        self._show_session(former)
-
-    def _cancel(self, page: Page, request: dict[str, Any]) -> None:
-        """End what takes long, of a kind that `_works` names; without it all stays as it is."""
-        kinds = [work["kind"] for work in self._works() if work["kind"] != "kernels"]
-        if (kind := request.get("kind")) not in kinds:
-            return  # it has ended meanwhile
-        if kind == LOAD:
-            if self._loading is not None:
-                self._loading.cancel()
-            self._replay = self._loading = None
-        elif self._making is not None:
-            self._making.cancel()
-        self._tell_all(_say("cancelled", kind=kind))
-
-    def _leave_room(self, page: Page, request: dict[str, Any]) -> None:
-        """Cancel the file of a page that has gone; the others are told, too."""
-        if self._making is not None and self._for is page:
-            self._making.cancel()
-
-    def _begin(self, session: Session, undoes: bool = False) -> None:
+    def _begin(self, session: Session, undoes: bool = False, comes_back: bool = False) -> None:
         """Go on with another session; pages can go back to the one before.
 
         That is the one before several in a row, where each undoes a change of the last one, or
@@ -374,116 +394,28 @@ class Room:
         """
         before = self.session
         in_a_row = undoes and self._undone == (before.steps, len(before.edits))
-        if not (in_a_row or before.same(session)):
+        if comes_back or not (in_a_row or before.same(session)):
             self._former = before
-        self._show_session(session)
         self._undone = (session.steps, len(session.edits)) if undoes else None
-
-    def _show_session(self, session: Session) -> None:
-        self.session, self._undone, self._shown = session, None, secrets.token_hex(8)
+        self.session, self._shown = session, secrets.token_hex(8)
         self.playing, self._piece, self._stroke = False, 1.0, None
-        self._compiles = False
-        messages = [*self._about(), *self._moment()]
+        self._tell_whole()
+
+    def _tell_whole(self, page: Page | None = None, begins: bool = True) -> None:
+        """Tell a page, or all, how all is now; where a session begins, also what it is about."""
+        messages: list[str | bytes] = [_say("snapshot"), self.session.snapshot()]
+        if begins:
+            header, setup, choices = self.session.header(), self.session.setup, self.choices
+            offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
+            begin = _say("begin", session=self._shown, header=header, **offered)
+            messages = [begin, self._state(), *messages]
 
         def show() -> None:
-            for page in self._pages:
-                page.begin(*messages)
+            self._pages.update([page] if page else [])
+            for one in [page] if page else self._pages:
+                one.begin(*messages)
 
         self._post(show)
-
-    def _welcome(self, page: Page, request: dict[str, Any]) -> None:
-        """Tell a new page what the session is about, and how it is now."""
-        messages = [*self._about(), *self._moment()]
-
-        def show() -> None:
-            self._pages.add(page)
-            page.begin(*messages)
-
-        self._post(show)
-
-    def _catch_up(self, page: Page, request: dict[str, Any]) -> None:
-        """Tell a page that was slow how all is now."""
-        messages = self._moment()
-        self._post(lambda: page.begin(*messages))
-
-    def _about(self) -> list[str | bytes]:
-        """What a page needs to know before the first frame of a session."""
-        header, setup, choices = self.session.header(), self.session.setup, self.choices
-        offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
-        return [_say("begin", session=self._shown, header=header, **offered), self._state()]
-
-    def _moment(self) -> list[str | bytes]:
-        """All as it is now, for a page that knows nothing of it."""
-        return [_say("snapshot"), self.session.snapshot()]
-
-    def _play(self, page: Page, request: dict[str, Any]) -> None:
-        self.playing, self._due = True, time.monotonic()
-        self._prepare_first()
-
-    def _prepare_first(self) -> None:
-        """Tell pages that the first step of a session may take seconds: kernels are compiled."""
-        if self.session.steps == 0 or self.session is self._loaded:
-            self._compiles, self._loaded = True, None
-            self._tell_all(self._state())
-            time.sleep(_BREATH)  # in which the thread of the sockets tells it
-
-    def _pause(self, page: Page, request: dict[str, Any]) -> None:
-        self.playing = False
-        self._end_preparing()
-
-    def _step(self, page: Page, request: dict[str, Any]) -> None:
-        self.playing = False
-        self._prepare_first()
-        try:
-            for _ in range(int(_number(request, "ticks", 1, 100))):
-                self._show(self.session.advance(1))
-        finally:
-            self._end_preparing()
-
-    def _end_preparing(self) -> None:
-        if self._compiles:
-            self._compiles, self._tells = False, 0.0  # as soon as that is so
-
-    def _set_speed(self, page: Page, request: dict[str, Any]) -> None:
-        self.speed, self._due = _number(request, "value", 1, FASTEST), time.monotonic()
-
-    def _edit(self, page: Page, request: dict[str, Any]) -> None:
-        edit = request.get("edit")
-        if not isinstance(edit, dict):
-            raise Closed("an edit has to be an object")
-        stroke = page, _number(request, "stroke", 0, 2**53)
-        self._show(self.session.apply(edit, goes_on=stroke == self._stroke))
-        self._stroke = stroke
-
-    def _begin_chosen(self, page: Page, request: dict[str, Any]) -> None:
-        self._begin(Session(self.choices.setup(request.get("chosen"))))
-
-    def _restart(self, page: Page, request: dict[str, Any]) -> None:
-        self._begin(Session(self.session.setup))
-
-    def _export(self, page: Page, request: dict[str, Any]) -> None:
-        kind = request.get("kind")
-        if not isinstance(kind, str) or kind not in {**QUICK, **SLOW}:
-            raise Closed("there is no file of this kind")
-        name = {**QUICK, **SLOW}[kind][0]
-        if kind in QUICK:
-            content = QUICK[kind][1](self.session)
-            self._post(lambda: page.tell(_say("file", name=name), content))
-            return
-        if self._making is not None and not self._making.over:
-            raise AntsError("another file is being made; wait for it, or cancel it.")
-
-        def end(made: Any) -> None:
-            if isinstance(made, str):
-                self._tell(page, _say("error", words=made))
-            else:
-                self._post(lambda: page.tell(_say("file", name=name), made))
-
-        content, ticks = self.session.to_bytes(), self.session.ticks
-        self._making, self._for = Making(kind, content, ticks, self._prepare, end), page
-
-    def _quit(self, page: Page, request: dict[str, Any]) -> None:
-        self.end()
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages but those that are behind."""
@@ -499,6 +431,10 @@ class Room:
 
     def _state(self) -> str:
         session = self.session
+        works = [
+            {"kind": kind, "done": work.done, "total": work.total}
+            for kind, work in self._works.items()
+        ]
         return _say(
             "state",
             playing=self._runs,
@@ -508,18 +444,17 @@ class Room:
             can_undo=bool(session.changes),
             can_go_back=self._former is not None,
             values=session.values(),
-            works=self._works(),
+            works=works + [{"kind": "kernels", "done": 0, "total": 0}] * self._compiles,
         )
 
-    def _tell_all(self, message: str) -> None:
+    def _tell(self, *messages: str | bytes, to: Page | None = None) -> None:
+        """Send messages to a page, or to all."""
+
         def tell() -> None:
-            for page in self._pages:
-                page.tell(message)
+            for page in self._pages if to is None else [to]:
+                page.tell(*messages)
 
         self._post(tell)
-
-    def _tell(self, page: Page, message: str) -> None:
-        self._post(lambda: page.tell(message))
 
     def _post(self, act: Callable[[], Any]) -> None:
         """Let the thread of the sockets do something, in the order of these calls."""
@@ -550,17 +485,11 @@ class Room:
                 page.tell(_say("over"))
 
     def _open(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request: with the page, with a refusal, or None, which opens a socket."""
-        response = self._answer_to(connection, request)
-        if response is not None:
-            for name, value in _HEADERS.items():
-                response.headers[name] = value
-            if _method(request) == "HEAD":
-                response.body = b""
-        return response
+        """Answer a request: with the page, with a refusal, or None, which opens a socket.
 
-    def _answer_to(self, connection: ServerConnection, request: Request) -> Response | None:
-        """As `_open`, without headers. The page holds no secret; a socket needs the token."""
+        The page holds no secret; a socket needs the token.
+        """
+        method = getattr(request, "method", "GET")  # websockets before 17 takes no other one
         asked = urlsplit(request.path)
         hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
         host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
@@ -570,18 +499,24 @@ class Room:
         # nobody's page.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
         knows = hmac.compare_digest("".join(tokens[:1]).encode(), self.token.encode())
-        if _method(request) not in ("GET", "HEAD")[: 1 if opens else 2]:
-            return connection.respond(405, "Only GET is allowed here.\n")
-        if not mine or not (knows or (asked.path == "/" and not tokens)):
-            return connection.respond(403, "Open the address that was printed.\n")
-        if opens:
-            full = self._joined >= _MOST_PAGES
-            return connection.respond(503, "Too many pages are open.\n") if full else None
-        if asked.path != "/":
-            return connection.respond(404, "There is nothing here.\n")
-        response = connection.respond(200, live_page(f"ws://{host[0]}"))
-        del response.headers["Content-Type"]
-        response.headers["Content-Type"] = "text/html; charset=utf-8"
+        if method not in ("GET", "HEAD")[: 1 if opens else 2]:
+            response = connection.respond(405, "Only GET is allowed here.\n")
+        elif not mine or not (knows or (asked.path == "/" and not tokens)):
+            response = connection.respond(403, "Open the address that was printed.\n")
+        elif opens:
+            if self._joined < _MOST_PAGES:
+                return None
+            response = connection.respond(503, "Too many pages are open.\n")
+        elif asked.path != "/":
+            response = connection.respond(404, "There is nothing here.\n")
+        else:
+            response = connection.respond(200, live_page(f"ws://{host[0]}"))
+            del response.headers["Content-Type"]
+            response.headers["Content-Type"] = "text/html; charset=utf-8"
+        for name, value in _HEADERS.items():
+            response.headers[name] = value
+        if method == "HEAD":
+            response.body = b""
         return response
 
     async def _hear(self, connection: ServerConnection) -> None:
@@ -591,14 +526,16 @@ class Room:
         page = Page(connection)
         self._joined += 1
         try:
-            await self._ask(page, {"do": "join"})
+            await self._ask(page, partial(self._tell_whole, page))
             async for message in connection:
-                if isinstance(message, bytes):  # in a thread, while others are answered
-                    log = await asyncio.to_thread(_log_or_fault, message)
-                    await self._ask(page, {"do": LOAD, "log": log, "content": message})
+                if isinstance(message, bytes):
+                    await self._upload(page, message)
                     continue
-                for request in self._read(page, message):
-                    await self._ask(page, request)
+                request = _read(message)
+                if request["do"] != "seen":
+                    await self._ask(page, partial(self._do, page, request))
+                elif page.has_seen(int(_number(request, "frames", 0, 1000))):
+                    await self._ask(page, partial(self._tell_whole, page, begins=False))
         except Closed as error:
             await connection.close(1008, str(error))
         except ConnectionClosed:
@@ -606,103 +543,39 @@ class Room:
         finally:
             self._joined -= 1
             self._pages.discard(page)
-            self._requests.put((page, {"do": "leave"}, self._loop.create_future()))
+            self._requests.put((page, partial(self._forget, page), self._loop.create_future()))
 
-    def _read(self, page: Page, message: str) -> Iterator[Any]:
-        """The request in a message, if the session has to do with it."""
-        if len(message) > _MOST_TEXT:
-            raise Closed("this is too long")
+    async def _upload(self, page: Page, content: bytes) -> None:
+        """Look at a file of a page in a thread, while others are answered."""
         try:
-            request = json.loads(message, parse_constant=_refuse)
-        except (ValueError, RecursionError):
-            raise Closed("this is no JSON") from None
-        if not isinstance(request, dict) or not isinstance(request.get("do"), str):
-            raise Closed('a request has to be an object with a "do"')
-        if request["do"] == "seen":
-            page.unseen = max(0, page.unseen - int(_number(request, "frames", 0, 1000)))
-            if page.behind and page.unseen == 0:
-                yield {"do": "catch up"}
-        elif request["do"] in REQUESTS and request["do"] not in _INWARD:
-            yield request
+            log = await asyncio.to_thread(uploaded, content)
+        except AntsError as error:
+            page.tell(_say("error", words=str(error)))
         else:
-            raise Closed("there is no such request")
+            await self._ask(page, partial(self._load, log, content))
 
-    async def _ask(self, page: Page, request: Any) -> None:
+    async def _ask(self, page: Page, act: Callable[[], None]) -> None:
         answered = self._loop.create_future()
-        self._requests.put((page, request, answered))
+        self._requests.put((page, act, answered))
         await answered
-
-
-class _Replay:
-    """The present session, while `pieces` make it once more without its last change."""
-
-    def __init__(self, session: Session) -> None:
-        self.pieces = session.undone()
-        self.steps, _ = session.edits[session.changes[-1]]  # at its end
-        self.session: Session | None = None  # so far
-
-
-REQUESTS: dict[str, Callable[[Room, Page, Any], None]] = {
-    "join": Room._welcome,  # what a socket says by being opened
-    "leave": Room._leave_room,  # what it says by being closed
-    "catch up": Room._catch_up,  # what a page says by having seen all that it was sent
-    LOAD: Room._load,  # what it says by sending bytes
-    "play": Room._play,
-    "pause": Room._pause,
-    "step": Room._step,  # {"ticks": 1 to 100}
-    "speed": Room._set_speed,  # {"value": ticks a second, 1 to FASTEST}
-    "edit": Room._edit,  # {"edit": see taichi_ants.live.edits, "stroke": same in those of a stroke}
-    "undo": Room._undo,
-    "back": Room._go_back,
-    "begin": Room._begin_chosen,  # {"chosen": see taichi_ants.live.choices}
-    "restart": Room._restart,
-    "export": Room._export,  # {"kind": of `QUICK` or `SLOW`}
-    "cancel": Room._cancel,  # {"kind": of what takes long}
-    "quit": Room._quit,
-}
-_INWARD = ("join", "leave", "catch up", LOAD)
-# What would be lost, or would take away the session that is to go on if a replay is cancelled.
-_CHANGES = (LOAD, "play", "step", "edit", "undo", "back", "begin", "restart")
-
-_HEADERS = {
-    "Allow": "GET, HEAD",
-    "Cache-Control": "no-store",
-    "Content-Security-Policy": "frame-ancestors 'none'",  # the page has its other rules in itself
-    "Cross-Origin-Opener-Policy": "same-origin",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "X-Frame-Options": "DENY",
-    "Cross-Origin-Resource-Policy": "same-origin",
-}
-
-
-def _method(request: Request) -> str:
-    """The method; versions of websockets before 17 close all but GET themselves."""
-    return getattr(request, "method", "GET")
-
-
-def _log_or_fault(content: bytes) -> Log | AntsError:
-    """The session in a file that a page has sent, or what is wrong with it."""
-    try:
-        return Log.from_bytes(content)
-    except AntsError as error:
-        return error
-
-
-def _of_page(fault: object) -> AntsError:
-    """What is wrong with a file, with the way out that a page has."""
-    what = str(fault).partition("; ")[0].rstrip(".").replace("'the loaded file'", "the loaded file")
-    return AntsError(f"{what}; load a session that Save has made.")
-
-
-def _words(error: Exception) -> str:
-    no_memory = isinstance(error, MemoryError)
-    return "this needs more memory than there is." if no_memory else str(error)
 
 
 def _say(kind: str, /, **facts: Any) -> str:
     """A message to a page."""
     return json.dumps({"say": kind, **facts}, separators=(",", ":"))
+
+
+def _read(message: str) -> dict[str, Any]:
+    """The request in a message."""
+    if len(message) > _MOST_TEXT:
+        raise Closed("this is too long")
+    try:
+        request = json.loads(message, parse_constant=_refuse)
+    except (ValueError, RecursionError):
+        raise Closed("this is no JSON") from None
+    if not isinstance(request, dict) or not isinstance(request.get("do"), str):
+        raise Closed('a request has to be an object with a "do"')
+    return request
 
 
 def _refuse(name: str) -> None:

@@ -1,4 +1,4 @@
-"""A colony that people watch and change: deterministic, recorded, replayed to the bit."""
+"""A colony that people watch and change, and its log, which replays it to the bit."""
 
 from __future__ import annotations
 
@@ -8,23 +8,100 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from taichi_ants import files
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, checked_whole, expect
+from taichi_ants.files.archives import Kind
 from taichi_ants.learners.policies import save_policy
 from taichi_ants.live import edits
-from taichi_ants.live.log import KIND, MOST_TICKS, Log, cells_of, check_room
 from taichi_ants.live.setup import Setup
+from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import Recorder
 
+MOST_TICKS = 1_000_000_000
+MOST_EDITS = 10_000
+MOST_CELLS = 400_000  # that edits name, all together
+# Sessions within these limits fit into `most`, so reading a file takes little time and memory.
+_WRITER = "Session.save, or Save on its page,"
+KIND = Kind("session", 3, _WRITER, most=5_000_000, most_lists=100_000)
 _PIECE = 0.02  # seconds, of a session that is replayed
 _BETWEEN = 0.1  # seconds of simulation between two snapshots, which undoing has to replay at most
 _MOST_KEPT = 1 << 28  # bytes of snapshots
 _LARGEST = 1 << 26  # bytes of a colony of which snapshots are taken
+
+
+def cells_of(edit: Any) -> int:
+    """The number of cells that an edit names, which may be none."""
+    cells = edit.get("cells") if isinstance(edit, dict) else None
+    return len(cells) if isinstance(cells, list) else 0
+
+
+def check_room(n_edits: int, n_cells: int) -> None:
+    """Raises AntsError if a session has more edits, or cells in them, than one may have."""
+    if n_edits > MOST_EDITS or n_cells > MOST_CELLS:
+        raise AntsError(
+            f"the session has {n_edits} edits of {n_cells} cells, and at most {MOST_EDITS} edits "
+            f"of {MOST_CELLS} cells are allowed; begin another session."
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """What a session was up to some moment; see `Session.replay`."""
+
+    setup: Setup
+    edits: tuple[tuple[int, Any], ...]  # (steps, edit) of each, in order, see `edits`
+    steps: int  # that time has made, see `Session`
+    ticks: int | None  # that have passed, if that is known
+    state: str | None  # of `Interventions.state` then, if that is known
+    name: str = "the session"  # in messages
+    changes: tuple[int, ...] = ()  # as in `Session`
+
+    def write(self, path: files.PathLike) -> None:
+        """Write the log; raises as `archives.write` does."""
+        table = np.zeros((0, N_ACTIONS)) if self.setup.learns else self.setup.policy
+        facts = {
+            "task": self.setup.task.as_dict(),
+            "setup": self.setup.to_json(),
+            **{"edits": self.edits, "changes": self.changes},
+            **{"steps": self.steps, "ticks": self.ticks, "state": self.state},
+        }
+        KIND.write(path, facts, {"table": np.asarray(table, np.float32)})
+
+    @classmethod
+    def read(cls, path: files.PathLike, content: bytes | None = None) -> Log:
+        """The log in a file; arguments and errors are those of `archives.read`."""
+        with KIND.reading(path, content) as (arrays, facts):
+            expect("state", facts["state"], str)
+            steps = checked_whole("steps", facts["steps"], 0, MOST_TICKS)
+            edits, before = [], 0
+            for at, edit in facts["edits"]:
+                before = checked_whole("steps", at, before, steps)
+                edits.append((before, edit))
+            last = max(len(edits) - 1, 0)
+            changes = [checked_whole("changes", first, 0, last) for first in facts["changes"]]
+            if changes[:1] != [0][: len(edits)] or changes != sorted(set(changes)):
+                raise ValueError("changes")
+            log = cls(
+                *(Setup.from_json(facts["setup"], arrays["table"]), tuple(edits), steps),
+                checked_whole("ticks", facts["ticks"], 0, steps),
+                *(facts["state"], str(path), tuple(changes)),
+            )
+        check_room(len(edits), sum(cells_of(edit) for _, edit in edits))
+        log.setup.check_size()
+        return log
+
+    @classmethod
+    def from_bytes(cls, content: bytes) -> Log:
+        """As `read`, of what a file holds that somebody has sent."""
+        return cls.read("the loaded file", content)
 
 
 class _Snapshot(NamedTuple):
@@ -38,10 +115,8 @@ class _Snapshot(NamedTuple):
 class Session:
     """A colony in a world, from its first tick on, and all interventions.
 
-    It depends on its setup and its edits alone: `load` replays them.
-
-    Args:
-        setup: How it begins.
+    It depends on its setup and its edits alone: `load` replays them. AntsError if the world or the
+    colony cannot be built.
 
     Attributes:
         colony: As it is now; nobody else may move it on.
@@ -49,9 +124,6 @@ class Session:
         steps: How many steps time has made: ticks, and episodes that began since one had ended.
         edits: (steps, edit) of each edit, in order.
         changes: Where in `edits` each change begins; the strokes of a brush are one change.
-
-    Raises:
-        AntsError: The world or the colony cannot be built.
     """
 
     def __init__(self, setup: Setup) -> None:
@@ -95,16 +167,13 @@ class Session:
         return new
 
     def snapshot(self) -> bytes:
-        """A frame that holds all as it is now, for a page that has read none."""
+        """A frame of all as it is now, for a page that has read none."""
         return self._recorder.whole()
 
     def advance(self, n: int = 1) -> bytes:
         """Let n ticks pass, fewer where the episode ends before; a frame of what has changed.
 
         If the episode has ended, the next one begins instead, and no tick passes.
-
-        Raises:
-            AntsError: n is not allowed.
         """
         return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
 
@@ -112,9 +181,6 @@ class Session:
         """Let time make n steps, also through several episodes; a frame of what has changed.
 
         What ants did between is in no frame, as it may be in those of `advance`.
-
-        Raises:
-            AntsError: n is not allowed.
         """
         until = self.steps + checked_whole("n", n)
         while self.steps < until:
@@ -146,10 +212,8 @@ class Session:
         """Do an edit now, see `edits`, and record it; a frame of what has changed.
 
         If the episode has ended, what is of this episode alone goes with it. An edit that `goes_on`
-        belongs to the same change as the one before, see `undone`.
-
-        Raises:
-            AntsError: It is none, or there is no room for it; nothing has changed.
+        belongs to the same change as the one before, see `undone`. AntsError if it is none, or
+        there is no room for it; nothing has changed.
         """
         self._do(edit, goes_on)
         return self._recorder.snapshot()
@@ -177,9 +241,8 @@ class Session:
         are the nearest to each other in time.
         """
         kept = self._snapshots
-        if kept and self._spent - kept[-1].spent < _BETWEEN:
-            return
-        if self.colony.nbytes > _LARGEST:
+        is_near = kept and self._spent - kept[-1].spent < _BETWEEN
+        if is_near or self.colony.nbytes > _LARGEST:
             return
         bare: Any = copy.copy(self)
         bare.setup, bare.edits, bare.changes, bare._snapshots = None, [], [], []
@@ -200,22 +263,20 @@ class Session:
         done, changes = tuple(self.edits), tuple(self.changes)
         return Log(self.setup, done, self.steps, self.ticks, state, changes=changes)
 
-    def to_bytes(self) -> bytes:
-        """The log, as a file holds it."""
-        return _bytes_of("session.npz", self.save)
-
     def save(self, path: files.PathLike) -> None:
         """Write the log; raises as `archives.write` does."""
         self.log().write(path)
+
+    def to_bytes(self) -> bytes:
+        """The log, as a file holds it."""
+        return bytes_of("session.npz", self.save)
 
     @classmethod
     def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
         """Replay a session that `save` wrote, up to its end.
 
-        `progress` is called now and then with the share of the ticks that have passed.
-
-        Raises:
-            AntsError: The file is missing, damaged or altered, or its end is another one here.
+        `progress` is called now and then with the share of the ticks that have passed. AntsError if
+        the file is missing, damaged or altered, or its end is another one here.
         """
         log = Log.read(path)
         for session in cls.replay(log):
@@ -227,31 +288,27 @@ class Session:
     def replay(cls, log: Log) -> Iterator[Session]:
         """Make the session of a log once more, in pieces, so that others get their turn.
 
-        Yields:
-            The session as far as it has come, some times a second at least; at last all of it.
-
-        Raises:
-            AntsError: The log is damaged, or its end is another one here.
+        Yields the session as far as it has come, some times a second at least; at last all of it.
+        AntsError if the log is damaged, or its end is another one here.
         """
         with KIND.building(log.name):
             session = cls(log.setup)
-            for _ in session._follow(log.edits, log.steps, log.changes):
-                yield session
+            yield from session._follow(log.edits, log.steps, log.changes)
             if log.state not in (None, session.interventions.state()):
                 raise ValueError("replayed, it does not end as it did")
-        yield session
 
     def _follow(
         self, edits: Sequence[tuple[int, Any]], steps: int, changes: Sequence[int]
-    ) -> Iterator[None]:
+    ) -> Iterator[Session]:
         """Let time pass until it has made so many steps, with these edits, in short pieces."""
         for at, edit in edits:
             yield from self._pieces(at)
             self._do(edit)
-            yield
+            yield self
         yield from self._pieces(steps)
         self.changes = list(changes)
         self._recorder.snapshot()
+        yield self
 
     def same(self, other: Session) -> bool:
         """Whether another one began alike, was changed alike, and stands where this one does."""
@@ -261,17 +318,10 @@ class Session:
     def undone(self) -> Iterator[Session]:
         """Make the session as it was before its last change, from the last snapshot before it.
 
-        Yields:
-            As `replay` does; this session stays as it is.
-
-        Raises:
-            AntsError: Nothing has been changed.
+        Yields as `replay` does; this session stays as it is. AntsError if nothing has been changed.
         """
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
-        return self._before_last_change()
-
-    def _before_last_change(self) -> Iterator[Session]:
         *changes, last = self.changes
         kept = [one for one in self._snapshots if one.edits <= last]
         if kept:
@@ -281,22 +331,18 @@ class Session:
         else:
             session = Session(self.setup)
         steps, _ = self.edits[last]
-        for _ in session._follow(self.edits[len(session.edits) : last], steps, changes):
-            yield session
-        yield session
+        return session._follow(self.edits[len(session.edits) : last], steps, changes)
 
     @classmethod
     def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
         """Replay a session from its beginning, snapshot by snapshot.
 
         There are about `most` snapshots. If there are fewer steps and edits, each step has a
-        snapshot, and so does each intervention.
-
-        Yields:
-            The session at that moment, and a frame of what has changed since the last one.
+        snapshot, and so does each intervention. Yields the session at that moment, and a frame of
+        what has changed since the last one.
         """
         changes = len({steps for steps, _ in log.edits})
-        every = max(1, -(-(log.steps + changes) // checked_whole("most", most)))
+        every = max(1, -(-(log.steps + changes) // most))
         session = cls(log.setup)
         yield session, session.snapshot()
         for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda one: one[0]):
@@ -314,21 +360,17 @@ class Session:
             if wanted if every == 1 else steps == log.steps:
                 yield session, session._recorder.snapshot()
 
-    def _pieces(self, steps: int) -> Iterator[None]:
+    def _pieces(self, steps: int) -> Iterator[Session]:
         """Let time pass until it has made so many steps, in pieces of about `_PIECE` seconds."""
         ticks = 1
         while self.steps < steps:
             began = time.perf_counter()
             self._pass(min(ticks, steps - self.steps), self.colony.tick)
             ticks = max(1, 2 * ticks if time.perf_counter() - began < _PIECE else ticks // 2)
-            yield
+            yield self
 
     def policy_bytes(self) -> bytes:
-        """The action values as they are now, as a policy file holds them.
-
-        Raises:
-            AntsError: Each ant has a table of its own.
-        """
+        """The action values as a policy file holds them; AntsError if each ant has a table."""
         colony = self.colony
         if colony.one_a_slot:
             raise AntsError(
@@ -338,8 +380,8 @@ class Session:
         told = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
         if self.setup.learns:
             told["training"] = colony.training.as_dict()
-        values, sees = colony.q_values[0], colony.task.observation
-        return _bytes_of("policy.npz", lambda path: save_policy(path, values, told, sees))
+        given = (colony.q_values[0], told, colony.task.observation)
+        return bytes_of("policy.npz", lambda path: save_policy(path, *given))
 
     def colony_bytes(self) -> bytes:
         """The colony as it is now, as `Colony.save` writes it; `Colony.load` goes on from it.
@@ -347,10 +389,10 @@ class Session:
         Its later episodes begin as those of the session would, with as many ants as this one.
         """
         self.colony.worlds = (self.interventions.world(),)
-        return _bytes_of("colony.npz", self.colony.save)
+        return bytes_of("colony.npz", self.colony.save)
 
 
-def _bytes_of(name: str, write: Callable[[Path], None]) -> bytes:
+def bytes_of(name: str, write: Callable[[Path], None]) -> bytes:
     """What a function writes into a file of that name."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name

@@ -33,35 +33,21 @@ _MOST_NUMBERS = 1 << 27  # of tables of ants' own
 class Setup:
     """How a session begins.
 
-    Attributes:
-        world: The name of a registered world, or the text of a map.
-        task: The rules of the game.
-        policy: How ants learn; or the action values that they follow, float (n_states, 5).
-        ants: How many start each episode.
-        capacity: How many ants can live at once; None: 2 * `ants` + 64.
-        seed: Of the colony.
-        ticks_per_episode: 0 for one episode without an end.
-        sharing: Of ants that learn: "shared" or "independent", see `Colony`.
-        epsilon: With which ants follow action values.
-        world_seed: Of a world that is drawn.
-        world_settings: Of a registered world, see `worlds.build`.
-
-    Raises:
-        AntsError: A value is not allowed. Whether the world, and a colony in it, can be built tells
-            `Session`.
+    AntsError if a value is not allowed; `Session` finds out whether the world, and a colony in it,
+    can be built.
     """
 
-    world: str
+    world: str  # the name of a registered world, or the text of a map
     task: Task
-    policy: TrainingConfig | np.ndarray
-    ants: int = 64
-    capacity: int | None = None
-    seed: int = 0
-    ticks_per_episode: int = 0
-    sharing: str = "shared"
-    epsilon: float = 0.01
-    world_seed: int = 0
-    world_settings: Mapping[str, Any] = field(default_factory=dict)
+    policy: TrainingConfig | np.ndarray  # or the action values that ants follow, (n_states, 5)
+    ants: int = 64  # that start each episode
+    capacity: int | None = None  # how many ants can live at once; None: 2 * `ants` + 64
+    seed: int = 0  # of the colony
+    ticks_per_episode: int = 0  # 0: one episode without an end
+    sharing: str = "shared"  # or "independent", of ants that learn, see `Colony`
+    epsilon: float = 0.01  # with which ants follow action values
+    world_seed: int = 0  # of a world that is drawn
+    world_settings: Mapping[str, Any] = field(default_factory=dict)  # see `worlds.build`
 
     def __post_init__(self) -> None:
         expect("world", self.world, str)
@@ -95,13 +81,13 @@ class Setup:
 
     def check_size(self) -> None:
         """Raise AntsError if the world is too large, as far as is known before it is built."""
-        settings = self.world_settings
-        if "\n" in self.world:
-            if len(self.world) > MOST_TEXT:
-                raise AntsError(
-                    f"the map has {len(self.world)} characters, and at most {MOST_TEXT} are "
-                    "allowed; draw a smaller one."
-                )
+        settings, is_map = self.world_settings, "\n" in self.world
+        if is_map and len(self.world) > MOST_TEXT:
+            raise AntsError(
+                f"the map has {len(self.world)} characters, and at most {MOST_TEXT} are allowed; "
+                "draw a smaller one."
+            )
+        if is_map:
             _check_cells(text_map.ranges_of(self.world))
         elif settings.get("ranges") is not None:
             _check_cells(parse_ranges(settings["ranges"]))
@@ -113,17 +99,13 @@ class Setup:
         self.check_size()
         if "\n" in self.world:
             return worlds.from_text(self.world)
-        if self.world not in worlds.names():  # never a path
-            raise AntsError(
-                f"there is no world named {shown(self.world)}; choose one of "
-                f"{', '.join(worlds.names())}, or give the text of a map."
-            )
+        check_one_of("the world", self.world, worlds.names())  # never a path
         world = worlds.build(self.world, self.world_seed, **self.world_settings)
         _check_cells(world.ranges)
         return world
 
     def build_colony(self) -> Colony:
-        """The colony, before its first episode; raises AntsError if it cannot be."""
+        """The colony, before its first episode; AntsError if it cannot be."""
         options: dict[str, Any] = {"ants": self.ants, "capacity": self.capacity}
         numbers = self.capacity * self.task.n_states * ROW  # type: ignore[operator]
         if self.learns and self.sharing == "independent" and numbers > _MOST_NUMBERS:
@@ -132,11 +114,10 @@ class Setup:
                 'many ants take too much memory; take a smaller one, or sharing "shared".'
             )
         if isinstance(self.policy, TrainingConfig):
-            options |= {"sharing": self.sharing}
-            training = self.policy
+            training, options["sharing"] = self.policy, self.sharing
         else:
-            options |= {"sharing": "frozen", "q_values": self.policy}
             training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
+            options |= {"sharing": "frozen", "q_values": self.policy}
         return Colony(self.build_world(), self.task, training, self.seed, **options)
 
     def to_json(self) -> dict[str, Any]:
@@ -148,19 +129,15 @@ class Setup:
 
     @classmethod
     def from_json(cls, facts: object, table: np.ndarray | None = None) -> Setup:
-        """The setup of `to_json`; what is left out is as usual.
+        """The setup of `to_json`, with the action values if the policy is "table".
 
-        `table` holds the action values, if the policy is "table".
-
-        Raises:
-            AntsError: A value is not allowed.
+        What is left out is as usual. AntsError if a value is not allowed.
         """
         expect("a setup", facts, Mapping)
         assert isinstance(facts, Mapping)
         known = [one.name for one in fields(cls)]
-        for name in facts:
-            if name not in known:
-                raise AntsError(f"a setup has no {shown(name)}; choose among {', '.join(known)}.")
+        for name in facts.keys() - known:
+            raise AntsError(f"a setup has no {shown(name)}; choose among {', '.join(known)}.")
         policy: Any = facts.get("policy")
         try:
             policy = TrainingConfig(**policy) if policy != "table" or table is None else table

@@ -11,8 +11,8 @@ import numpy as np
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, neighbour
+from taichi_ants.reference.observations import is_better
 from taichi_ants.reference.random_stream import RandomStream, hash_of, pick
-from taichi_ants.reference.vision import is_better
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import (
     EMPTY,
@@ -27,6 +27,17 @@ from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
     from taichi_ants.task import Task, Traffic
+
+# The field of `Rewards` that pays for an event.
+PAID = {
+    Event.ENTERED_EMPTY: "empty",
+    Event.PUSHED: "empty",
+    Event.ENTERED_LURE: "shaping",
+    Event.PICKED_UP: "pick_up",
+    Event.DELIVERED: "deliver",
+    Event.BLOCKED: "failed",
+    Event.FAILED: "failed",
+}
 
 
 def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomStream) -> int:
@@ -44,14 +55,12 @@ def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomSt
 
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """What an ant is about to do.
+    """The action that an ant is about to do, 0 to 4.
 
     Attributes:
-        ant: As it is at the start of the tick.
-        action: 0..4.
-        heading: Of a move or a pick-up: towards its cell.
-        target: The cell that it wants to enter or whose food it wants to take. None where there is
-            nothing to want: the way is closed, no food is in view, or the action is to give.
+        heading: Of a move or a pick-up, towards its target.
+        target: The cell that it wants to enter or whose food it wants to take. None if the way is
+            closed, no food is in view, or the action is to give.
         lured: Whether the cell looks T or S, or is better than the ant's own if an ant is there.
         gives: Whether it can give.
     """
@@ -97,22 +106,14 @@ def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent
 
 
 def winners(
-    intents: Sequence[Intent],
-    tick: int,
-    index: Callable[[Cell], int],
-    carriers_first: bool = False,
+    intents: Sequence[Intent], tick: int, index: Callable[[Cell], int], carriers_first: bool = False
 ) -> set[int]:
     """The slots of the ants that win the cell, or the food, that they want.
 
-    Of those that want one cell, it is the one whose own cell has the smallest hash with the tick;
-    were two equal, the one with the smaller heading towards the cell. So neither numbers of ants
-    nor their order matter, and no place in the world wins for ever.
-
-    Args:
-        intents: All wishes of a tick.
-        tick: Its number in the episode, from 0.
-        index: The number of a cell that is hashed.
-        carriers_first: Whether an ant with food wins against all without.
+    Of those that want one cell, it is the one whose own cell (its `index`) has the smallest hash
+    with the tick; of equal ones, the one with the smaller heading towards the cell. So neither
+    numbers of ants nor their order matter, and no place in the world wins for ever. With
+    `carriers_first` an ant with food wins against all without.
     """
     best: dict[Cell, tuple[bool, int, int, int]] = {}
     for intent in intents:
@@ -128,17 +129,14 @@ def winners(
 def settle(
     intents: Sequence[Intent], winning: set[int], traffic: Traffic
 ) -> tuple[dict[int, Cell], dict[int, Cell]]:
-    """By slot the cells that ants enter, and those onto which others are pushed.
+    """Return, by slot, the cells that ants enter, and those onto which others are pushed.
 
-    Args:
-        intents: All wishes of a tick.
-        winning: The slots of those that win what they want.
-        traffic: Who may enter a cell on which another ant stands.
+    `winning` are the slots of the ants that win what they want.
     """
     standing: dict[Cell | None, Intent] = {intent.ant.cell: intent for intent in intents}
 
     def moves(intent: Intent) -> bool:
-        """Whether an ant enters its cell, which is empty or which another one leaves."""
+        """Return whether an ant enters its cell, which is empty or which another one leaves."""
         one = intent
         while one.enters and one.ant.slot in winning:
             ahead = standing.get(one.target)
@@ -176,51 +174,41 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
     entered, pushed = settle(intents, winning, task.traffic)
     events = []
     for intent in intents:
-        slot = intent.ant.slot
+        ant, slot = intent.ant, intent.ant.slot
+        ant.action = intent.action
+        if intent.action < PICK_UP:
+            # The turn is made even if the way is blocked: so an ant gets out of a dead end.
+            ant.heading = intent.heading
         if slot in pushed:
-            events.append(_pushed(intent, pushed[slot], task))
+            ant.cell, event = pushed[slot], Event.PUSHED
         elif intent.action < PICK_UP:
-            events.append(_moved(world, intent, entered.get(slot), task))
+            event = _move(world, intent, entered.get(slot))
         else:
-            events.append(_handled(world, intent, slot in winning, task))
-    for intent in intents:
-        intent.ant.carried += intent.ant.carries
+            event = _handle(world, intent, slot in winning, task)
+        ant.reward = getattr(task.rewards, PAID[event])
+        ant.carried += ant.carries
+        events.append(event)
     world.ants = {intent.ant.cell: intent.ant for intent in intents}
     return events
 
 
-def _moved(world: WorldState, intent: Intent, destination: Cell | None, task: Task) -> Event:
-    """Do a move, onto a cell or none."""
-    ant, rewards = intent.ant, task.rewards
-    # The turn is made even if the way is blocked: so an ant gets out of a dead end.
-    ant.action, ant.heading, ant.reward = intent.action, intent.heading, rewards.failed
+def _move(world: WorldState, intent: Intent, destination: Cell | None) -> Event:
+    ant = intent.ant
     if destination is None:
         return Event.BLOCKED
     ant.cell = destination
     if ant.carries:
         world.trail.deposit(destination, ant.carried)
-    ant.reward = rewards.shaping if intent.lured else rewards.empty
     return Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
 
 
-def _pushed(intent: Intent, destination: Cell, task: Task) -> Event:
-    """Give way; of its own action only the turn of a move is left."""
+def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
+    """Do a pick-up or a delivery, if it can be done."""
     ant = intent.ant
-    ant.action, ant.cell, ant.reward = intent.action, destination, task.rewards.empty
-    if intent.action < PICK_UP:
-        ant.heading = intent.heading
-    return Event.PUSHED
-
-
-def _handled(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
-    """Do a pick-up or a give, if it can be done."""
-    ant, rewards = intent.ant, task.rewards
-    ant.action, ant.reward = intent.action, rewards.failed
     if intent.gives:
         ant.carries, ant.carried = False, 0
         if task.turns_at_queen:
             ant.heading = (ant.heading + 3) % N_HEADINGS
-        ant.reward = rewards.deliver
         return Event.DELIVERED
     if intent.action == PICK_UP and wins and intent.target is not None:
         world.ground[intent.target] = EMPTY
@@ -228,6 +216,5 @@ def _handled(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event
         world.trail.deposit(ant.cell, 0)
         ant.carries = True
         ant.heading = (ant.heading + 3) % N_HEADINGS
-        ant.reward = rewards.pick_up
         return Event.PICKED_UP
     return Event.FAILED

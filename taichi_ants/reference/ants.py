@@ -24,17 +24,12 @@ class Ant:
     """An ant.
 
     Attributes:
-        cell, heading, carries: Where it is (normal form), where it looks (0..5), whether it
-            carries food.
         slot: Its place in the colony, 0 .. slots - 1; free again after its death.
         number: The initial ants are 0 .. n - 1, those born in an episode n, n + 1, ...
-        stream: Its random stream.
-        age: Ticks that it has lived, where there is a lifespan, else 0.
-        carried: Ticks that it has carried its food, 0 without food.
-        percept: What lies in the three cells ahead, 0..127; what it does goes by this.
-        state: The index of its state; what it chooses and learns goes by this.
-        action: What it did last, 0..4; -1 before its first tick.
-        reward: What that gave; 0 before its first tick.
+        age, carried: Ticks that it has lived, if there is a lifespan, and carried its food.
+        percept: Load and looks of the three cells ahead, 0 to 127, by which it acts.
+        state: The state index, by which it chooses and learns.
+        action, reward: The last ones; -1 and 0 before its first tick.
         chosen: The action that it has drawn already for its next tick, if any.
     """
 
@@ -55,20 +50,17 @@ class Ant:
 
 @dataclass(kw_only=True, slots=True)
 class Transition:
-    """What one ant did in one tick, and what it learns from.
+    """One ant in one tick, from which it learns.
 
     Attributes:
-        slot, number: Of the ant.
         episode, step: The episode in the run and the tick in the episode, from 0.
-        cell, heading, state: Of the ant before the tick.
-        action, reward, event: What it did, and what came of it.
-        next_state: Of the ant after the tick.
-        next_action: a', if it was drawn.
-        terminated: Whether it gave its food and this counts as a terminal state: the update does
-            not bootstrap.
+        cell, heading, state: Before the tick.
+        next_state, next_action: After it; the action if it was drawn.
+        terminated: Whether it delivered and this is a terminal state: the update does not
+            bootstrap.
         truncated: Whether this was the ant's last update in the episode all the same: its last
             tick, its death, or a delivery that ends the episode and is not terminal.
-        td_error: Of the update from this step (planning is not recorded); None if nobody learns.
+        td_error: Of the update from this step (planning is not recorded); None without learning.
     """
 
     slot: int
@@ -89,42 +81,41 @@ class Transition:
 
     @property
     def pair(self) -> Pair:
-        """State and action."""
         return self.state, self.action
 
 
 def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tuple[Cell, int]]:
-    """Cell and heading of each of n ants.
+    """Return cell and heading of each of n ants; AntsError if the world has too few free cells.
 
     The ants that the world lists come first. The others take free cells, those nearest to the
     queen if `where` is "nest", any if it is "spread", otherwise in an order that depends on the
     seed; and a heading that depends on the seed.
-
-    Raises:
-        AntsError: The world has too few free cells.
     """
     listed = [((x, y, z), heading) for x, y, z, heading in world.ants.tolist()]
     if n <= len(listed):
         return listed[:n]
     taken = {world.queen, *listed_cells(world.foods), *listed_cells(world.obstacles)}
     taken |= {cell for cell, _ in listed}
-    free = [
-        (
-            distance(cell, world.queen) if where == "nest" else 0,
-            stream_state(seed, STREAM_START_CELL, number),
-            cell,
-        )
-        for number, cell in enumerate(existing_cells(world.ranges))
-        if cell not in taken
-    ]
+    order = start_order(world, world.queen, seed, where)
+    free = [cell for cell in order if cell not in taken]
     missing = n - len(listed)
     if missing > len(free):
         raise AntsError(
             f"n is {n}; the world lists {len(listed)} ants and has {len(free)} free cells, "
             "so take fewer ants or a larger world."
         )
-    first = [cell for _, _, cell in sorted(free)[:missing]]
     return listed + [
         (cell, pick(stream_state(seed, STREAM_START_HEADING, ant) >> 32, N_HEADINGS))
-        for ant, cell in enumerate(first, start=len(listed))
+        for ant, cell in enumerate(free[:missing], start=len(listed))
     ]
+
+
+def start_order(world: World, queen: Cell, seed: int, where: str) -> list[Cell]:
+    """Return all cells in the order in which ants take those that are free, see `starts`."""
+    numbers = {cell: number for number, cell in enumerate(existing_cells(world.ranges))}
+
+    def key(cell: Cell) -> tuple[int, int]:
+        far = distance(cell, queen) if where == "nest" else 0
+        return far, stream_state(seed, STREAM_START_CELL, numbers[cell])
+
+    return sorted(numbers, key=key)

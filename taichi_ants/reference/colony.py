@@ -23,10 +23,9 @@ from taichi_ants.reference.ants import Ant, Transition, starts
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.learners import LEARNERS
-from taichi_ants.reference.observations import OBSERVATIONS
+from taichi_ants.reference.observations import OBSERVATIONS, observe
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.sharing import SHARING
-from taichi_ants.reference.vision import observe
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, PICK_UP
@@ -36,25 +35,14 @@ from taichi_ants.worlds.world import World
 
 @dataclass
 class EpisodeRecord:
-    """What happened in an episode so far.
-
-    Attributes:
-        episode_return: Sum of the rewards of all ants.
-        ticks: How many have passed.
-        deliveries: Foods given to the queen.
-        moves: Moves tried, 0..2 among the actions.
-        blocked: Moves that only turned the ant.
-        first_delivery: Ticks passed when the first food had been given; -1 if none was.
-        births, deaths: Of ants.
-        regrown: Foods that grew back.
-    """
+    """Sums over all ants of an episode so far."""
 
     episode_return: int = 0
     ticks: int = 0
     deliveries: int = 0
-    moves: int = 0
-    blocked: int = 0
-    first_delivery: int = -1
+    moves: int = 0  # tried
+    blocked: int = 0  # of them
+    first_delivery: int = -1  # ticks passed when the first food item had been delivered
     births: int = 0
     deaths: int = 0
     regrown: int = 0
@@ -63,26 +51,28 @@ class EpisodeRecord:
 class ReferenceColony:
     """Ants in one world: `begin_episode`, any number of `tick`s, `end_episode`, and again.
 
+    Arguments are those of `Colony`. An ant that is born with a table of its own begins with the
+    initial values, whatever `q_values` are.
+
     Attributes:
-        world: The present state of the world.
-        start_world: The world in which each episode begins.
-        n_ants: How many ants start an episode.
-        task: The rules of the game.
-        pheromone: How trails are laid, fall and spread; where the task says so, they do not fall.
-        seed, sharing, slots, start: As given; there are so many slots for ants.
-        ants: The living ants by slot.
+        world: The present state of the world, which begins each episode as `start_world`.
+        n_ants: The number of ants that start an episode.
+        pheromone: That of the task; where the task says so, it does not evaporate.
+        ants: The living ants by slot, of which there are `slots`.
         streams: Of the initial ants; they run on through all episodes.
-        food_sources: The places of the foods of the start.
         next_number: Of the next ant that comes to those that started.
-        store: Foods that wait with the queen to become ants.
+        store: Food items that wait with the queen to become ants.
         queen_stream: Her random stream, which runs on; food that wanders draws from it as well.
         minds: The tables; see `sharing`.
         epsilon, learning_rate: Of the present episode, float64.
         episode: Its number in the run, from 0; -1 before the first.
-        record: What happened in the present episode, or in the last one between two.
-        records: Of each finished episode.
+        record: Of the present episode, or of the last one between two; `records`: of finished ones.
         transitions: Of each ant that acted in the last tick, by ascending slot.
         over: Whether the episode has ended at a delivery; it then takes no further tick.
+
+    Raises:
+        AntsError: The learner, one of its hyperparameters, the sharing or the observation is
+            unknown, the learner cannot share a table, or the world has too few cells for the ants.
     """
 
     def __init__(
@@ -98,24 +88,6 @@ class ReferenceColony:
         sharing: str = "shared",
         q_values: np.ndarray | None = None,
     ) -> None:
-        """Set up a run, before its first episode.
-
-        Args:
-            world: Every episode starts from it.
-            task: The rules of the game; the paper's if None.
-            training: The learner and its settings.
-            seed: Any integer.
-            ants, capacity, start, ends_at_delivery: As in `Colony`.
-            sharing: "shared", "independent" or "frozen".
-            q_values: The table to begin with, (n_states, 5); with "independent" also (slots,
-                n_states, 5). Zeros if not given. A born ant that has a table of its own begins
-                with zeros all the same.
-
-        Raises:
-            AntsError: The learner, one of its hyperparameters, the sharing or the observation is
-                unknown, the learner cannot share a table, or the world has too few cells for the
-                ants.
-        """
         self.task = task = task or Task()
         check_one_of("sharing", sharing, tuple(SHARING))
         check_one_of("learner", training.learner, tuple(LEARNERS))
@@ -191,8 +163,7 @@ class ReferenceColony:
     def run_episode(self, ticks: int) -> Iterator[list[Transition]]:
         """Run an episode of so many ticks, fewer where it ends at a delivery.
 
-        Yields:
-            The transitions of each tick.
+        Yield the transitions of each tick.
         """
         self.begin_episode()
         while self.record.ticks < ticks and not self.over:
@@ -201,7 +172,7 @@ class ReferenceColony:
         self.end_episode()
 
     def run(self, episodes: int, ticks: int) -> list[Transition]:
-        """Run episodes, see `run_episode`; all of their transitions."""
+        """Run episodes, see `run_episode`; return all of their transitions."""
         ticked = (steps for _ in range(episodes) for steps in self.run_episode(ticks))
         return [step for steps in ticked for step in steps]
 
@@ -213,7 +184,11 @@ class ReferenceColony:
         acting = [self.ants[slot] for slot in sorted(self.ants)]
         before = [copy.copy(ant) for ant in acting]
         traffic = self.task.traffic
-        intents = [intend(self.world, ant, self._choose(ant), traffic) for ant in acting]
+        intents = []
+        for ant in acting:
+            action = self._draw_action(ant) if ant.chosen is None else ant.chosen
+            ant.chosen = None
+            intents.append(intend(self.world, ant, action, traffic))
         events = carry_out(self.world, intents, tick, self.task)
         for intent, event in zip(intents, events, strict=True):
             if event is Event.PICKED_UP and intent.target is not None:
@@ -224,16 +199,16 @@ class ReferenceColony:
             self.store += events.count(Event.DELIVERED)
             self._births()
         dying = self._deaths(acting)
-        self._food(tick)
+        life = self.task.life
+        if life.regrowth is not None:
+            self.record.regrown += self.food_sources.regrow(self.world, life.regrowth, tick)
+        if life.wander is not None and (tick + 1) % life.wander == 0:
+            self.food_sources.wander(self.world, self.queen_stream)
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
         self._learn(before, acting, events, last or self.over)
         self.record.ticks += 1
-
-    def _choose(self, ant: Ant) -> int:
-        action, ant.chosen = ant.chosen, None
-        return self._draw_action(ant) if action is None else action
 
     def _draw_action(self, ant: Ant) -> int:
         values = self.minds.of(ant.slot).rows[ant.state]
@@ -293,13 +268,6 @@ class ReferenceColony:
         self.record.deaths += len(dying)
         return dying
 
-    def _food(self, tick: int) -> None:
-        life = self.task.life
-        if life.regrowth is not None:
-            self.record.regrown += self.food_sources.regrow(self.world, life.regrowth, tick)
-        if life.wander is not None and (tick + 1) % life.wander == 0:
-            self.food_sources.wander(self.world, self.queen_stream)
-
     def _learn(
         self, before: Sequence[Ant], after: Sequence[Ant], events: Sequence[Event], last: bool
     ) -> None:
@@ -334,10 +302,7 @@ class ReferenceColony:
 def beginner(
     world: World, config: TrainingConfig, seed: int, task: Task | None = None
 ) -> ReferenceColony:
-    """One ant, before its training.
-
-    Of the world's listed ants it is the first; if there is none, it is placed by the seed.
-    """
+    """Return one ant before its training: the first that the world lists, else by the seed."""
     return ReferenceColony(world, task, config, seed, ends_at_delivery=True, sharing="independent")
 
 
@@ -349,10 +314,7 @@ def follower(
     task: Task | None = None,
     epsilon: float = 0.0,
 ) -> ReferenceColony:
-    """One ant that goes by a table (n_states, 5), before its episode.
-
-    `number` tells which rollout of the seed it is; each has a random stream of its own.
-    """
+    """Return one ant that goes by a table (n_states, 5), before rollout `number` of the seed."""
     training = TrainingConfig("q_learning", 1.0, 1.0, epsilon, 1.0)
     colony = ReferenceColony(
         world, task, training, seed, ends_at_delivery=True, sharing="frozen", q_values=q_values

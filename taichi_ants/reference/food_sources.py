@@ -17,15 +17,10 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class FoodSource:
-    """The place of one food of the start.
-
-    Attributes:
-        cell: Where it is now.
-        waiting_since: The tick in which its food was taken; None while the food is there.
-    """
+    """The present place of one food of the start."""
 
     cell: Cell
-    waiting_since: int | None = None
+    waiting_since: int | None = None  # the tick in which the food was taken; None: it is there
 
 
 class FoodSources:
@@ -33,9 +28,6 @@ class FoodSources:
 
     Food that lies elsewhere, since a dying ant dropped it, has no food source. At most one full
     food source is on a cell; waiting ones may share it, with each other or with a full one.
-
-    Attributes:
-        food_sources: In their order.
     """
 
     def __init__(self, world: World) -> None:
@@ -79,7 +71,7 @@ class FoodSources:
         """Let food grow back on the empty cells of food sources that have waited `delay` ticks.
 
         Returns:
-            How many foods grew back.
+            The number of food items that grew back.
         """
         regrown = 0
         for source in self.food_sources:
@@ -129,17 +121,11 @@ def _connected(food_sources: list[FoodSource]) -> list[list[FoodSource]]:
 
 def _front_first(pile: list[FoodSource], heading: int) -> list[FoodSource]:
     """The food sources of a pile, the foremost in the direction of `heading` first."""
-    step_q, step_r = _axial(HEADING_STEPS[heading])
+    dx, dy, dz = HEADING_STEPS[heading]
 
     def progress(source: FoodSource) -> int:
-        q, r = _axial(source.cell)
-        return step_q * q + step_r * r
+        x, y, z = source.cell
+        return (dx - dz) * (x - z) + (dy - dz) * (y - z)
 
-    return sorted(
-        pile, key=progress, reverse=True
-    )  # stable: ties keep the order of the food sources
-
-
-def _axial(cell: Cell) -> tuple[int, int]:
-    x, y, z = cell
-    return x - z, y - z
+    # Ties keep the order of the food sources.
+    return sorted(pile, key=progress, reverse=True)

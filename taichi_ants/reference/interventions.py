@@ -6,22 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from taichi_ants.grid.constants import (
-    N_HEADINGS,
-    STREAM_ANT,
-    STREAM_INTERVENTION,
-    STREAM_START_CELL,
-)
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
+from taichi_ants.reference.ants import start_order
 from taichi_ants.reference.colony import ReferenceColony
-from taichi_ants.reference.geometry import (
-    Cell,
-    distance,
-    existing_cells,
-    listed_cells,
-    normal_form,
-)
+from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, normal_form
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.reference.trail import Trail
+from taichi_ants.reference.world_state import Trail
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds.world import World
 
@@ -31,12 +21,8 @@ REACH = 8  # cells that an ant is moved aside at most
 class Interventions:
     """Changes a colony that is in an episode; ants look around again after each change.
 
-    A cell that cannot take what is put there is left as it is. What an ant has drawn to do already
-    it still does.
-
-    Attributes:
-        colony: That is changed.
-        ants: How many start each later episode.
+    A cell that cannot take what is put there is left as it is. An ant still does the action that it
+    has drawn already. `ants` start each later episode.
     """
 
     def __init__(self, colony: ReferenceColony) -> None:
@@ -148,16 +134,9 @@ class Interventions:
         self.ants = n
         by_number = sorted(colony.ants.values(), key=lambda ant: ant.number)
         self.remove_ants([ant.cell for ant in by_number[n:]])
-        free = sorted(
-            (
-                distance(cell, world.queen) if colony.start == "nest" else 0,
-                stream_state(colony.seed, STREAM_START_CELL, number),
-                cell,
-            )
-            for number, cell in enumerate(existing_cells(self._first.ranges))
-            if world.content(cell) == EMPTY
-        )
-        self.add_ants([cell for _, _, cell in free[: max(0, n - len(by_number))]])
+        order = start_order(self._first, world.queen, colony.seed, colony.start)
+        free = [cell for cell in order if world.content(cell) == EMPTY]
+        self.add_ants(free[: max(0, n - len(by_number))])
 
     def set_evaporation(self, falls: bool) -> None:
         """Whether trails evaporate: as the task says, by 1 a tick if it says nothing."""
@@ -195,20 +174,12 @@ class Interventions:
         for number in range(len(colony.streams), self.ants):
             state = stream_state(colony.seed, STREAM_ANT, number)
             colony.streams.append(RandomStream(state))
-        held = {kind: [cell for cell, on in self._start.items() if on == kind]
+        start = self._start
+        held = {kind: [cell for cell in start if start[cell] == kind]
                 for kind in (QUEEN, FOOD, OBSTACLE)}  # fmt: skip
-        trails, ants = first.trails.tolist(), first.ants.tolist()
-        colony.begin_episode(
-            World(
-                first.ranges,
-                held[QUEEN][0],
-                held[FOOD],
-                held[OBSTACLE],
-                [(row[:3], row[3]) for row in trails if tuple(row[:3]) not in held[OBSTACLE]],
-                [
-                    (row[:3], row[3])
-                    for row in ants
-                    if self._start.get(tuple(row[:3]), EMPTY) == EMPTY
-                ],
-            )
-        )
+        trails = [(tuple(row[:3]), row[3]) for row in first.trails.tolist()]
+        trails = [(cell, level) for cell, level in trails if start.get(cell) != OBSTACLE]
+        ants = [(tuple(row[:3]), row[3]) for row in first.ants.tolist()]
+        ants = [(cell, heading) for cell, heading in ants if start.get(cell, EMPTY) == EMPTY]
+        [queen] = held[QUEEN]
+        colony.begin_episode(World(first.ranges, queen, held[FOOD], held[OBSTACLE], trails, ants))

@@ -1,24 +1,79 @@
-"""The twins of the package's observations: what an ant observes."""
+"""What an ant sees of the cells around it, and the twins of the package's observations."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.vision import (
-    cells_in_view,
-    codes_in_view,
-    is_better,
-    levels_in_view,
-    strongest_in_view,
-)
+from taichi_ants.reference.geometry import Cell, distance, neighbour
 from taichi_ants.reference.world_state import Level, WorldState
-from taichi_ants.task.constants import SEES_GOAL, SEES_LURE, SEES_OBSTACLE
+from taichi_ants.task.constants import (
+    EMPTY,
+    FOOD,
+    QUEEN,
+    SEES_EMPTY,
+    SEES_GOAL,
+    SEES_LURE,
+    SEES_OBSTACLE,
+)
 
+AHEAD = (-1, 0, 1)  # headings relative to the ant's: left, forward, right
 ANOTHER_ANT = 4  # a code of its own, beside the paper's four
 # Another ant: with the other load on a better cell or not, with the same load on a better one.
-BETTER, OTHER, AHEAD = 4, 5, 6
+BETTER, OTHER, IN_QUEUE = 4, 5, 6
 NOTHING, OBSTACLE, WEAK, MIDDLE, STRONG, GOAL = range(6)
+
+
+def cells_in_view(ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Cell]:
+    """The cells at these headings relative to the ant's."""
+    return [neighbour(ant.cell, ant.heading + turn) for turn in turns]
+
+
+def strongest_in_view(world: WorldState, ant: Ant) -> Level:
+    """The largest trail level of the three cells ahead that count, 0 where none does."""
+    counting = [cell for cell in cells_in_view(ant) if world.content(cell) == EMPTY]
+    if world.pheromone.view == "strongest_under_carriers":
+        others = [world.ants.get(cell) for cell in cells_in_view(ant)]
+        counting += [other.cell for other in others if other is not None and other.carries]
+    return max((world.trail.level(cell) for cell in counting), default=0)
+
+
+def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
+    """Whether a cell is better than the ant's own for what the ant is about.
+
+    With food that is nearer to the queen, without food a stronger trail.
+    """
+    if ant.carries:
+        return distance(cell, world.queen) < distance(ant.cell, world.queen)
+    return bool(world.trail.level(cell) > world.trail.level(ant.cell))
+
+
+def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
+    """What each cell looks like, SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
+    strongest = 0 if ant.carries else strongest_in_view(world, ant)
+    return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
+
+
+def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
+    content = world.content(cell)
+    if content == (QUEEN if ant.carries else FOOD):
+        return SEES_GOAL
+    if content != EMPTY:  # without food the queen too, with food other food
+        return SEES_OBSTACLE
+    if ant.carries:
+        lures = is_better(world, ant, cell)
+    else:
+        level = world.trail.level(cell)
+        enough = 2 * level if world.pheromone.view == "half" else level
+        lures = bool(level >= 1 and enough >= strongest)
+    return SEES_LURE if lures else SEES_EMPTY
+
+
+def observe(world: WorldState, ant: Ant) -> int:
+    """The percept, the paper's state: load, left, forward, right as a number, 0..127."""
+    left, forward, right = codes_in_view(world, ant)
+    return 64 * ant.carries + 16 * left + 4 * forward + right
 
 
 def paper(world: WorldState, ant: Ant) -> int:
@@ -26,14 +81,9 @@ def paper(world: WorldState, ant: Ant) -> int:
     return ant.percept
 
 
-def five_cells(world: WorldState, ant: Ant) -> int:
-    """The load, then the paper's codes from behind left to behind right."""
-    return _number([ant.carries, *codes_in_view(world, ant, (-2, -1, 0, 1, 2))], 4)
-
-
-def six_cells(world: WorldState, ant: Ant) -> int:
-    """The load, then the paper's codes from behind left to behind right, then behind."""
-    return _number([ant.carries, *codes_in_view(world, ant, (-2, -1, 0, 1, 2, 3))], 4)
+def more_cells(turns: tuple[int, ...], world: WorldState, ant: Ant) -> int:
+    """The load, then the paper's codes of the cells at these headings relative to the ant's."""
+    return _number([ant.carries, *codes_in_view(world, ant, turns)], 4)
 
 
 def ants_seen(world: WorldState, ant: Ant) -> int:
@@ -47,10 +97,9 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
 
 def trail_levels(world: WorldState, ant: Ant) -> int:
     """The load, then the cells ahead; trails in three levels: thirds of the strongest one."""
-    levels = levels_in_view(world, ant)
     strongest = strongest_in_view(world, ant)
     codes = []
-    for code, level in zip(codes_in_view(world, ant), levels, strict=True):
+    for code, cell in zip(codes_in_view(world, ant), cells_in_view(ant), strict=True):
         if code == SEES_GOAL:
             codes.append(GOAL)
         elif code == SEES_OBSTACLE:
@@ -58,21 +107,17 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
         elif ant.carries:
             codes.append(STRONG if code == SEES_LURE else NOTHING)
         else:
+            # A trail on food, or on the queen's cell, is not seen.
+            level = world.trail.level(cell) if world.content(cell) == EMPTY else 0
             codes.append(_share(level, strongest))
     return _number([ant.carries, *codes], 6)
 
 
-def ants(world: WorldState, ant: Ant) -> int:
-    """The load, then the codes of the cells ahead; ants with the other load have their own."""
-    return _number([ant.carries, *_crowd(world, ant, queue=False)], 6)
+def crowd(queue: bool, world: WorldState, ant: Ant) -> int:
+    """The load, then the codes of the cells ahead; ants with the other load have their own.
 
-
-def queues(world: WorldState, ant: Ant) -> int:
-    """As `ants`; ants with the same load on a better cell have a code of their own, too."""
-    return _number([ant.carries, *_crowd(world, ant, queue=True)], 7)
-
-
-def _crowd(world: WorldState, ant: Ant, queue: bool) -> list[int]:
+    In a `queue`, ants with the same load on a better cell have a code of their own, too.
+    """
     codes = codes_in_view(world, ant)
     for side, cell in enumerate(cells_in_view(ant)):
         there = world.ants.get(cell)
@@ -82,8 +127,8 @@ def _crowd(world: WorldState, ant: Ant, queue: bool) -> list[int]:
         if there.carries != ant.carries:
             codes[side] = BETTER if better else OTHER
         elif queue and better:
-            codes[side] = AHEAD
-    return codes
+            codes[side] = IN_QUEUE
+    return _number([ant.carries, *codes], 7 if queue else 6)
 
 
 def _share(level: Level, strongest: Level) -> int:
@@ -104,10 +149,11 @@ def _number(digits: list[int], base: int) -> int:
 
 OBSERVATIONS: dict[str, Callable[[WorldState, Ant], int]] = {
     "paper": paper,
-    "five_cells": five_cells,
-    "six_cells": six_cells,
+    # From behind left to behind right; then behind.
+    "five_cells": partial(more_cells, (-2, -1, 0, 1, 2)),
+    "six_cells": partial(more_cells, (-2, -1, 0, 1, 2, 3)),
     "trail_levels": trail_levels,
     "ants_seen": ants_seen,
-    "ants": ants,
-    "queues": queues,
+    "ants": partial(crowd, False),
+    "queues": partial(crowd, True),
 }

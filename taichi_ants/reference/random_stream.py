@@ -26,9 +26,8 @@ def hash_of(*numbers: int) -> int:
     return state
 
 
-def stream_state(seed: int, purpose: int, number: int) -> int:
-    """The first state of a stream; the purpose is one of the constants STREAM_*."""
-    return hash_of(seed, purpose, number)
+# The first state of a stream, of its seed, its purpose (one of the constants STREAM_*) and number.
+stream_state = hash_of
 
 
 @dataclass(slots=True)

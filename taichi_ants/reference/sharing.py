@@ -22,9 +22,8 @@ _ONE = 1 << 32  # TD errors are summed in units of 2**-32
 class FrozenTable:
     """One table for all ants, that stays as it is.
 
-    Attributes:
-        draws_next_action: Whether a' is drawn at the end of a tick.
-        tables: The learners: one, or one for each slot.
+    `tables` are the learners: one, or one for each slot. If it `draws_next_action`, a' is drawn at
+    the end of a tick.
     """
 
     draws_next_action = False

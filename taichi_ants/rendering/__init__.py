@@ -14,8 +14,7 @@ from taichi_ants.rendering.learning import (
     learning_frames,
     typical_seed,
 )
-from taichi_ants.rendering.panel import Status
-from taichi_ants.rendering.scene import Scene
+from taichi_ants.rendering.scene import Scene, Status
 from taichi_ants.rendering.sheet import policy_sheet
 from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames
 from taichi_ants.rendering.writers import (

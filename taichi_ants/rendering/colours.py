@@ -1,10 +1,12 @@
-"""The colours of the pictures, as 0xRRGGBB.
+"""The colours of the pictures, as 0xRRGGBB, and the shapes of marks.
 
-Chosen so that people with any of the common colour deficiencies can tell them apart, on a light
-page, in print and on a projector.
+The colours are chosen so that people with any of the common colour deficiencies can tell them
+apart, on a light page, in print and on a projector.
 """
 
 from __future__ import annotations
+
+from enum import IntEnum
 
 import numpy as np
 
@@ -34,15 +36,26 @@ def channels(colours: int | np.ndarray) -> np.ndarray:
     return (words >> np.array([16, 8, 0], dtype=np.uint32)).astype(np.uint8)
 
 
-def _ramp() -> np.ndarray:
-    samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()]))
-    places = np.linspace(0, len(samples) - 1, 256)
-    steps = [np.interp(places, np.arange(len(samples)), channel) for channel in samples.T]
-    red, green, blue = np.rint(steps).astype(np.uint32)
-    table = red << 16 | green << 8 | blue
-    table.setflags(write=False)
-    return table
-
-
+_samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()]))
+_places = np.linspace(0, len(_samples) - 1, 256)
+_red, _green, _blue = (np.interp(_places, range(len(_samples)), one) for one in _samples.T)
 # uint32 (256,): the trail from just above 0 to the strongest that is shown.
-TRAIL_RAMP = _ramp()
+TRAIL_RAMP = np.rint([_red, _green, _blue]).astype(np.uint32).T @ np.array(
+    [1 << 16, 1 << 8, 1], np.uint32
+)
+TRAIL_RAMP.setflags(write=False)
+
+
+class Mark(IntEnum):
+    """The shapes, whose outlines are in `raster_kernels`."""
+
+    HEXAGON = 0
+    OUTLINE = 1  # of a hexagon
+    FOOD = 2
+    QUEEN = 3
+    ARROW = 4
+    DOT = 5
+    DART = 6
+    DART_WITH_FOOD = 7
+    ANT = 8
+    ANT_WITH_FOOD = 9

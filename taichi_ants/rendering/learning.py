@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +15,7 @@ from taichi_ants.engines.runs.training import evaluate, train
 from taichi_ants.errors import AntsError, count, entries_of, expect, shown, whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.marks import cell
-from taichi_ants.rendering.rasteriser import Rasteriser, draw_marks
+from taichi_ants.rendering.rasteriser import Rasteriser, cell, draw_marks
 from taichi_ants.rendering.scene import check_size
 from taichi_ants.rendering.snapshots import Episode
 from taichi_ants.task import Rewards, Task
@@ -52,13 +52,8 @@ class Checkpoint:
         return f"after {count(self.episodes, 'episode')}" if self.episodes else "before learning"
 
     def account(self) -> np.ndarray:
-        """What was earned until each snapshot, int (len(episode), 5); the sum is the return.
-
-        The columns are T, S, F, Q and X: steps onto a trail, steps nearer to the queen with food,
-        food picked up, food given to her, and what failed.
-        """
-        trace = self.episode.trace
-        events = trace.events
+        """What was earned until each snapshot, int (len(episode), 5), by `_SOURCES`."""
+        trace, events = self.episode.trace, self.episode.trace.events
         gave, took = events == Event.DELIVERED, events == Event.PICKED_UP
         failed = (events == Event.FAILED) | (events == Event.BLOCKED)
         carries = np.cumsum(took) > np.cumsum(gave)
@@ -82,25 +77,18 @@ def learning_checkpoints(
     """Train one ant, and roll its policy out whenever it has had a given number of episodes.
 
     Args:
-        world, config: Where and how it learns.
+        world, config, task: Where and how it learns; None is the paper's task.
         seed: Of training and rollouts.
         checkpoints: Numbers of episodes, ascending; 0 is before learning.
         max_steps, epsilon: Of a rollout.
-        task: The rules of the game; None is the paper's.
         progress: Called with the share of the work that is done.
-
-    Raises:
-        AntsError: An argument is not allowed; the message names it.
     """
-    checks.check_progress(progress)
-    task = checks.checked_task(Task() if task is None else task)
-    checkpoints = _checked_checkpoints(checkpoints)
+    task, checkpoints = _checked(task, checkpoints, progress)
     played = []
     for n in checkpoints:
         table = _tables(world, config, [seed], n, task)[0]
-        episode = Episode.play(
-            world, table, seed=seed, max_steps=max_steps, task=task, epsilon=epsilon
-        )
+        rules: dict[str, Any] = {"max_steps": max_steps, "task": task, "epsilon": epsilon}
+        episode = Episode.play(world, table, seed=seed, **rules)
         played.append(Checkpoint(n, episode, "delivered" if episode.delivered else ""))
         if progress is not None:
             progress(len(played) / len(checkpoints))
@@ -128,9 +116,7 @@ def typical_seed(
     Returns:
         The seed, and for each checkpoint the number of seeds that deliver within `max_steps`.
     """
-    checks.check_progress(progress)
-    task = checks.checked_task(Task() if task is None else task)
-    checkpoints = _checked_checkpoints(checkpoints)
+    task, checkpoints = _checked(task, checkpoints, progress)
     chosen = checks.checked_seeds(seeds)
     distances, deliver = np.zeros(len(chosen)), []
     for done, n in enumerate(checkpoints, start=1):
@@ -145,7 +131,11 @@ def typical_seed(
     return int(chosen[distances.argmin()]), deliver
 
 
-def _checked_checkpoints(checkpoints: Sequence[int]) -> list[int]:
+def _checked(
+    task: Task | None, checkpoints: Sequence[int], progress: object
+) -> tuple[Task, list[int]]:
+    checks.check_progress(progress)
+    task = checks.checked_task(Task() if task is None else task)
     listed = entries_of(checkpoints)
     if listed is None:
         raise AntsError(f"checkpoints is {shown(checkpoints)}; it must be numbers of episodes.")
@@ -154,7 +144,7 @@ def _checked_checkpoints(checkpoints: Sequence[int]) -> list[int]:
         raise AntsError(
             f"checkpoints are {shown(tuple(checkpoints))}; they must ascend, from 0 or more."
         )
-    return checkpoints
+    return task, checkpoints
 
 
 def _tables(
@@ -171,20 +161,13 @@ def learning_frames(
 ) -> Iterator[np.ndarray]:
     """The pictures of checkpoints of one world side by side, uint8 (height, width, 3).
 
-    A checkpoint that has ended stays as it ended, until the last one does.
-
-    Args:
-        checkpoints: At least one.
-        size: Width and height in pixels.
-        title: A line above all.
-
-    Raises:
-        AntsError: The size is not allowed.
+    A checkpoint that has ended stays as it ended, until the last one does. `size` is width and
+    height in pixels, `title` a line above all.
     """
     expect("checkpoints", checkpoints, list, tuple)
     for checkpoint in checkpoints:
         expect("a checkpoint", checkpoint, Checkpoint)
-    if len({checkpoint.episode.world for checkpoint in checkpoints}) != 1:
+    if len({checkpoint.episode.made.world for checkpoint in checkpoints}) != 1:
         raise AntsError(
             "the checkpoints are of several worlds, or there are none; give those of one."
         )
@@ -197,7 +180,7 @@ def learning_frames(
     room = width - 2 * letters
     text.write(canvas, title, width / 2, 1.5 * letters, letters, align="middle", room=room)
     if letters:
-        _draw_legend(canvas, bottom, letters, checkpoints[0].episode.task.rewards)
+        _draw_legend(canvas, bottom, letters, checkpoints[0].episode.made.task.rewards)
     columns = math.ceil(len(checkpoints) / max(1, math.isqrt(len(checkpoints) * height // width)))
     more = _MORE_LINES * any(checkpoint.among for checkpoint in checkpoints)
     rows, lines = math.ceil(len(checkpoints) / columns), round((_TILE_LINES + more) * letters)
@@ -205,7 +188,7 @@ def learning_frames(
     # No higher than wide, so that a title stays near to what it speaks of.
     h = min((bottom - top) // rows, w + lines)
     top += (bottom - top - rows * h) // 2
-    grid, margin = checkpoints[0].episode.world.grid, max(2, round(min(w, h) / 60))
+    grid, margin = checkpoints[0].episode.made.world.grid, max(2, round(min(w, h) / 60))
     rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
     pictures = [
         _tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints

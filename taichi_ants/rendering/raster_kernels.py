@@ -1,6 +1,8 @@
 """The kernels that turn cells and marks into pixels. They assume valid arguments.
 
-A frame is uint8 (height, width, 3), colours are 0xRRGGBB.
+A frame is uint8 (height, width, 3), colours are 0xRRGGBB. Outlines are signed distances: negative
+inside, in units of the shape, which lies within the unit circle around (0, 0). Its x is to the
+right, y downwards; an ant looks up, towards negative y.
 """
 
 import math
@@ -8,13 +10,13 @@ import math
 import taichi as ti
 from taichi.math import clamp, mix, vec2, vec3
 
-from taichi_ants.rendering import shapes
-from taichi_ants.rendering.colours import CELL_FOOD, PAGE
-from taichi_ants.rendering.marks import Mark
+from taichi_ants.rendering.colours import CELL_FOOD, PAGE, Mark
 
 BAND = 16  # rows that one thread draws
 _SQRT_3 = math.sqrt(3.0)
 _HALO = 1.2  # pixels around an ant in the colour of the page
+_CRUMB_AT = -0.70  # where an ant carries food, before its head
+_CRUMB_RADIUS = 0.25
 
 
 @ti.func
@@ -74,45 +76,128 @@ def draw_small_cells(
 
 
 @ti.func
+def disc(p, x, y, radius):
+    """A disc around (x, y)."""
+    return (p - vec2(x, y)).norm() - radius
+
+
+@ti.func
+def ellipse(p, y, half_width, half_height):
+    """An upright ellipse around (0, y); close to the true distance near its outline."""
+    inverse = vec2(1.0 / half_width, 1.0 / half_height)
+    scaled = (p - vec2(0.0, y)) * inverse
+    level = scaled.norm()
+    steepness = (scaled * inverse).norm()
+    return level * (level - 1.0) / ti.max(steepness, 1e-6)
+
+
+@ti.func
+def line(p, x0, y0, x1, y1):
+    """The distance to a line from (x0, y0) to (x1, y1), not negative."""
+    along = vec2(x1 - x0, y1 - y0)
+    from_start = p - vec2(x0, y0)
+    share = ti.math.clamp(from_start.dot(along) / along.dot(along), 0.0, 1.0)
+    return (from_start - share * along).norm()
+
+
+@ti.func
+def hexagon(p):
+    """A flat-topped hexagon with corners on the unit circle."""
+    half_height = 0.8660254
+    slanted = ti.abs(p.x) * half_height + ti.abs(p.y) * 0.5
+    return ti.max(slanted, ti.abs(p.y)) - half_height
+
+
+@ti.func
+def ant_body(p):
+    """Head, thorax and abdomen."""
+    head = ellipse(p, -0.37, 0.19, 0.17)
+    thorax = ellipse(p, -0.06, 0.13, 0.20)
+    abdomen = ellipse(p, 0.45, 0.27, 0.39)
+    return ti.min(head, ti.min(thorax, abdomen))
+
+
+@ti.func
+def ant_limbs(p):
+    """Six legs and two antennae, as lines without width."""
+    q = vec2(ti.abs(p.x), p.y)
+    front = ti.min(line(q, 0.08, -0.16, 0.42, -0.34), line(q, 0.42, -0.34, 0.56, -0.66))
+    middle = ti.min(line(q, 0.08, -0.06, 0.48, -0.02), line(q, 0.48, -0.02, 0.74, 0.20))
+    hind = ti.min(line(q, 0.08, 0.04, 0.44, 0.26), line(q, 0.44, 0.26, 0.58, 0.70))
+    antenna = ti.min(line(q, 0.07, -0.48, 0.17, -0.68), line(q, 0.17, -0.68, 0.30, -0.86))
+    return ti.min(ti.min(front, middle), ti.min(hind, antenna))
+
+
+@ti.func
+def dart(p):
+    """A pointed shape for ants of few pixels."""
+    q = vec2(ti.abs(p.x), p.y)
+    side = q.dot(vec2(0.932, -0.362)) - 0.326  # from the tip (0, -0.9) to (0.67, 0.824)
+    back = q.dot(vec2(-0.336, 0.942)) - 0.551  # from there to the notch (0, 0.585)
+    return ti.max(side, back)
+
+
+@ti.func
+def crumbs(p):
+    """Food: three crumbs."""
+    q = vec2(ti.abs(p.x), p.y)
+    return ti.min(disc(p, 0.0, -0.36, 0.36), disc(q, 0.40, 0.30, 0.36))
+
+
+@ti.func
+def crown(p):
+    """The queen: a crown with three points, each with a bead."""
+    q = vec2(ti.abs(p.x), p.y)
+    # Half of it, from the middle point (0, -0.5) down to (0.32, -0.02) and up to (0.8, -0.28).
+    top = ti.min(q.dot(vec2(0.832, -0.555)) - 0.277, q.dot(vec2(-0.476, -0.879)) + 0.135)
+    side = q.dot(vec2(0.975, 0.222)) - 0.718
+    beads = ti.min(disc(p, 0.0, -0.60, 0.12), disc(q, 0.84, -0.38, 0.12))
+    return ti.min(ti.max(ti.max(top, side), p.y - 0.60), beads)
+
+
+@ti.func
+def arrow(p):
+    """An arrow that points up."""
+    q = vec2(ti.abs(p.x), p.y)
+    head = ti.max(q.dot(vec2(0.857, -0.515)) - 0.489, p.y - 0.05)
+    shaft = ti.max(q.x - 0.2, ti.abs(p.y - 0.45) - 0.5)
+    return ti.min(head, shaft)
+
+
+@ti.func
 def blend(rgb, colour, distance, opacity):
     """A colour over another where `distance` (pixels) is negative, its edge smooth."""
     return mix(rgb, unpack(colour), opacity * clamp(0.5 - distance, 0.0, 1.0))
 
 
 @ti.func
-def draw_ant(rgb, p, radius, shape, colour):
-    """A pixel with an ant over it; `p` in units of the ant, which looks up."""
-    body = radius * shapes.dart(p)
-    if shape >= Mark.ANT:
-        limb = ti.max(0.032 * radius, 0.45)
-        body = radius * ti.min(shapes.ant_body(p), shapes.ant_limbs(p) - limb / radius)
-    result = blend(rgb, PAGE, body - _HALO, 0.8)
-    result = blend(result, colour, body, 1.0)
-    if shape == Mark.ANT_WITH_FOOD or shape == Mark.DART_WITH_FOOD:
-        scale = ti.select(shape == Mark.DART_WITH_FOOD, 1.5, 1.0)
-        crumb = radius * shapes.disc(p, 0.0, shapes.CRUMB_AT, scale * shapes.CRUMB_RADIUS)
-        result = blend(result, PAGE, crumb - _HALO, 1.0)
-        result = blend(result, CELL_FOOD, crumb, 1.0)
-    return result
-
-
-@ti.func
 def draw_mark(rgb, p, radius, shape, colour):
-    """A pixel with any other mark over it; `p` in units of the mark."""
+    """A pixel with a mark over it; `p` in units of the mark, which looks up."""
     # A halo of the page around it; none at all, not even on smooth edges, around a cell.
-    distance, halo = radius * shapes.hexagon(p), -1.0
+    distance, halo, opacity = radius * hexagon(p), -1.0, 1.0
     if shape == Mark.OUTLINE:
         half_width = ti.max(0.06 * radius, 0.8)
         distance, halo = ti.abs(distance + half_width) - half_width, 0.5 * _HALO
     elif shape == Mark.FOOD:
-        distance, halo = radius * shapes.crumbs(p), 0.0
+        distance, halo = radius * crumbs(p), 0.0
     elif shape == Mark.QUEEN:
-        distance, halo = radius * shapes.crown(p), 0.0
+        distance, halo = radius * crown(p), 0.0
     elif shape == Mark.ARROW:
-        distance, halo = radius * shapes.arrow(p), _HALO
+        distance, halo = radius * arrow(p), _HALO
     elif shape == Mark.DOT:
-        distance, halo = radius * shapes.disc(p, 0.0, 0.0, 1.0), 0.0
-    return blend(blend(rgb, PAGE, distance - halo, 1.0), colour, distance, 1.0)
+        distance, halo = radius * disc(p, 0.0, 0.0, 1.0), 0.0
+    elif shape >= Mark.ANT:
+        limb = ti.max(0.032 * radius, 0.45)
+        distance = radius * ti.min(ant_body(p), ant_limbs(p) - limb / radius)
+        halo, opacity = _HALO, 0.8
+    elif shape >= Mark.DART:
+        distance, halo, opacity = radius * dart(p), _HALO, 0.8
+    result = blend(blend(rgb, PAGE, distance - halo, opacity), colour, distance, 1.0)
+    if shape == Mark.ANT_WITH_FOOD or shape == Mark.DART_WITH_FOOD:
+        scale = ti.select(shape == Mark.DART_WITH_FOOD, 1.5, 1.0)
+        crumb = radius * disc(p, 0.0, _CRUMB_AT, scale * _CRUMB_RADIUS)
+        result = blend(blend(result, PAGE, crumb - _HALO, 1.0), CELL_FOOD, crumb, 1.0)
+    return result
 
 
 @ti.kernel
@@ -142,9 +227,5 @@ def draw_marks(
                         dx, dy = (i + 0.5 - x) / radius, (j + 0.5 - y) / radius
                         p = vec2(dx * cosine + dy * sine, dy * cosine - dx * sine)
                         rgb = vec3(frame[j, i, 0], frame[j, i, 1], frame[j, i, 2])
-                        drawn = rgb
-                        if shape >= Mark.DART:
-                            drawn = draw_ant(rgb, p, radius, shape, colour)
-                        else:
-                            drawn = draw_mark(rgb, p, radius, shape, colour)
+                        drawn = draw_mark(rgb, p, radius, shape, colour)
                         put(frame, j, i, mix(rgb, drawn, table[n, 5]))

@@ -1,4 +1,4 @@
-"""Draws the cells and the ants of a world."""
+"""Draws the cells and the ants of a world, and marks over them: tables of a row for each."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import math
 from types import ModuleType
 
 import numpy as np
+import numpy.typing as npt
 
 from taichi_ants import runtime
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours
-from taichi_ants.rendering.marks import DOT, DOTS_BELOW, Mark, ants, marks, thing
+from taichi_ants.rendering.colours import Mark
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
 
 # From this size on, food and queen are drawings on a light floor. In smaller cells food is a dot
@@ -27,6 +28,79 @@ _SMALLEST_MARK = 8.0
 
 _SQRT_3 = math.sqrt(3.0)
 _QUEEN, _QUEEN_OUTLINE = 2.5, 7.0  # pixels, her radius where cells are small
+_DOTS_BELOW = 2.5  # pixels from the centre of a cell to its corners: ants are dots
+_DARTS_BELOW = 11.0  # ants have no legs
+_DOT = 0.9  # pixels, the radius of an ant in cells that are too small for it
+_DOT_WITH_FOOD = 0x9A3F00
+_FILL = 0.83  # the radius of an ant in sizes of its cell; the largest disc in one is 0.866
+
+_COLOURS = {Mark.FOOD: colours.CELL_FOOD, Mark.QUEEN: colours.CELL_QUEEN}
+# By the letters of states: the colour of a cell, and what stands on it.
+_CELLS: dict[str, tuple[int, Mark | None]] = {
+    "E": (colours.CELL_EMPTY, None),
+    "O": (colours.CELL_OBSTACLE, None),
+    "T": (int(colours.TRAIL_RAMP[120]), None),
+    "S": (colours.CELL_NEARER, None),
+    "F": (colours.FLOOR_FOOD, Mark.FOOD),
+    "Q": (colours.FLOOR_QUEEN, Mark.QUEEN),
+}
+CELL_LETTERS = "".join(_CELLS)
+
+
+def marks(
+    places: npt.ArrayLike,
+    radius: float,
+    mark: int | np.ndarray,
+    colour: int | np.ndarray,
+    headings: npt.ArrayLike = 0,
+    opacity: float = 1.0,
+) -> np.ndarray:
+    """Marks, float32 (n, 7), of kinds of `Mark` with their middles at places (n, 2) in pixels.
+
+    `radius` is of the circle that holds them, in pixels; `headings` are where they point, 0 to 5.
+    """
+    places = np.asarray(places, dtype=np.float32).reshape(-1, 2)
+    table = np.empty((len(places), 7), dtype=np.float32)  # colours are below 2^24, so it holds them
+    table[:, :2] = places
+    for column, value in enumerate((radius, headings, mark, opacity, colour), start=2):
+        table[:, column] = value
+    return table
+
+
+def thing(places: npt.ArrayLike, hexagon: float, mark: Mark) -> np.ndarray:
+    """Marks of food or queens on cells of a size."""
+    return marks(places, 0.72 * hexagon, mark, _COLOURS[mark])
+
+
+def cell_colour(letter: str) -> int:
+    """The colour of a cell by its letter in a state; letters of other observations look empty."""
+    return _CELLS.get(letter[0], _CELLS["E"])[0]
+
+
+def cell(letter: str, centre: npt.ArrayLike, hexagon: float) -> np.ndarray:
+    """Marks of a cell as it is called in a state, with what stands on it."""
+    table = marks(centre, hexagon, Mark.HEXAGON, cell_colour(letter))
+    stands = _CELLS.get(letter, _CELLS["E"])[1]
+    return table if stands is None else np.concatenate([table, thing(centre, hexagon, stands)])
+
+
+def ants(
+    places: npt.ArrayLike,
+    headings: npt.ArrayLike,
+    carries: np.ndarray,
+    hexagon: float,
+    radius: float | None = None,
+    opacity: float = 1.0,
+) -> np.ndarray:
+    """Marks of ants (n,) as they look in cells of a size, or with another radius in pixels."""
+    if hexagon < _DOTS_BELOW:
+        colour = np.where(carries, _DOT_WITH_FOOD, colours.ANT)
+        return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)
+    without, with_food = Mark.ANT, Mark.ANT_WITH_FOOD
+    if hexagon < _DARTS_BELOW:
+        without, with_food = Mark.DART, Mark.DART_WITH_FOOD
+    look = np.where(carries, with_food, without)
+    return marks(places, radius or _FILL * hexagon, look, colours.ANT, headings, opacity)
 
 
 def kernels() -> ModuleType:
@@ -52,8 +126,7 @@ class Rasteriser:
 
     Args:
         grid: The grid of all worlds to draw.
-        width, height: Of the pictures, in pixels.
-        margin: Pixels to leave free at each side.
+        width, height, margin: Of the pictures, and what to leave free at each side, in pixels.
         beyond: Whether to leave room for the cells just beyond the border of the world.
         strongest: The trail level of the darkest colour.
 
@@ -92,9 +165,7 @@ class Rasteriser:
     def draw(self, snapshot: Snapshot, in_view: np.ndarray | None = None) -> np.ndarray:
         """The picture of a world with its ants, uint8 (height, width, 3).
 
-        Args:
-            snapshot: The world, of this grid.
-            in_view: Flat indices of the cells that ant number 0 sees, to be marked.
+        `in_view` are flat indices of the cells that ant number 0 sees, to be marked.
         """
         hexagon, tables = self.hexagon, []
         frame = self.draw_cells(self.cell_colours(snapshot))
@@ -115,7 +186,7 @@ class Rasteriser:
                 radius = max(_MARK * hexagon, _SMALLEST_MARK)
             tables.append(marks(places, radius, Mark.OUTLINE, colours.INK))
         tables.append(self._ants(snapshot))
-        if hexagon < DOTS_BELOW:
+        if hexagon < _DOTS_BELOW:
             # Dots overlap. A dot of hers over the ants would hide those beside her, one under them
             # may be hidden by a crowd: they lie over it, and an outline around it over them.
             tables.append(marks(queens, _QUEEN_OUTLINE, Mark.OUTLINE, colours.CELL_QUEEN))
@@ -131,7 +202,7 @@ class Rasteriser:
     def _cells(self, of_cells: np.ndarray) -> np.ndarray:
         grid, hexagon = self.grid, self.hexagon
         frame = self._page.copy()
-        if hexagon < DOTS_BELOW:
+        if hexagon < _DOTS_BELOW:
             layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
             kernels().draw_small_cells(frame, of_cells, *layout)
             return frame
@@ -167,9 +238,9 @@ class Rasteriser:
     def _ants(self, snapshot: Snapshot) -> np.ndarray:
         hexagon, opacity = self.hexagon, 1.0
         places = self._places(snapshot.ant_cells)
-        if hexagon < DOTS_BELOW:
+        if hexagon < _DOTS_BELOW:
             # Dots that would hide the world and each other become a shade, which grows with them.
             world = self.grid.count * 1.5 * _SQRT_3 * hexagon**2
-            covered = len(places) * math.pi * DOT**2 / world
+            covered = len(places) * math.pi * _DOT**2 / world
             opacity = min(1.0, 0.5 * max(covered, 1e-9) ** -0.6)
         return ants(places, snapshot.ant_headings, snapshot.ant_carries, hexagon, opacity=opacity)

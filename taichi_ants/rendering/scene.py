@@ -2,24 +2,72 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering import colours, panel, text
-from taichi_ants.rendering.panel import Status
-from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.rendering.state_names import name_parts
-from taichi_ants.task.constants import DEPOSIT_LEVEL, FOOD, QUEEN
+from taichi_ants.rendering import colours, text
+from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks
+from taichi_ants.task import Observation, observations
+from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
+from taichi_ants.task.states import REACHABLE_STATES, TASK_NAMES
 
+PAPER = observations.get("paper")
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
 DEFAULT_SIZE = (1280, 720)
 # In sizes of the text.
 _PANEL_WIDTH = 15
 _TITLE_HEIGHT = 2.2
 _SMALLEST_LETTERS = 10.0  # size of a hexagon in pixels
+# A cell by its letter, whether an ant on it carries food, a letter on it, and what it is called.
+_LEGEND = (
+    ("E", None, "", "empty (E)"),
+    ("O", None, "", "obstacle (O)"),
+    ("F", None, "", "food (F)"),
+    ("Q", None, "", "queen (Q)"),
+    ("E", None, "S", "nearer to the queen"),
+    ("E", False, "", "ant"),
+    ("E", True, "", "ant with food"),
+)
+
+_LEGEND_HEIGHT = 14.8  # in sizes of the text
+
+
+def name_parts(observation: Observation, state: int) -> tuple[str, str, list[str]]:
+    """The task in a state's name or "", the rest, and in it a letter or two for each cell in view.
+
+    Of two letters the first tells the kind of cell, as in "T3". Names of other forms have none.
+    """
+    name = observation.name_of(state)
+    task, _, rest = name.partition(" ")
+    if task not in TASK_NAMES:
+        return "", name, []
+    letters = rest.split()
+    one_each = len(letters) == len(observation.cells) and max(map(len, letters)) <= 2
+    return task, rest, letters if one_each else []
+
+
+def possible_states(observation: Observation) -> Sequence[int]:
+    """The states that an ant can come into, as far as is known."""
+    paper = observation.name == PAPER.name
+    return REACHABLE_STATES if paper else range(observation.n_states)
+
+
+@dataclass(frozen=True, eq=False)
+class Status:
+    """The text about a snapshot, with the state of ant number 0 and its action values."""
+
+    lines: tuple[tuple[str, str], ...]  # names and values, such as ("step", "12")
+    state: int | None = None
+    q_values: np.ndarray | None = None  # float (5,), of the state; None draws no bars
+    action: int | None = None  # the chosen one, 0 to 4
+    q_range: tuple[float, float] = (0.0, 1.0)  # at the ends of the bars; at most 0, and above
+    observation: Observation = PAPER  # whose state it is
 
 
 def check_size(size: tuple[int, int]) -> tuple[int, int]:
@@ -76,12 +124,12 @@ class Scene:
         self._rasteriser = Rasteriser(grid, room, height, margin, view and overlay, strongest)
         if self._has_panel:
             column = width - margin - room
-            bottom = height - margin - round(panel.LEGEND_HEIGHT * letters)
+            bottom = height - margin - round(_LEGEND_HEIGHT * letters)
             text.write(self._background, title, room, margin + letters, letters, room=column)
             top = margin + round(_TITLE_HEIGHT * letters) * bool(title)
             self._status_place = room, top, column, letters
             hexagon = self._rasteriser.hexagon
-            panel.draw_legend(self._background, room, bottom, column, letters, hexagon, strongest)
+            draw_legend(self._background, room, bottom, column, letters, hexagon, strongest)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """A picture, uint8 (height, width, 3), of a world and of what is said of it.
@@ -100,7 +148,7 @@ class Scene:
         frame = self._background.copy()
         frame[:, : world.shape[1]] = world
         if self._has_panel and status is not None:
-            panel.draw_status(frame, status, *self._status_place)
+            _draw_status(frame, status, *self._status_place)
         return frame
 
     def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
@@ -121,3 +169,79 @@ class Scene:
                 if not taken[number]:
                     text.write_on(world, letter, centres[number], hexagon, floors[number])
         return world
+
+
+def _draw_status(
+    frame: np.ndarray, status: Status, left: int, top: int, width: int, size: int
+) -> None:
+    """Draw what is said into a part of a frame, in text of a size."""
+    y = top + size
+    for label, value in status.lines:
+        text.write(frame, label, left, y, size, colours.FAINT_INK)
+        room = width - text.width(label + "  ", size)
+        text.write(frame, value, left + width, y, size, align="right", room=room)
+        y += round(1.45 * size)
+    if status.q_values is not None:
+        y += round(0.3 * size)
+        text.write(frame, "action values Q", left, y, size, colours.FAINT_INK)
+        _draw_bars(frame, status, left, y + round(0.5 * size), width, size)
+
+
+def _draw_bars(
+    frame: np.ndarray, status: Status, left: int, top: int, width: int, size: int
+) -> None:
+    start = left + max(text.width(name, size) for name in ACTION_NAMES) + 0.6 * size
+    end = left + width - text.width("-00.00", size) - 0.3 * size
+    low, high = status.q_range
+    pixels = (end - start) / (high - low)
+    zero = start - low * pixels
+    pitch, thickness = round(1.4 * size), round(0.75 * size)
+    for action, value in enumerate(np.asarray(status.q_values, dtype=float).tolist()):
+        y = top + action * pitch
+        ends = sorted((zero, zero + min(max(value, low), high) * pixels))
+        bar, ink = colours.RULE, colours.INK
+        if action == status.action:
+            bar = ink = colours.CHOSEN
+        fill(frame, ends[0], y + 0.35 * size, ends[1] - ends[0], thickness, bar)
+        baseline = y + round(1.05 * size)
+        text.write(frame, ACTION_NAMES[action], left, baseline, size, ink)
+        number = f"{round(value, 2) + 0.0:.2f}"  # no minus zero
+        text.write(frame, number, left + width, baseline, size, ink, align="right")
+    fill(frame, zero - 1, top + 0.1 * size, 1, N_ACTIONS * pitch - 0.1 * size, colours.FAINT_INK)
+
+
+def draw_legend(
+    frame: np.ndarray, left: int, top: int, width: int, size: int, hexagon: float, strongest: int
+) -> None:
+    """Draw what colours, shapes and letters mean, `_LEGEND_HEIGHT` sizes of the text high.
+
+    The world's hexagons have `hexagon` pixels, trails of the level `strongest` the darkest colour.
+    """
+    pitch, radius = round(1.55 * size), 0.82 * size
+    for row, (kind, carries, letter, label) in enumerate(_LEGEND):
+        x, y = left + 0.85 * size, top + row * pitch + 0.75 * size
+        tables = [cell(kind, (x, y), radius)]
+        if carries is not None:
+            tables.append(ants((x, y), 1, np.array([carries]), hexagon, 0.83 * radius))
+        draw_marks(frame, *tables)
+        baseline = round(y + 0.36 * size)
+        text.write(frame, letter, x, baseline, size, align="middle")
+        text.write(frame, label, left + round(2.1 * size), baseline, size)
+    y = top + len(_LEGEND) * pitch + round(1.45 * size)
+    text.write(frame, "trail (T), by strength", left, y, size)
+    y += round(0.45 * size)
+    columns = np.linspace(0, len(colours.TRAIL_RAMP) - 1, width).astype(int)
+    ramp = colours.channels(colours.TRAIL_RAMP[columns])
+    frame[y : y + round(0.7 * size), left : left + width] = ramp
+    y += round(1.75 * size)
+    text.write(frame, "1", left, y, size, colours.FAINT_INK)
+    most = f"{strongest} and more"
+    text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
+
+
+def fill(
+    frame: np.ndarray, left: float, top: float, width: float, height: float, colour: int
+) -> None:
+    """Fill a rectangle, its edges rounded to whole pixels."""
+    x, y = max(0, round(left)), max(0, round(top))
+    frame[y : round(top + height), x : round(left + width)] = colours.channels(colour)

@@ -16,11 +16,17 @@ from taichi_ants.errors import expect
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.grid.hexgrid import centre_of
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.marks import CELL_LETTERS, Mark, ants, cell, cell_colour, marks
-from taichi_ants.rendering.panel import fill
-from taichi_ants.rendering.rasteriser import draw_marks
-from taichi_ants.rendering.state_names import Observation, name_parts, possible_states
-from taichi_ants.task import Task
+from taichi_ants.rendering.colours import Mark
+from taichi_ants.rendering.rasteriser import (
+    CELL_LETTERS,
+    ants,
+    cell,
+    cell_colour,
+    draw_marks,
+    marks,
+)
+from taichi_ants.rendering.scene import fill, name_parts, possible_states
+from taichi_ants.task import Observation, Task
 from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
@@ -48,20 +54,16 @@ _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
 
 
 def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
-    """The mean gap from best to worst action value (n_states, 5) of possible states, or 0.
-
-    States whose values are all equal do not count.
-    """
+    """The mean gap from best to worst action value of possible states with different values."""
     rows = q_values.astype(np.float64)[list(possible_states(observation))]
     spreads = np.ptp(rows, axis=1)
     return float(spreads[spreads > 0].mean()) if spreads.any() else 0.0
 
 
 def clarity(values: np.ndarray, spread: float) -> float:
-    """How clear the best of action values (5,) is, from 0 to 1.
+    """The gap from best to second best of action values (5,) as a share of `usual_spread`, 0 to 1.
 
-    The gap from the best to the second best as a share of `spread`, the table's `usual_spread`: a
-    state's own values would make every hair's breadth look like a clear choice.
+    As a share of the state's own values, every small gap would look like a clear choice.
     """
     *_, second, best = np.sort(values.astype(np.float64)).tolist()
     return min(1.0, (best - second) / spread)
@@ -79,16 +81,12 @@ def learned(values: np.ndarray, spread: float) -> bool:
 def policy_sheet(
     q_values: np.ndarray, title: str = "Policy", *, task: Task | None = None
 ) -> np.ndarray:
-    """The sheet of a policy, uint8 (height, 1280, 3).
+    """The sheet of a policy, uint8 (height, 1280, 3), with a title above it.
 
     Args:
         q_values: float (n_states, 5), finite action values; or the `TrainingResult` of a single
             run, or a `Policy`.
-        title: Stands above it, in ASCII.
         task: Whose states they are; None is the paper's.
-
-    Raises:
-        AntsError: The table is no policy of the task, or the title no text.
     """
     task = checked_task(Task() if task is None else task)
     table = checked_table(q_values, task)
@@ -133,9 +131,7 @@ def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None
     *lines, letters = _EXPLANATION
     letters = "; ".join(filter(None, [letters, observation.letters])) + "."
     if not name_parts(observation, 0)[2]:
-        letters = (
-            "The text in a drawing is the name or the number of the state; cells have no letters."
-        )
+        letters = "The text in a drawing is the name or number of the state; cells have no letters."
     for number, line in enumerate([*lines, letters]):
         y = _MARGIN + 2 * _LARGE + number * 1.5 * _SMALL
         text.write(sheet, line, _MARGIN, y + 7, _SMALL, colours.FAINT_INK, room=room)

@@ -13,14 +13,12 @@ import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.records import Snapshot
-from taichi_ants.engines.runs.traces import Trace, rollout
+from taichi_ants.engines.runs.traces import Made, Trace, rollout
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.rendering.panel import Status
-from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene
-from taichi_ants.rendering.state_names import name_parts
+from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, Status, name_parts
 from taichi_ants.task import Observation, Task
 from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS
 from taichi_ants.worlds.world import World
@@ -41,10 +39,7 @@ def frames(
 ) -> Iterator[np.ndarray]:
     """The pictures of snapshots of one world, uint8 (height, width, 3), as they come.
 
-    Args:
-        snapshots: Of an `Episode`, of `colony_snapshots`, or made by hand.
-        size: Width and height in pixels.
-        look: What to draw, see `Scene`.
+    `size` is width and height in pixels; `look`, what to draw, see `Scene`.
     """
     scene = None
     expect("snapshots", snapshots, Iterable)
@@ -59,22 +54,9 @@ def frames(
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """Rollout 0 of a seed, with what it takes to draw it.
+    """Rollout 0 of a seed: its trace, and what the panel calls it."""
 
-    Attributes:
-        world: Where it happened.
-        q_values: float (n_states, 5), the action values that the ant followed.
-        trace: Its n steps.
-        seed, task, epsilon: Of the rollout.
-        name: What the panel calls it.
-    """
-
-    world: World
-    q_values: np.ndarray
     trace: Trace
-    seed: int
-    task: Task
-    epsilon: float
     name: str
 
     @classmethod
@@ -91,8 +73,13 @@ class Episode:
         """Roll a policy out; arguments and errors are those of `rollout`."""
         expect("world", world, World)
         trace = rollout(world, q_values, seed, 0, max_steps, task, epsilon)
-        name = "greedy" if epsilon == 0 else f"epsilon {epsilon:g}"
-        return cls(world, q_values, trace, seed, task or Task(), epsilon, name)
+        return cls(trace, "greedy" if epsilon == 0 else f"epsilon {epsilon:g}")
+
+    @property
+    def made(self) -> Made:
+        """World, task, policy and seed."""
+        assert self.trace.made is not None  # it is of `rollout`
+        return self.trace.made
 
     @property
     def delivered(self) -> bool:
@@ -100,12 +87,12 @@ class Episode:
         return bool(self.trace.delivered[-1])
 
     def __len__(self) -> int:
-        """The number of its snapshots, n + 1."""
+        """The number of its snapshots, one more than its steps."""
         return len(self.trace) + 1
 
     def snapshots(self) -> Iterator[CaptionedSnapshot]:
         """The world before each step with what the ant is about to do, and the world at the end."""
-        colony = colony_of_rollout(self.world, self.task, self.q_values, self.epsilon, self.seed)
+        colony = colony_of_rollout(self.made)
         returns = np.concatenate([[0], np.cumsum(self.trace.rewards)]).tolist()
         for step, gained in enumerate(returns):
             if step:
@@ -122,23 +109,18 @@ class Episode:
             last = [("action", ACTION_NAMES[action])]
         elif self.delivered:
             last = [("outcome", "delivered")]
-        table, sees = self.q_values, self.task.sees
+        table, sees = self.made.q_values, self.made.task.sees
+        assert table is not None
         return _status_of(sees, state, table[state], action, trace.q_values, lines, last)
 
 
-def colony_of_rollout(
-    world: World,
-    task: Task,
-    q_values: np.ndarray,
-    epsilon: float = 0.0,
-    seed: int = 0,
-    number: int = 0,
-) -> Colony:
-    """A colony of one ant that will do what it does in `rollout`, since it has the same stream."""
-    steady = TrainingConfig("q_learning", 1.0, 0.0, epsilon, 1.0, min_epsilon=0.0)
-    colony = Colony(world, task, steady, seed, sharing="frozen", q_values=q_values)
+def colony_of_rollout(made: Made) -> Colony:
+    """A colony of one ant that will do what it did in `rollout`, since it has the same stream."""
+    steady = TrainingConfig("q_learning", 1.0, 0.0, made.epsilon, 1.0, min_epsilon=0.0)
+    frozen: dict[str, Any] = {"sharing": "frozen", "q_values": made.q_values}
+    colony = Colony(made.world, made.task, steady, made.seed, **frozen)
     colony.begin_episode()
-    colony.streams[0, 0] = stream_state(seed, STREAM_ROLLOUT, number)
+    colony.streams[0, 0] = stream_state(made.seed, STREAM_ROLLOUT, made.number)
     return colony
 
 
@@ -153,9 +135,6 @@ def colony_snapshots(
         frame_interval: Ticks from one snapshot to the next, at least 1.
         follow: The number of an ant, from 0, whose view, state and action values are shown while
             it lives; None: of no ant.
-
-    Raises:
-        AntsError: A number is not allowed, or no episode has begun.
     """
     between = intervals(colony, ticks, frame_interval, follow)
     yield _snapshot(colony, follow)

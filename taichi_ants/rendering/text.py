@@ -35,7 +35,6 @@ def write(
         x, align: Pixels to the "left" edge, the "middle" or the "right" edge of the text.
         baseline: Where its letters stand, in pixels from the top.
         size: Of the font, in pixels; what is smaller than 9 cannot be read and is left out.
-        colour: 0xRRGGBB.
         room: Pixels for the text, which is shortened; None is without bounds.
     """
     if size < SMALLEST:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import io
 import os
 import struct
+from collections import deque
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
-from itertools import chain
+from contextlib import suppress
+from itertools import chain, groupby
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
@@ -21,13 +22,12 @@ from taichi_ants.rendering import colours
 
 DEFAULT_FPS = 8.0
 PAUSE = 1.5  # seconds, for which episodes are shown as they ended
-_LONGEST_PAUSE = 60
 # The shortest and the longest side of a picture in pixels, by the kind of file; of PNG anything
 # that fits into the memory.
 _SIDES = {".gif": (1, 65_535), ".mp4": (2, 16_384), "": (1, 2**31 - 1)}
 
 _SAME = 255  # in a GIF, for pixels that stay as they are; palettes have fewer colours
-_LONGEST = 655_350  # milliseconds for which a GIF can show a picture
+_LONGEST = 600  # seconds for which a GIF shows a picture; it can count 655
 
 # The colours of scenes, which all palettes hold.
 _KEPT = (
@@ -42,28 +42,26 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
     """Make sure, before the work begins, that an animation can be written.
 
     Args:
-        path: The file, .gif or .mp4; without an ending a folder for numbered PNG pictures.
+        path: The file, .gif or .mp4; without an ending a new folder for numbered PNG pictures.
         fps: Frames per second, 0.1 to 50.
 
     Raises:
-        AntsError: The ending or the speed is not allowed, PyAV is missing for an .mp4, the folder
-            holds something, or the place cannot be written to.
+        AntsError: One is not allowed, or the place cannot be written to, or PyAV is missing.
     """
     expect("path", path, str, os.PathLike)
     target = Path(path)
-    if target.suffix or not os.path.lexists(target):
+    is_old_folder = not target.suffix and os.path.lexists(target)
+    if not is_old_folder:
         files.check_writable_file(target)
     if target.suffix.lower() not in (".gif", ".mp4", ""):
         raise AntsError(
             f"{str(path)!r} ends in {target.suffix!r}; an animation ends in .gif, .mp4, or in "
             "nothing for a folder of PNG pictures."
         )
-    if isinstance(fps, bool) or not isinstance(fps, Real) or not 0.1 <= fps <= 50:
-        # Viewers slow a GIF down that is faster.
-        raise AntsError(f"fps is {shown(fps)}; it must be a number from 0.1 to 50.")
+    _check_number("fps", fps, "number", 0.1, 50)  # viewers slow a GIF down that is faster
     if target.suffix.lower() == ".mp4":
         _import_av()
-    if not target.suffix and os.path.lexists(target):
+    if is_old_folder:
         files.check_writable_folder(target.absolute().parent)
         named = target.name not in ("", "..") and not target.is_symlink()
         if not (named and target.is_dir() and not any(target.iterdir())):
@@ -74,6 +72,11 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
     return target
 
 
+def _check_number(name: str, value: float, kind: str, least: float, most: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, Real) or not least <= value <= most:
+        raise AntsError(f"{name} is {shown(value)}; it must be a {kind} from {least} to {most}.")
+
+
 def is_picture(path: files.PathLike) -> bool:
     """Whether a path is one of a single picture, not of an animation."""
     return Path(path).suffix.lower() == ".png"
@@ -81,9 +84,16 @@ def is_picture(path: files.PathLike) -> bool:
 
 def check_picture(path: files.PathLike) -> Path:
     """Make sure that a picture can be written; raises as `save_picture` does."""
+    return check_single(path, "one picture", ".png")
+
+
+def check_single(path: files.PathLike, holds: str, *endings: str) -> Path:
+    """Make sure that a file of one of these endings can be written; AntsError if not."""
     target = files.check_writable_file(path)
-    if not is_picture(target):
-        raise AntsError(f"{str(path)!r} is to hold one picture; give it a name that ends in .png.")
+    if target.suffix.lower() not in endings:
+        raise AntsError(
+            f"{str(path)!r} is to hold {holds}; give it a name that ends in {endings[0]}."
+        )
     return target
 
 
@@ -104,18 +114,24 @@ def save_animation(
             before all begins anew.
     """
     target = check_animation(path, fps)
-    if isinstance(pause, bool) or not isinstance(pause, Real) or not 0 <= pause <= _LONGEST_PAUSE:
-        raise AntsError(
-            f"pause is {shown(pause)}; it must be a number of seconds from 0 to {_LONGEST_PAUSE}."
-        )
+    _check_number("pause", pause, "number of seconds", 0, 60)
     sides = _SIDES.get(target.suffix.lower(), _SIDES[""])
     checked = _checked(frames, round(pause * fps) - 1, sides)
     encode = _mp4 if target.suffix.lower() == ".mp4" else _gif
-    with _folder_of(target):
+    missing = [folder for folder in target.absolute().parents if not folder.exists()]
+    try:
+        files.check_writable_folder(target.parent)
         if target.suffix:
-            files.write_atomically(target, lambda file: encode(file, checked, fps))
+            first = next(checked)
+            every = chain([first], checked)
+            files.write_atomically(target, lambda file: encode(file, first, every, fps))
         else:
             _write_folder(target, checked)
+    except BaseException:
+        for folder in missing:
+            with suppress(OSError):
+                folder.rmdir()
+        raise
 
 
 def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
@@ -133,20 +149,6 @@ def write(target: Path, content: bytes) -> None:
     """Write a file into a folder that is made if it is missing."""
     files.check_writable_folder(target.parent)
     files.write_atomically(target, lambda file: file.write(content))
-
-
-@contextmanager
-def _folder_of(target: Path) -> Iterator[None]:
-    """The folder of a file; if writing fails, folders that were missing are gone again."""
-    missing = [folder for folder in target.absolute().parents if not folder.exists()]
-    try:
-        files.check_writable_folder(target.parent)
-        yield
-    except BaseException:
-        for folder in missing:
-            with suppress(OSError):
-                folder.rmdir()
-        raise
 
 
 def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
@@ -206,16 +208,14 @@ def _png(frame: np.ndarray, optimize: bool = False) -> bytes:
     return buffer.getvalue()
 
 
-def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
+def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write a GIF that repeats for ever.
 
     Pillow's own writer keeps all frames until the last one; this one keeps two, and has Pillow
-    compress one at a time.
+    compress what has changed since the one before. Equal frames become one.
     """
     from PIL import GifImagePlugin, Image
 
-    waiting = iter(frames)
-    first = next(waiting)
     colour_table = _palette(first).tobytes()
     palette = Image.new("P", (1, 1))
     palette.putpalette(colour_table)
@@ -224,40 +224,26 @@ def _gif(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
     file.write(colour_table.ljust(3 * 256, b"\0"))
     file.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # repeat without end
 
-    def write(picture: np.ndarray, place: tuple[int, int], duration: int) -> None:
-        options = {"duration": duration, "transparency": _SAME, "disposal": 1}
-        image = Image.frombytes("P", picture.shape[::-1], picture.tobytes())
-        for part in GifImagePlugin.getdata(image, place, **options):
-            file.write(part)
+    def drawn() -> Iterator[tuple[int, bytes]]:
+        for number, frame in enumerate(frames, start=1):
+            image = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
+            yield number, image.tobytes()
 
-    before, change, place, shown, lasts = None, np.empty(0), (0, 0), 0, 0
-    for number, frame in enumerate(chain([first], waiting), start=1):
-        drawn = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-        picture = np.asarray(drawn)
+    before, shown = np.full((height, width), _SAME, np.uint8), 0
+    most = _LONGEST * fps
+    for _, same in groupby(drawn(), key=lambda one: (one[1], (one[0] - 1) // most)):
+        ((number, content),) = deque(same, maxlen=1)
+        picture = np.frombuffer(content, np.uint8).reshape(height, width)
+        differs = picture != before
+        box = Image.fromarray(differs).getbbox() or (0, 0, 1, 1)
+        change = Image.fromarray(np.where(differs, picture, np.uint8(_SAME))).crop(box)
         # A GIF counts hundredths of a second; rounded so that their sum is right.
         until = 10 * round(100 * number / fps)
-        duration, shown = until - shown, until
-        if before is None:
-            change, place, lasts = picture, (0, 0), duration
-        elif (picture == before).all() and lasts + duration <= _LONGEST:
-            lasts += duration
-        else:
-            write(change, place, lasts)
-            (change, place), lasts = _change(before, picture), duration
-        before = picture
-    write(change, place, lasts)
+        options = {"duration": until - shown, "transparency": _SAME, "disposal": 1}
+        for part in GifImagePlugin.getdata(change, box[:2], **options):
+            file.write(part)
+        before, shown = picture, until
     file.write(b";")
-
-
-def _change(before: np.ndarray, picture: np.ndarray) -> tuple[np.ndarray, tuple[int, int]]:
-    """The smallest part of a picture that holds all that has changed, and its left upper corner."""
-    differs = picture != before
-    rows, columns = (np.flatnonzero(differs.any(axis=axis)) for axis in (1, 0))
-    if not len(rows):
-        return np.full((1, 1), _SAME, np.uint8), (0, 0)
-    top, left = rows[0], columns[0]
-    part = (slice(top, rows[-1] + 1), slice(left, columns[-1] + 1))
-    return np.where(differs[part], picture[part], np.uint8(_SAME)), (int(left), int(top))
 
 
 def _palette(first: np.ndarray) -> np.ndarray:
@@ -274,13 +260,11 @@ def _palette(first: np.ndarray) -> np.ndarray:
     return np.concatenate([kept, others[away > 20]])
 
 
-def _mp4(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
+def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write an MP4 (H.264); of an odd width or height the last column or row is left out."""
     av = _import_av()
     from fractions import Fraction
 
-    waiting = iter(frames)
-    first = next(waiting)
     height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
     with av.open(file, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
@@ -290,7 +274,7 @@ def _mp4(file: BinaryIO, frames: Iterable[np.ndarray], fps: float) -> None:
             **{"crf": "17", "preset": "superfast", "tune": "animation"},
             "x264-params": "colorprim=bt709:transfer=bt709:colormatrix=bt709",
         }
-        for frame in chain([first], waiting):
+        for frame in frames:
             picture = np.ascontiguousarray(frame[:height, :width])
             video = av.VideoFrame.from_ndarray(picture, format="rgb24")
             # Players take pictures of this kind for BT.709, PyAV's default is BT.601.

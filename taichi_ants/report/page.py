@@ -18,8 +18,8 @@ import numpy as np
 from taichi_ants.analysis.findings import Finding, Verdict
 from taichi_ants.analysis.tables import figure, number
 from taichi_ants.errors import count
+from taichi_ants.viewer.frames import Recording
 from taichi_ants.viewer.page import content_policy, part
-from taichi_ants.viewer.recording import Recording
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -23,7 +23,7 @@ from taichi_ants.analysis.paper.figures import CURVES, curve_row, curves_of, dra
 from taichi_ants.analysis.paper.measures import MEASURES, measures_of_runs
 from taichi_ants.analysis.paper.report import Results, report, table2_markdown
 from taichi_ants.analysis.paper.table2 import example_name, examples
-from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
+from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, Made, trace_policies
 from taichi_ants.engines.runs.training import evaluate
 from taichi_ants.files import archives
 from taichi_ants.files.results import MANIFEST, REPORT
@@ -101,7 +101,7 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
     load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
-    colony = colony_of_rollout(point.world, point.task, nothing)
+    colony = colony_of_rollout(Made(point.world, point.task, 0, 1, q_values=nothing))
     next(frames(colony_snapshots(colony), SIZE))
     record_colony(colony, 1)
     for kind in ("png", "svg") if draws else ():

@@ -129,6 +129,19 @@ class Task(Settings, path="task"):
         """The number of states."""
         return self.sees.n_states
 
+    @property
+    def numbers(self) -> dict[str, int]:
+        """The numbers of all rules but the pheromone's, as kernels read them; -1 is off."""
+        life, off = self.life, -1
+        return {
+            "turns_at_queen": int(self.turns_at_queen),
+            "delivery_terminates": int(self.delivery != "truncates"),
+            "births": int(life.births),
+            "lifespan": life.lifespan or off,
+            "regrowth": off if life.regrowth is None else life.regrowth,
+            "wander": life.wander or off,
+        }
+
     def pheromone_while(self, learning: bool) -> Pheromone:
         """The pheromone while ants learn, or while nobody does: with evaporation or without."""
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation

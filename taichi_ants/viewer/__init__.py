@@ -5,16 +5,15 @@
 - `page` puts a recording into a page, `save_page` writes it, `frame` shows it in a notebook.
 """
 
-from taichi_ants.viewer.page import check_page, frame, is_page, notebook, page, save_page
-from taichi_ants.viewer.recorder import Recorder
-from taichi_ants.viewer.recording import Recording, record_colony, record_episode, record_trace
+from taichi_ants.viewer.frames import Recording
+from taichi_ants.viewer.page import check_page, frame, notebook, page, save_page
+from taichi_ants.viewer.recorder import Recorder, record_colony, record_episode, record_trace
 
 __all__ = [
     "Recorder",
     "Recording",
     "check_page",
     "frame",
-    "is_page",
     "notebook",
     "page",
     "record_colony",

@@ -1,4 +1,4 @@
-"""Frames: what changed in a world from one moment to the next, as bytes.
+"""Frames: what changed in a world from one moment to the next, as bytes; and recordings of them.
 
 A frame is a list of arrays, its sections, in little-endian order. It begins with uint32 numbers:
 its length in bytes, and how many elements each section has. Each section begins at a multiple of
@@ -7,7 +7,10 @@ eight bytes, so that both NumPy and JavaScript can look at it where it lies.
 
 from __future__ import annotations
 
+import json
+import zlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,6 +29,10 @@ CLOCK = (
     "ticks",
     "trail_clock",
 )
+
+# Of a point of the curves, in this order. The ticks and what was delivered are of all episodes so
+# far, returns of this one; ended is 1 at the end of an episode.
+POINT = ("episode", "ticks", "delivered", "returns", "epsilon", "ended")
 
 # The sections, in order, and their types; "cell", "state" and "level" depend on the world.
 SECTIONS = {
@@ -46,7 +53,7 @@ SECTIONS = {
     "trail": "level",  # expiry clocks, or levels, see `Colony.stored_trail`
     "table_at": "f8",  # (owner * n_states + state) * 5 + action; the owner is 0, or an ant
     "table": "f4",
-    # Points for curves since the frame before, of six numbers each, see `progress.POINT`.
+    # Points for curves since the frame before, see `POINT`.
     "progress": "f8",
 }
 _HEAD = 8 * -(-(1 + len(SECTIONS)) // 2)  # bytes
@@ -74,11 +81,25 @@ def pack(types: Mapping[str, str], sections: Mapping[str, Any]) -> bytes:
     return numbers.ljust(_HEAD, b"\0") + body
 
 
-def unpack(types: Mapping[str, str], frame: bytes) -> dict[str, np.ndarray]:
-    """The sections of a frame."""
-    lengths = np.frombuffer(frame, "<u4", 1 + len(types)).tolist()[1:]
-    sections, at = {}, _HEAD
-    for (name, kind), length in zip(types.items(), lengths, strict=True):
-        sections[name] = np.frombuffer(frame, f"<{kind}", length, at)
-        at += 8 * -(-sections[name].nbytes // 8)
-    return sections
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What happened, as a page plays it.
+
+    Attributes:
+        header: What it is about, as JSON can hold it, see `Recorder.header`.
+        frames: The first moment, then what changed until each later one.
+    """
+
+    header: dict[str, Any]
+    frames: list[bytes]
+
+    def __len__(self) -> int:
+        """The number of moments."""
+        return len(self.frames)
+
+    def to_bytes(self) -> bytes:
+        """The recording as a page holds it, compressed: its header as JSON, then all frames."""
+        header = json.dumps(self.header, separators=(",", ":")).encode()
+        header += b" " * (-(len(header) + 4) % 8)  # frames begin at a multiple of eight
+        length = np.array([len(header)], dtype="<u4").tobytes()
+        return zlib.compress(b"".join([length, header, *self.frames]), 9)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import hashlib
 import html
-import os
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -14,9 +13,10 @@ from typing import Any
 from taichi_ants import files
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
-from taichi_ants.errors import AntsError, expect
-from taichi_ants.rendering.writers import write
-from taichi_ants.viewer.recording import Recording, record_colony, record_trace
+from taichi_ants.errors import expect
+from taichi_ants.rendering.writers import check_single, write
+from taichi_ants.viewer.frames import Recording
+from taichi_ants.viewer.recorder import record_colony, record_trace
 
 # The parts of one script, in this order: what a part uses stands in those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
@@ -86,22 +86,9 @@ def assemble(
     return whole
 
 
-def is_page(path: files.PathLike) -> bool:
-    """Whether a path is one of a page; AntsError if it is no path."""
-    expect("path", path, str, os.PathLike)
-    return Path(path).suffix.lower() in (".html", ".htm")
-
-
 def check_page(path: files.PathLike) -> Path:
-    """Make sure, before the work begins, that a page can be written there.
-
-    Raises:
-        AntsError: The file does not end in .html, or cannot be written.
-    """
-    target = files.check_writable_file(path)
-    if not is_page(target):
-        raise AntsError(f"{str(path)!r} is to hold a page; give it a name that ends in .html.")
-    return target
+    """Make sure, before the work begins, that `save_page` can write a page there."""
+    return check_single(path, "a page", ".html", ".htm")
 
 
 def save_page(path: files.PathLike, recording: Recording) -> None:
@@ -131,7 +118,5 @@ def notebook(shown: Any) -> str | None:
         small = shown.made is not None and len(shown) <= _MOST_STEPS
         return frame(record_trace(shown)) if small else None
     expect("what is shown", shown, Colony)
-    if shown.episode < 0:
-        return None
     small = shown.grid.size <= _MOST_CELLS and shown.ants <= _MOST_ANTS
-    return frame(record_colony(shown)) if small else None
+    return frame(record_colony(shown)) if small and shown.episode >= 0 else None

@@ -1,23 +1,77 @@
-"""Records a colony while it runs: a frame for each moment, of what has changed since the last."""
+"""Records a colony while it runs: a frame for each moment, of what has changed since the last.
+
+An episode of one ant is played once more by a colony of one.
+"""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import learners
+from taichi_ants.checks import check_progress
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.errors import count, expect
-from taichi_ants.rendering.state_names import name_parts
+from taichi_ants.engines.runs.traces import Trace
+from taichi_ants.errors import AntsError, count, expect
+from taichi_ants.rendering.scene import name_parts
+from taichi_ants.rendering.snapshots import Episode, colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
-from taichi_ants.viewer.frames import pack, types_of
-from taichi_ants.viewer.progress import Progress
+from taichi_ants.viewer.frames import Recording, pack, types_of
 
 _MOST_NAMES = 4096  # of states that a header holds, seen or not
+_MOST = 1000  # points of curves of each kind
+
+Point = tuple[float, ...]  # see `frames.POINT`
+
+
+class Progress:
+    """Points of one world of a colony: at the end of each episode, and within the first one."""
+
+    def __init__(self, colony: Colony, world: int) -> None:
+        self._colony, self._world, self._first = colony, world, colony.episode
+        self._before = 0  # ticks of episodes that have ended
+        # Within the first episode, and at ends: the points that are kept, the first of each so
+        # many, and how many there were.
+        self._kept: tuple[list[Point], list[Point]] = ([], [])
+        self._every, self._seen = [1, 1], [0, 0]
+        self._new: list[Point] = []
+
+    @property
+    def ticks(self) -> int:
+        """How many have passed in all episodes."""
+        return self._before + self._colony.ticks
+
+    def note(self, ended: bool = False) -> None:
+        """Remember how the colony is now; tell it each time before another episode begins."""
+        colony = self._colony
+        if not ended and colony.episode != self._first:
+            return
+        outcome, kept = colony.outcome(), self._kept[ended]
+        delivered = colony.delivered[self._world] + outcome.deliveries[0, self._world]
+        returns = outcome.returns[0, self._world]
+        numbers = (colony.episode, self.ticks, delivered, returns, colony.epsilon, ended)
+        if self._seen[ended] % self._every[ended] == 0:
+            kept.append(tuple(map(float, numbers)))
+            self._new.append(kept[-1])
+        self._seen[ended] += 1
+        if len(kept) > _MOST:
+            del kept[1::2]
+            self._every[ended] *= 2
+        if ended:
+            self._before = self.ticks
+
+    def news(self) -> list[Point]:
+        """The points since this was asked last."""
+        new, self._new = self._new, []
+        return new
+
+    def points(self) -> list[Point]:
+        """All points that are kept, those at the ends of episodes last."""
+        return [*self._kept[False], *self._kept[True]]
 
 
 class Recorder:
@@ -25,12 +79,9 @@ class Recorder:
 
     Args:
         colony: In an episode.
-        world: Which of its worlds.
+        world: Which of its worlds; AntsError if there is no such world.
         title: What the page is called; "" for a name of the colony.
         follow: The number of the ant that the page follows at first.
-
-    Raises:
-        AntsError: No episode has begun, or there is no such world.
     """
 
     def __init__(
@@ -55,16 +106,12 @@ class Recorder:
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables
         self._table = np.full((owners * self._n_states, N_ACTIONS), np.nan, np.float32)
         self._owners = np.full(owners, -1 if colony.one_a_slot else 0)
-        self._fixed: np.ndarray | None = None  # the tables where nobody learns
-        self._fixed = None if self._learns else self._tables()
+        self._fixed: np.ndarray | None = None
+        self._fixed = None if self._learns else self._tables()  # read once where nobody learns
         self.progress = Progress(colony, world)
 
     def header(self) -> dict[str, Any]:
-        """What all frames are about.
-
-        States have names as far as they have been seen, all of them if they are few: a task or "",
-        the rest of the name, and a letter or two for each cell in view where the name has them.
-        """
+        """What all frames are about, as JSON can hold it."""
         colony, task = self.colony, self.colony.task
         changes = task.life.births or task.life.lifespan
         ants = "Ants" if changes else count(colony.ants, "ant")
@@ -76,8 +123,8 @@ class Recorder:
             "strongest": int(task.pheromone.level),
             "n_states": self._n_states,
             "names": self.names(),
-            "view": list(self.colony.task.sees.cells),
-            "letters": self.colony.task.sees.letters,
+            "view": list(task.sees.cells),
+            "letters": task.sees.letters,
             "actions": ACTION_NAMES,
             "events": [event.name for event in Event],
             "rewards": task.rewards.by_event().tolist(),
@@ -89,7 +136,7 @@ class Recorder:
         }
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
-        """The names of the states seen, of all if they are few, but not of those `known`."""
+        """The `name_parts` of the states seen, of all if they are few, but not of those `known`."""
         few = self._n_states <= _MOST_NAMES
         seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
         named = range(self._n_states) if few else seen
@@ -99,21 +146,20 @@ class Recorder:
         """Lines about the colony, names and values."""
         colony, config = self.colony, self.colony.training
         x, y, z = self.grid.ranges
-        lines = [
-            ("world", f"{self.grid.count} cells, ranges {x}, {y}, {z}"),
-            ("ants at first", str(colony.ants)),
-            ("seed", str(colony.seeds[self.world])),
-            ("they see", f"{self.colony.task.sees.name}, {self._n_states} states"),
-        ]
-        if not self._learns:
-            return [*lines, ("policy", "frozen"), ("epsilon", f"{colony.epsilon:g}")]
-        return [
-            *lines,
-            ("learner", learners.label(config.learner)),
-            ("table", "each has its own" if colony.one_a_slot else "one for all"),
-            ("learning rate", f"{config.learning_rate:g}"),
-            ("discount", f"{config.discount:g}"),
-        ]
+        lines = {
+            "world": f"{self.grid.count} cells, ranges {x}, {y}, {z}",
+            "ants at first": str(colony.ants),
+            "seed": str(colony.seeds[self.world]),
+            "they see": f"{colony.task.sees.name}, {self._n_states} states",
+        }
+        if self._learns:
+            lines["learner"] = learners.label(config.learner)
+            lines["table"] = "each has its own" if colony.one_a_slot else "one for all"
+            lines["learning rate"] = f"{config.learning_rate:g}"
+            lines["discount"] = f"{config.discount:g}"
+        else:
+            lines |= {"policy": "frozen", "epsilon": f"{colony.epsilon:g}"}
+        return [*lines.items()]
 
     def snapshot(self) -> bytes:
         """A frame of the colony as it is now: the first one, or after an intervention."""
@@ -229,3 +275,72 @@ def _changes(name: str, old: np.ndarray, new: np.ndarray) -> dict[str, np.ndarra
     """Where an array has changed, and what it holds there."""
     places = np.flatnonzero(old != new)
     return {f"{name}_at": places, name: new[places]}
+
+
+def record_colony(
+    colony: Colony,
+    ticks: int = 0,
+    frame_interval: int = 1,
+    *,
+    world: int = 0,
+    title: str = "",
+    follow: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """What a colony does from now on, as a recording; other arguments are those of `Recorder`.
+
+    Args:
+        colony: In an episode; it is moved on by `ticks`.
+        ticks: How many; 0 gives the moment as it is.
+        frame_interval: Ticks from one moment to the next; at 1, what each ant did is known.
+        progress: Called after each moment with the share of the work that is done.
+
+    Raises:
+        AntsError: A number is not allowed, or no episode has begun.
+    """
+    between, done = intervals(colony, ticks, frame_interval, follow), 0
+    check_progress(progress)
+    recorder = Recorder(colony, world, title, follow)
+    frames = [recorder.snapshot()]
+    for n in between:
+        frames.append(recorder.tick(n))
+        done += n
+        if progress is not None:
+            progress(done / ticks)
+    return Recording(recorder.header(), frames)
+
+
+def record_episode(episode: Episode, title: str = "") -> Recording:
+    """An episode in which one ant follows a policy."""
+    expect("episode", episode, Episode)
+    return record_trace(episode.trace, title)
+
+
+def record_trace(trace: Trace, title: str = "") -> Recording:
+    """A trace of `rollout` or `trace_training`, with its TD errors; AntsError if it is another."""
+    expect("trace", trace, Trace)
+    made = trace.made
+    if made is None:
+        raise AntsError(
+            "the trace does not say how it was made, so it cannot be played again; take one of "
+            "rollout or trace_training."
+        )
+    expect("title", title, str)
+    if made.config is None:
+        title = title or "One ant that follows a policy"
+        return record_colony(colony_of_rollout(made), len(trace), title=title, follow=0)
+    # A colony of one ant with a table of its own learns as it did.
+    options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
+    colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
+    colony.begin_episode(made.max_steps)
+    recorder, frames = Recorder(colony, 0, title, 0), []
+    errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
+    for number, (step, error) in enumerate(zip(trace.steps.tolist(), errors, strict=True)):
+        if step == 0 and number:
+            recorder.progress.note(ended=True)
+            colony.end_episode()
+            colony.begin_episode(made.max_steps)
+        if step == 0:
+            frames.append(recorder.snapshot())
+        frames.append(recorder.tick(td_errors=np.array([error])))
+    return Recording(recorder.header(), frames)

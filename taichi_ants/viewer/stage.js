@@ -1,6 +1,6 @@
 /* The picture of the world. The cells are pixels: which cell a pixel belongs to is worked out once for
    a view, so that another moment only takes new colours. Ants, and what is said of the followed one,
-   are drawn on a second canvas above. The outlines are those of rendering/shapes.py, the colours
+   are drawn on a second canvas above. The outlines are those of rendering/raster_kernels.py, the colours
    are those of the style sheet. */
 
 const DOTS_BELOW = 2.1, DRAWN_FROM = 9; // pixels, of an ant; between them it is an arrowhead

@@ -9,7 +9,7 @@ from random_worlds import random_world
 from taichi_ants import worlds
 from taichi_ants.baselines.ant_system import METHODS, Search, search
 from taichi_ants.errors import AntsError
-from taichi_ants.reference.ant_system import tours
+from taichi_ants.reference.baselines import tours
 from taichi_ants.reference.geometry import neighbour
 from taichi_ants.worlds import World, double_bridge
 

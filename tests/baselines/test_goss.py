@@ -14,7 +14,7 @@ from taichi_ants.baselines.goss import (
     crossing_steps,
 )
 from taichi_ants.errors import AntsError
-from taichi_ants.reference.goss import bridge_choices
+from taichi_ants.reference.baselines import bridge_choices
 
 
 @pytest.mark.parametrize(

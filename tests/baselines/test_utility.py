@@ -10,7 +10,7 @@ from taichi_ants import worlds
 from taichi_ants.baselines.utility import Foraging, forage
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.reference.utility import UtilityColony
+from taichi_ants.reference.baselines import UtilityColony
 from taichi_ants.worlds import World, double_bridge
 
 # Seven cells up, one way alone.

@@ -128,7 +128,7 @@ def test_the_pages_places():
         assert text.index(f"<!-- {name} -->\n") < text.index(f"<!-- /{name} -->")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_command(capfd):
     with pytest.raises(SystemExit) as end:
         peers.main(["--small", "--rounds", "1"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
 import subprocess
@@ -12,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_lines import EXPERIMENTS, ROOT, assert_one_sentence, call, environment, start
+from command_lines import run as process
 from PIL import Image
 
 from taichi_ants import AntsError, commands
@@ -21,30 +22,16 @@ from taichi_ants.rendering import learning_frames, text
 from taichi_ants.studies.command_line import Parser
 from taichi_ants.worlds import paper
 
-ROOT = Path(__file__).parents[2]
-SCRIPT = ROOT / "experiments" / "render.py"
+sys.path.insert(0, str(EXPERIMENTS))
+import gallery
 
-sys.path.insert(0, str(SCRIPT.parent))
-import gallery  # noqa: E402
-
-sys.path.remove(str(SCRIPT.parent))
+sys.path.remove(str(EXPERIMENTS))
 
 
-def environment(**changes: str) -> dict[str, str]:
-    """No display, and the package from this folder."""
-    kept = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
-    return {**kept, "PYTHONPATH": str(ROOT), **changes}
-
-
-def run(*arguments: object, **changes: str) -> subprocess.CompletedProcess:
-    return subprocess.run(
-        [sys.executable, str(SCRIPT), *map(str, arguments)],
-        env=environment(**changes),
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+@pytest.fixture
+def run(capsys):
+    """Calls the command in this process; its exit status, standard output and error."""
+    return lambda *arguments: call("render", arguments, capsys)
 
 
 @pytest.fixture(scope="module")
@@ -58,11 +45,12 @@ def files_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.rglob("*"))
 
 
-def test_an_episode_without_display_and_home(tmp_path, policy) -> None:
+def test_an_episode_without_display_and_home(tmp_path, policy, kernels) -> None:
     path = tmp_path / "new" / "a.gif"
-    done = run("episode", "--policy", policy, "--size", "400x330", "--out", path, HOME="/proc/nope")
-    assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    shown = ["episode", "--policy", policy, "--size", "400x330", "--out", path]
+    places = {"HOME": "/proc/nope", "DISPLAY": None}
+    done = process("render", shown, kernels, tmp_path, **places)
+    assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == f"{path}: 34 steps, return 45, delivered\n"
     with Image.open(path) as image:
         assert image.n_frames == 35
@@ -70,43 +58,31 @@ def test_an_episode_without_display_and_home(tmp_path, policy) -> None:
     assert files_in(tmp_path) == ["a.gif", "new"]
 
 
-def test_training_on_the_spot(tmp_path) -> None:
-    done = run(
-        "episode",
-        "--episodes",
-        30,
-        "--out",
-        tmp_path / "frames",
-        "--size",
-        "64x64",
-        "--max-steps",
-        4,
-    )
-    assert done.returncode == 0, done.stderr
+def test_training_on_the_spot(tmp_path, run) -> None:
+    short = ["--episodes", 30, "--size", "64x64", "--max-steps", 4]
+    assert run("episode", *short, "--out", tmp_path / "frames")[0] == 0
     assert files_in(tmp_path / "frames")[0] == "frame_000000.png"
     assert 5 <= len(files_in(tmp_path / "frames")) <= 17
 
 
-def test_a_still_and_a_sheet(tmp_path, policy) -> None:
+def test_a_still_and_a_sheet(tmp_path, policy, run) -> None:
     path = tmp_path / "a.png"
-    done = run("episode", "--policy", policy, "--max-steps", 3, "--out", path)
-    assert done.stdout.endswith("3 steps, return 3, not delivered\n")
-    done = run("episode", "--policy", policy, "--max-steps", 1, "--out", path)
-    assert ": 1 step, return" in done.stdout
+    _, out, _ = run("episode", "--policy", policy, "--max-steps", 3, "--out", path)
+    assert out.endswith("3 steps, return 3, not delivered\n")
+    _, out, _ = run("episode", "--policy", policy, "--max-steps", 1, "--out", path)
+    assert ": 1 step, return" in out
     assert Image.open(path).size == (1280, 720)
-    done = run("sheet", "--policy", policy, "--out", tmp_path / "sheet.png")
-    assert done.returncode == 0, done.stderr
+    assert run("sheet", "--policy", policy, "--out", tmp_path / "sheet.png")[0] == 0
     assert Image.open(tmp_path / "sheet.png").width == 1280
     assert files_in(tmp_path) == ["a.png", "sheet.png"]
 
 
 @pytest.mark.parametrize("shown", ["episode", "colony", "sheet"])
-def test_a_policy_of_another_observation_is_shown_as_such(tmp_path, shown) -> None:
+def test_a_policy_of_another_observation_is_shown_as_such(tmp_path, shown, run) -> None:
     path = tmp_path / "five.npz"
     save_policy(path, np.eye(2048, 5), {}, "five_cells")
     length = {"episode": ["--max-steps", "2"], "colony": ["--ticks", "2"], "sheet": []}[shown]
-    done = run(shown, "--policy", path, *length, "--out", tmp_path / "a.png")
-    assert done.returncode == 0, done.stderr
+    assert run(shown, "--policy", path, *length, "--out", tmp_path / "a.png")[0] == 0
     assert files_in(tmp_path) == ["a.png", "five.npz"]
 
 
@@ -139,28 +115,27 @@ def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) 
     assert render.training_config(settings).planning_steps == 2
     if shown == "learning":
         _, (checkpoint,) = render.noted_checkpoints(settings, paper())
-        table, task = checkpoint.episode.q_values, checkpoint.episode.task
+        table, task = checkpoint.episode.made.q_values, checkpoint.episode.made.task
     else:
         table, task, title = render.find_policy(settings, paper())
         assert title == "Dyna-Q after 1 episode"
     assert (table.shape, task.observation) == ((250, 5), "ants_seen")
 
 
-def test_learning_and_a_colony(tmp_path) -> None:
-    done = run(
+def test_learning_and_a_colony(tmp_path, run) -> None:
+    status, out, err = run(
         *("learning", "--seed", 5, "--checkpoints", 0, 2, "--max-steps", 9, "--size", "300x200"),
         *("--out", tmp_path / "a.gif"),
     )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.endswith("a.gif: seed 5, before learning, after 2 episodes\n")
+    assert (status, err) == (0, "")
+    assert out.endswith("a.gif: seed 5, before learning, after 2 episodes\n")
     with Image.open(tmp_path / "a.gif") as image:
         assert image.n_frames >= 5
-    done = run(
+    _, out, _ = run(
         *("colony", "--world", "open", "--ants", 7, "--episodes", 2, "--ticks", 9),
         *("--frame-interval", 3, "--size", "300x200", "--out", tmp_path / "b.gif"),
     )
-    assert done.returncode == 0, done.stderr
-    assert "7 ants, 9 ticks" in done.stdout
+    assert "7 ants, 9 ticks" in out
     with Image.open(tmp_path / "b.gif") as image:
         assert image.n_frames == 4
 
@@ -227,14 +202,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_mistakes_are_one_sentence(tmp_path, policy, name) -> None:
+def test_mistakes_are_one_sentence(tmp_path, policy, name, run) -> None:
     arguments, named = WRONG[name]
-    done = run(*(part.format(tmp_path, policy=policy) for part in arguments))
-    assert done.returncode == 2, done.stderr
-    assert named in done.stderr
-    assert done.stderr.startswith("error: ")
-    assert done.stderr.count("\n") == 1
-    assert done.stdout == ""
+    status, out, err = run(*(part.format(tmp_path, policy=policy) for part in arguments))
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    assert named in err
     assert files_in(tmp_path) == []
 
 
@@ -242,31 +215,26 @@ def test_mistakes_are_one_sentence(tmp_path, policy, name) -> None:
     ("name", "sent", "status"),
     [
         ("a.gif", signal.SIGINT, 130),
-        ("frames", signal.SIGINT, 130),
-        pytest.param("a.gif", signal.SIGTERM, 143, marks=pytest.mark.slow),
+        ("frames", signal.SIGTERM, 143),
     ],
 )
-def test_stopped_midway_it_leaves_nothing_behind(tmp_path, policy, name, sent, status) -> None:
+def test_stopped_midway_it_leaves_nothing_behind(
+    tmp_path, policy, name, sent, status, kernels
+) -> None:
     # An ant that moves at random has far more steps to take than there is time for.
     arguments = ["episode", "--policy", str(policy), "--epsilon", "1", "--max-steps", "100000"]
     arguments += ["--world", "open", "--size", "1600x1200", "--out", str(tmp_path / "new" / name)]
-    with subprocess.Popen(
-        [sys.executable, str(SCRIPT), *arguments],
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
-        for _ in range(50):  # pictures are written to a hidden folder, a GIF to memory
+    with start("render", arguments, kernels, tmp_path) as running:
+        for _ in range(25):  # pictures are written to a hidden folder, a GIF to memory
             if any(tmp_path.rglob("frame_*")):
                 break
             time.sleep(0.1)
-        process.send_signal(sent)
+        running.send_signal(sent)
         try:
-            _, errors = process.communicate(timeout=30)
+            _, errors = running.communicate(timeout=30)
         finally:
-            process.kill()
-    assert process.returncode == status
+            running.kill()
+    assert running.returncode == status
     assert errors == "Stopped; nothing was left behind.\n"
     assert files_in(tmp_path) == []
 
@@ -302,21 +270,17 @@ def test_the_command_names_itself_as_it_is_called(capsys, monkeypatch) -> None:
     assert "Example: taichi-ants render colony --ants 200 --out ants.gif" in shown
 
 
-def test_help_is_quick_and_needs_little() -> None:
-    took = []
+def test_help_needs_little(run, kernels) -> None:
     for kind in ("episode", "colony", "learning", "sheet"):
-        began = time.perf_counter()
-        done = run(kind, "--help")
-        took.append(time.perf_counter() - began)
-        assert "--training.learner" in done.stdout
-        example = re.search(r"Example: render.py (.*)", done.stdout)[1].split()
+        _, out, _ = run(kind, "--help")
+        assert "--training.learner" in out
+        example = re.search(rf"Example: .*?\b({kind}\b.*)", out)[1].split()
         assert render.parse_arguments(example).kind == kind
-    assert min(took) < 1.0
     heavy = "import sys; sys.path.insert(0, sys.argv[1]); import render, gallery; "
     heavy += "print({'taichi', 'matplotlib', 'PIL', 'av', 'numpy'} & set(sys.modules))"
     loaded = subprocess.run(
-        [sys.executable, "-c", heavy, str(SCRIPT.parent)],
-        env=environment(),
+        [sys.executable, "-c", heavy, str(EXPERIMENTS)],
+        env=environment(kernels),
         capture_output=True,
         text=True,
         check=True,

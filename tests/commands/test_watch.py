@@ -42,11 +42,10 @@ def test_ctrl_c_ends_it_promptly_in_one_line(number: int, kernels: Path, tmp_pat
 def test_ctrl_c_ends_the_replay_of_a_session(kernels: Path, tmp_path: Path) -> None:
     log = Session(Choices({}).setup(load("watch").START)).log()
     replace(log, steps=10**9, ticks=10**9).write(tmp_path / "endless.npz")
-    assert (
-        run("watch", ["--duration", 1], kernels, tmp_path).returncode == 0
-    )  # compiles some kernels
+    # Compiles some kernels.
+    assert run("watch", ["--duration", 1], kernels, tmp_path).returncode == 0
     process = start("watch", ["--session", tmp_path / "endless.npz"], kernels, tmp_path)
-    time.sleep(5)
+    time.sleep(3)
     assert process.poll() is None
     began = time.monotonic()
     process.send_signal(signal.SIGINT)

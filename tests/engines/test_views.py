@@ -9,7 +9,7 @@ from random_worlds import random_world
 from taichi_ants import AntsError, Colony, TrainingConfig, rollout, train
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.observations import registry
-from taichi_ants.worlds import paper
+from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.97)
 
@@ -59,8 +59,13 @@ def test_trails_and_distances_are_seen():
     assert set(nearer[trace.percepts < 64].tolist()) == {0, 1, 2}  # without food too
 
 
-def load(view):
-    return view.carries
+@pytest.mark.parametrize(("levels", "codes"), [((10, 30, 20), (3, 4, 4)), ((9, 30, 19), (2, 4, 3))])
+def test_a_third_of_the_strongest_trail_is_middling_and_two_thirds_are_strong(levels, codes):
+    ahead = [(3, 2, 0), (3, 3, 0), (2, 3, 0)]
+    trails = list(zip(ahead, levels, strict=True))
+    world = World((8, 8, 1), (0, 7, 0), trails=trails, ants=[((2, 2, 0), 1)])
+    trace = rollout(world, np.zeros((432, 5)), max_steps=1, task=Task("trail_levels"))
+    assert trace.states[0] == 36 * codes[0] + 6 * codes[1] + codes[2]
 
 
 def own_trail(view):
@@ -79,7 +84,7 @@ def lesser_trail(view):
 
 @pytest.mark.parametrize(
     ("encode", "n_states"),
-    [(load, 2), (own_trail, 4), pytest.param(lesser_trail, 256, marks=pytest.mark.slow)],
+    [(own_trail, 4), pytest.param(lesser_trail, 256, marks=pytest.mark.slow)],
 )
 def test_a_row_may_leave_any_part_of_a_look_unread(encode, n_states):
     """Taichi's compiler drops what computes the parts that nobody reads."""

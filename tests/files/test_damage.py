@@ -67,11 +67,11 @@ def mutated(content: bytes, rng: np.random.Generator, times: int) -> bytes:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_anything_that_can_happen_to_a_file(kind: str, small: dict[str, SmallFile]) -> None:
-    """Ten thousand files in all, the same each time."""
+    """Three thousand files in all, the same each time."""
     file, rng = small[kind], np.random.default_rng(KINDS.index(kind))
     whole, begun = file.read(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     with restored(file) as content:
-        for number in range(10_000 // len(KINDS) + 1):
+        for number in range(3000 // len(KINDS) + 1):
             file.path.write_bytes(mutated(content, rng, int(rng.integers(1, 5))))
             began = time.process_time()
             read = outcome(file)

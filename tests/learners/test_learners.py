@@ -20,7 +20,7 @@ from taichi_ants import (
     train,
 )
 from taichi_ants.learners import registry, td_learner
-from taichi_ants.reference.learners.sarsa import Sarsa
+from taichi_ants.reference.learners import Sarsa
 from taichi_ants.task import Task
 from taichi_ants.worlds import paper
 
@@ -79,14 +79,13 @@ def test_it_has_a_twin_in_the_reference(name):
     assert usual == twin.hyperparameters
 
 
-@pytest.mark.parametrize("delivery", DELIVERIES)
-def test_one_of_ones_own_equals_its_twin(delivery):
+def test_one_of_ones_own_equals_its_twin():
     """Some hundred steps in random worlds, to the bit; the package's own: tests/engines."""
     steps = deliveries = 0
     for seed in range(12):
         world = random_world(seed + 200)
         config = config_for("clipped_sarsa", learning_rate=0.37, discount=0.99, epsilon=0.2)
-        task = Task(delivery=delivery, evaporation_in_training=seed % 2 == 0)
+        task = Task(delivery=DELIVERIES[seed % 2], evaporation_in_training=seed % 4 < 2)
         ours = trace_training(world, config, seed, 3, 30, task)
         plain, tables = train_with_tables(world, config, seed, 3, 30, task)
         assert len(ours) == len(plain.trace)
@@ -103,16 +102,16 @@ def test_one_of_ones_own_equals_its_twin(delivery):
 
 
 @pytest.mark.parametrize("delivery", DELIVERIES)
-@pytest.mark.parametrize("name", NAMES)
-def test_it_learns_to_deliver_in_the_papers_world(name, delivery):
-    config = config_for(name)
-    result = train(paper(), config, range(10), 400, 600, Task(delivery=delivery))
+def test_all_learn_to_deliver_in_the_papers_world(delivery):
+    configs = [config_for(name) for name in NAMES]
+    result = train(paper(), configs, range(10), 400, 600, Task(delivery=delivery))
     assert np.isfinite(result.q_values).all()
-    late, early = result.steps[0, :, -50:], result.steps[0, :, :3]
-    assert late.mean() < early.mean() / 2
     greedy = evaluate(paper(), result.q_values, 10, range(10))
-    assert greedy.deliveries.mean() > 0.9
-    assert np.median(greedy.steps) <= 36  # 34 is the shortest way
+    for c, name in enumerate(NAMES):
+        late, early = result.steps[c, :, -50:], result.steps[c, :, :3]
+        assert late.mean() < early.mean() / 2, name
+        assert greedy.deliveries[c].mean() > 0.9, name
+        assert np.median(greedy.steps[c]) <= 36, name  # 34 is the shortest way
     untrained = evaluate(paper(), np.zeros((128, 5)), 100)
     assert untrained.deliveries.mean() < 0.5
 
@@ -135,10 +134,10 @@ def test_a_learner_of_ones_own_is_replaced():
     assert learners.names().count("mine") == 1
 
 
-@pytest.mark.parametrize("name", registry.BUILT_IN)
-def test_built_in_learners_are_not_replaced(name):
-    with pytest.raises(AntsError, match=f"^'{name}' is the name of a built-in learner, which"):
-        learners.register(td_learner(name, clipped_td_error, True))
+def test_built_in_learners_are_not_replaced():
+    for name in registry.BUILT_IN:
+        with pytest.raises(AntsError, match=f"^'{name}' is the name of a built-in learner, which"):
+            learners.register(td_learner(name, clipped_td_error, True))
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import runpy
 from dataclasses import dataclass, replace
+from itertools import cycle
 from typing import Annotated
 
 import numpy as np
@@ -253,8 +254,10 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("td_error", "says"), REFUSED)
+@pytest.mark.parametrize(
+    ("td_error", "says", "engine"),
+    [(*refused, engine) for refused, engine in zip(REFUSED, cycle(ENGINES), strict=False)],
+)
 def test_what_cannot_work_is_refused_and_the_process_lives(td_error, says, engine, capfd):
     register(td_learner("mine", td_error, draws_next_action=True))
     with pytest.raises(AntsError) as caught:

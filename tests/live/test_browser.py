@@ -18,9 +18,8 @@ from taichi_ants.commands import watch
 from taichi_ants.learners.expected_sarsa import EXPECTED_SARSA
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.log import Log
 from taichi_ants.live.server import Room
-from taichi_ants.live.session import Session
+from taichi_ants.live.session import Log, Session
 from taichi_ants.live.setup import MOST_ANTS
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 

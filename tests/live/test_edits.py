@@ -13,7 +13,7 @@ from random_edits import apply_to_both, random_edit
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
-from taichi_ants.engines.colony import stepping
+from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.layout import Stage, WorldRow
 from taichi_ants.live import edits
@@ -24,7 +24,6 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 # Each entry takes kernels of its own, see tests/engines/colony/test_against_reference.py.
 KERNELS = [
-    ("q_learning", "shared", "paper", False, "blocking", "half"),
     ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
     ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),
     ("double_q", "independent", "ants_seen", True, "blocking", "half"),
@@ -32,7 +31,7 @@ KERNELS = [
     ("n_step_sarsa", "independent", "paper", False, "blocking", "half"),
 ]
 TRAINING = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 0.9)
-MARKED = [*KERNELS[:4], *(pytest.param(one, marks=pytest.mark.slow) for one in KERNELS[4:])]
+MARKED = [*KERNELS[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in KERNELS[2:])]
 
 
 def assert_sound(interventions: Interventions) -> None:
@@ -58,13 +57,13 @@ def assert_sound(interventions: Interventions) -> None:
 def test_edits_keep_colony_and_reference_equal(kernel):
     learner, sharing, observation, dense, traffic, view = kernel
     done, refused = {}, 0
-    for seed in range(12):
+    for seed in range(8):
         rng = np.random.default_rng(seed)
         drawn = random_colony(
             *(seed, 12, sharing, 5, None, learner, observation, dense),
             traffic=traffic,
             view=view,
-            changes=kernel is not KERNELS[0],
+            changes=True,
         )
         population = {**drawn.population, "ends_at_delivery": False}
         population["capacity"] = population["ants"] + int(rng.integers(0, 9))
@@ -80,7 +79,7 @@ def test_edits_keep_colony_and_reference_equal(kernel):
         colony.begin_episode()
         plain.begin_episode()
         interventions, plain_hand = Interventions(colony), PlainInterventions(plain)
-        for _ in range(40):
+        for _ in range(30):
             edit = random_edit(rng, interventions)
             before = interventions.state()
             try:
@@ -96,13 +95,13 @@ def test_edits_keep_colony_and_reference_equal(kernel):
                 plain.tick()
                 assert_equal(colony, plain)
     assert len(done) == 7
-    assert min(done.values()) > 5, done
+    assert min(done.values()) > 3, done
     assert refused > 5
 
 
 def test_schedules_do_not_matter_to_edits(monkeypatch):
     """Many chunks; where no slot is vacant, ants are sorted now and then."""
-    monkeypatch.setattr(stepping, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
     for name in ("_FEWEST_TICKS", "_MOST_TICKS"):  # between two sorts
         monkeypatch.setattr(stepping, name, 2)
     world, training = worlds.open_world(5, (9, 8, 7)), TRAINING

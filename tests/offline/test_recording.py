@@ -42,7 +42,7 @@ def rows(data, names=FIELDS) -> list[tuple]:
 def test_a_learner_while_it_learns(learner):
     """SARSA draws its next action by the table as it is before the update."""
     config, seeds = TrainingConfig(learner, 0.5, 0.9, 0.4, 0.7), (3, -1)
-    for number in range(8):
+    for number in range(4):
         world, task = (
             random_world(number),
             Task(delivery="truncates" if number % 2 else "terminates"),

@@ -50,7 +50,7 @@ def test_a_move_onto_an_empty_cell_turns_and_goes(action, heading, cell):
     scene = Scene()
     assert scene.act(action) == (0, Event.ENTERED_EMPTY)
     assert scene.ends == (cell, heading, False)
-    assert scene.world.level(cell) == 0  # without food, no deposit
+    assert scene.world.trail.level(cell) == 0  # without food, no deposit
 
 
 def test_headings_wrap_around():
@@ -75,7 +75,7 @@ def test_a_blocked_move_only_turns(action, carries):
     scene = Scene(carries, queen=R, foods=[L], obstacles=[M])
     assert scene.act(action) == (-1, Event.BLOCKED)
     assert scene.ends == (A, action, carries)  # headings 0, 1, 2
-    assert [scene.world.level(cell) for cell in (A, L, M, R)] == [0, 0, 0, 0]
+    assert [scene.world.trail.level(cell) for cell in (A, L, M, R)] == [0, 0, 0, 0]
 
 
 def test_a_move_out_of_the_world_only_turns():
@@ -88,23 +88,23 @@ def test_with_food_a_move_nearer_pays_one_and_deposits_on_the_new_cell():
     scene = Scene(carries=True, queen=(4, 0, 0))  # sees S E E
     assert scene.act(LEFT) == (1, Event.ENTERED_LURE)
     assert scene.ends == (L, 0, True)
-    assert scene.world.level(L) == 250
-    assert scene.world.level(A) == 0
+    assert scene.world.trail.level(L) == 250
+    assert scene.world.trail.level(A) == 0
 
 
 def test_with_food_a_move_not_nearer_pays_nothing_and_deposits_too():
     scene = Scene(carries=True, queen=(4, 0, 0))
     assert scene.act(FORWARD) == (0, Event.ENTERED_EMPTY)
-    assert scene.world.level(M) == 250
+    assert scene.world.trail.level(M) == 250
 
 
 def test_a_deposit_sets_the_trail_and_does_not_add():
     scene = Scene(carries=True, trails=[(L, 1000), (M, 3)])
     scene.act(LEFT)
-    assert scene.world.level(L) == 250
+    assert scene.world.trail.level(L) == 250
     scene = Scene(carries=True, trails=[(L, 1000), (M, 3)])
     scene.act(FORWARD)
-    assert scene.world.level(M) == 250
+    assert scene.world.trail.level(M) == 250
 
 
 def test_pick_up_takes_the_food_turns_round_and_deposits_on_both_cells():
@@ -112,7 +112,7 @@ def test_pick_up_takes_the_food_turns_round_and_deposits_on_both_cells():
     assert scene.act(PICK_UP) == (3, Event.PICKED_UP)
     assert scene.ends == (A, 4, True)  # heading 1 + 3, wherever the food was
     assert scene.world.content(R) == EMPTY
-    assert [scene.world.level(cell) for cell in (A, R, L, M)] == [250, 250, 0, 0]
+    assert [scene.world.trail.level(cell) for cell in (A, R, L, M)] == [250, 250, 0, 0]
     assert scene.ant.stream.state == 0  # one food: no draw
 
 
@@ -135,7 +135,7 @@ def test_of_several_foods_the_draw_decides(foods, rng_state, taken):
     assert scene.act(PICK_UP) == (3, Event.PICKED_UP)
     left_over = {cell for cell in foods if scene.world.content(cell) == FOOD}
     assert left_over == set(foods) - {taken}
-    assert {cell for cell in (L, M, R) if scene.world.level(cell) == 250} == {taken}
+    assert {cell for cell in (L, M, R) if scene.world.trail.level(cell) == 250} == {taken}
     assert scene.ant.stream.state == (rng_state + GAMMA) % 2**64  # one draw
 
 
@@ -156,7 +156,7 @@ def test_pick_up_fails(contents):
     assert scene.ends == (A, 1, carries)
     assert scene.ant.stream.state == 0
     assert all(scene.world.content(cell) == FOOD for cell in contents.get("foods", []))
-    assert scene.world.level(A) == 0
+    assert scene.world.trail.level(A) == 0
 
 
 @pytest.mark.parametrize(("queen", "state"), [(L, 16), (M, 4), (R, 1)])
@@ -165,7 +165,7 @@ def test_give_pays_ten_and_keeps_the_heading(queen, state):
     assert scene.act(GIVE) == (10, Event.DELIVERED)
     assert scene.ends == (A, 1, False)
     assert scene.ant.percept == state  # the queen looks O again
-    assert scene.world.level(A) == 0
+    assert scene.world.trail.level(A) == 0
 
 
 @pytest.mark.parametrize(

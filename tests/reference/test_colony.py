@@ -103,12 +103,12 @@ def test_by_default_trails_fall_only_where_nobody_learns(sharing, level):
     colony = ReferenceColony(world, None, training(), 0, sharing=sharing)
     colony.begin_episode()
     act(colony, GIVE)
-    assert colony.world.level((1, 0, 0)) == level
+    assert colony.world.trail.level((1, 0, 0)) == level
     task = Task(evaporation_in_training=True, evaporation_in_evaluation=False)
     colony = ReferenceColony(world, task, training(), 0, sharing=sharing)
     colony.begin_episode()
     act(colony, GIVE)
-    assert colony.world.level((1, 0, 0)) == 19 - level
+    assert colony.world.trail.level((1, 0, 0)) == 19 - level
 
 
 @pytest.mark.parametrize("learner", ["sarsa_lambda", "n_step_sarsa"])

@@ -197,7 +197,7 @@ def test_of_two_that_want_one_food_one_gets_it(tick):
     assert cells_of(colony) == [first, second]
     assert foods_of(colony) == set()
     # Trail on the food's cell and on the winner's own, not on the loser's.
-    levels = [colony.world.level(cell) for cell in (food, gets.cell, loses.cell)]
+    levels = [colony.world.trail.level(cell) for cell in (food, gets.cell, loses.cell)]
     assert levels == [249, 249, 0]
     assert (colony.record.moves, colony.record.blocked) == (0, 0)
 

@@ -262,4 +262,4 @@ def test_trails_do_not_wander():
     colony = begun(place, seed=seed_of(0), wander=1)
     act(colony, GIVE)
     assert foods_of(colony) == {(2, 0, 0)}
-    assert [cell for cell in colony.world.ground if colony.world.level(cell)] == [(1, 0, 0)]
+    assert [cell for cell in colony.world.ground if colony.world.trail.level(cell)] == [(1, 0, 0)]

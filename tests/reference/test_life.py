@@ -10,8 +10,8 @@ from colonies import act, begun, cells_of, foods_of, load, n_draws, training
 
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_BORN, STREAM_QUEEN
 from taichi_ants.reference.geometry import neighbour
+from taichi_ants.reference.observations import observe
 from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.reference.vision import observe
 from taichi_ants.task.constants import FOOD, FORWARD, GIVE
 from taichi_ants.worlds import World
 
@@ -277,4 +277,4 @@ def test_every_episode_starts_with_the_same_ants_in_the_same_places():
         assert (again.number, again.cell, again.heading) == (ant.number, ant.cell, ant.heading)
         assert (again.age, again.action, again.state) == (0, -1, ant.state)
     assert colony.world.ground == ground
-    assert all(colony.world.level(cell) == trail.level(cell) for cell in ground)
+    assert all(colony.world.trail.level(cell) == trail.level(cell) for cell in ground)

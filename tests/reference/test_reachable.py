@@ -11,7 +11,7 @@ from plain_runs import train
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import existing_cells
-from taichi_ants.reference.vision import observe
+from taichi_ants.reference.observations import observe
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.constants import EMPTY

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from random_worlds import random_world
 
 from taichi_ants.reference.geometry import existing_cells, neighbour
-from taichi_ants.reference.trail import Trail
+from taichi_ants.reference.world_state import Trail
 from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
 from taichi_ants.worlds import World
@@ -200,12 +200,12 @@ def test_the_deposit_of_a_carrying_ant(pheromone, bare, trodden):
     start = colony.ants[0].cell
     act(colony, FORWARD)
     first = colony.ants[0].cell
-    assert colony.world.level(first) == bare
-    assert colony.world.level(start) == 0  # left, not entered
+    assert colony.world.trail.level(first) == bare
+    assert colony.world.trail.level(start) == 0  # left, not entered
     act(colony, FORWARD)
     second = colony.ants[0].cell
     assert second != first
-    assert colony.world.level(second) == trodden
+    assert colony.world.trail.level(second) == trodden
 
 
 def test_an_ant_that_does_not_move_or_does_not_carry_lays_nothing():
@@ -213,7 +213,7 @@ def test_an_ant_that_does_not_move_or_does_not_carry_lays_nothing():
     act(colony, FORWARD)
     load(colony, 0)
     act(colony, GIVE)
-    assert {colony.world.level(cell) for cell in colony.world.ground} == {0, 598}
+    assert {colony.world.trail.level(cell) for cell in colony.world.ground} == {0, 598}
 
 
 @pytest.mark.parametrize(
@@ -233,7 +233,7 @@ def test_picking_up_lays_a_trail_on_both_cells(pheromone, level):
     colony = begun(world, pheromone=pheromone)
     act(colony, PICK_UP)
     assert colony.ants[0].carries
-    assert [float(colony.world.level(cell)) for cell in cells] == [level, level]
+    assert [float(colony.world.trail.level(cell)) for cell in cells] == [level, level]
 
 
 def test_the_first_observation_sees_the_start_undiminished_and_the_next_a_tick_later():
@@ -285,7 +285,7 @@ def test_trails_that_fade_rise_towards_the_food(pheromone, levels):
     act(colony, PICK_UP)
     act(colony, FORWARD)
     act(colony, FORWARD)
-    assert [float(colony.world.level(cell)) for cell in cells] == list(levels)
+    assert [float(colony.world.trail.level(cell)) for cell in cells] == list(levels)
 
 
 def test_a_fading_deposit_lowers_no_trail():
@@ -296,7 +296,10 @@ def test_a_fading_deposit_lowers_no_trail():
     first = colony.ants[0].cell
     act(colony, PICK_UP)
     act(colony, FORWARD)
-    assert [colony.world.level(first), colony.world.level(neighbour(first, 3))] == [500, 900]
+    assert [colony.world.trail.level(first), colony.world.trail.level(neighbour(first, 3))] == [
+        500,
+        900,
+    ]
 
 
 # An ant below food; below it two free cells, and the queen beside them.

@@ -16,7 +16,7 @@ from __future__ import annotations
 import pytest
 
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.vision import cells_in_view, observe
+from taichi_ants.reference.observations import cells_in_view, observe
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Pheromone
 from taichi_ants.worlds.world import World

@@ -24,8 +24,8 @@ from taichi_ants.rendering import (
     typical_seed,
 )
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
+from taichi_ants.rendering.scene import PAPER
 from taichi_ants.rendering.sheet import clarity, learned, usual_spread
-from taichi_ants.rendering.state_names import PAPER
 from taichi_ants.task import Life, Observation, Rewards, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES

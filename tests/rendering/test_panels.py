@@ -9,7 +9,7 @@ import pytest
 from named_states import parse_state
 
 from taichi_ants import AntsError
-from taichi_ants.rendering import Scene, Status, at_start, frames, panel, text
+from taichi_ants.rendering import Scene, Status, at_start, frames, scene, text
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Observation, observations
@@ -209,7 +209,7 @@ def test_ants_of_the_legend_look_as_those_of_the_world() -> None:
 
     def legend(hexagon: float) -> np.ndarray:
         frame = np.full((260, 200, 3), 255, dtype=np.uint8)
-        panel.draw_legend(frame, 4, 4, 180, 16, hexagon, 250)
+        scene.draw_legend(frame, 4, 4, 180, 16, hexagon, 250)
         return frame
 
     darts, legs, dots = legend(8.0), legend(20.0), legend(1.0)

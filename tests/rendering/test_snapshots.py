@@ -47,7 +47,9 @@ def check(world: World, seed: int, evaporation: bool, epsilon: float) -> int:
     for step, (snapshot, status) in enumerate(snapshots):
         ant = colony.ants[0]
         assert snapshot.ground[index].tolist() == [colony.world.ground[cell] for cell in existing]
-        assert snapshot.trail[index].tolist() == [colony.world.level(cell) for cell in existing]
+        assert snapshot.trail[index].tolist() == [
+            colony.world.trail.level(cell) for cell in existing
+        ]
         assert snapshot.ant_cells[0] == world.grid.index(normal_form(ant.cell))
         assert snapshot.ant_headings[0] == ant.heading
         assert snapshot.ant_carries[0] == ant.carries

@@ -41,7 +41,7 @@ def test_a_colony_is_saved_although_its_picture_cannot_be(
     pictures = []
 
     def fourth(*given, **options) -> bytes:  # at the start and after 2, 4, 6 ticks
-        pictures.extend(islice(given[1], 4) if writer == "_gif" else given[:1])
+        pictures.extend(islice(given[2], 4) if writer == "_gif" else given[:1])
         if len(pictures) == 4 or render == "a.png":
             raise error
         return b""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import runpy
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -86,6 +87,19 @@ def call(name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[s
     capsys.readouterr()
     with pytest.raises(SystemExit) as exit_:
         load(name).main([str(argument) for argument in arguments])
+    written = capsys.readouterr()
+    return exit_.value.code, written.out, written.err
+
+
+def call_script(
+    name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[str]
+) -> Outcome:
+    """Run a script of an experiment, which is no command, within this process."""
+    capsys.readouterr()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", [f"{name}.py", *map(str, arguments)])
+        with pytest.raises(SystemExit) as exit_:
+            runpy.run_path(str(EXPERIMENTS / f"{name}.py"), run_name="__main__")
     written = capsys.readouterr()
     return exit_.value.code, written.out, written.err
 

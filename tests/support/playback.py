@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +12,16 @@ import numpy as np
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import Recording
+
+
+def unpack(types: Mapping[str, str], frame: bytes) -> dict[str, np.ndarray]:
+    """The sections of a frame, see `taichi_ants.viewer.frames`."""
+    lengths = np.frombuffer(frame, "<u4", 1 + len(types)).tolist()[1:]
+    sections, at = {}, 8 * -(-(1 + len(types)) // 2)
+    for (name, kind), length in zip(types.items(), lengths, strict=True):
+        sections[name] = np.frombuffer(frame, f"<{kind}", length, at)
+        at += 8 * -(-sections[name].nbytes // 8)
+    return sections
 
 
 @dataclass
@@ -49,11 +59,13 @@ def played(recording: Recording) -> Iterator[Played]:
     """Every moment of a recording."""
     grid = AxialGrid(tuple(recording.header["ranges"]))
     ground = np.zeros(grid.size, np.uint8)
-    stored = np.zeros(grid.size, recording.sections(0)["trail"].dtype)
+    stored = np.zeros(
+        grid.size, unpack(recording.header["types"], recording.frames[0])["trail"].dtype
+    )
     values: dict[int, float] = {}
     numbers = np.zeros(0, np.int32)
     for moment in range(len(recording)):
-        frame = recording.sections(moment)
+        frame = unpack(recording.header["types"], recording.frames[moment])
         clock = frame["clock"].tolist()
         ground[frame["ground_at"]] = frame["ground"]
         stored[frame["trail_at"]] = frame["trail"]

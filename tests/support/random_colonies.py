@@ -9,7 +9,7 @@ import numpy as np
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
-from taichi_ants.engines.colony.colony import SHARINGS
+from taichi_ants.engines.colony.state import SHARINGS
 from taichi_ants.task import Life, Pheromone, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY, GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds import World

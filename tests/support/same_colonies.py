@@ -32,7 +32,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(plain.world.ground.values())
-    levels = np.array([plain.world.level(cell) for cell in plain.world.ground])
+    levels = np.array([plain.world.trail.level(cell) for cell in plain.world.ground])
     assert np.array_equal(ours.trail[places], levels.astype(ours.trail.dtype))
     assert np.array_equal(colony.q_values[world], plain.q_values)
     assert int(arrays["queen_streams"][world]) == plain.queen_stream.state

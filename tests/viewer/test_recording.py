@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from playback import played, unpacked
+from playback import played, unpack, unpacked
 from random_colonies import random_colony
 
 from taichi_ants import (
@@ -112,7 +112,7 @@ def test_an_episode_is_its_trace(epsilon):
     assert len(moments) == len(trace) + 1
     assert recording.header["follow"] == 0
     for step, (moment, after) in enumerate(pairwise(moments)):
-        assert episode.world.grid.cells(moment.cells).tolist() == [trace.cells[step].tolist()]
+        assert episode.made.world.grid.cells(moment.cells).tolist() == [trace.cells[step].tolist()]
         assert moment.headings == trace.headings[step]
         assert moment.states == trace.states[step]
         assert after.actions == trace.actions[step]
@@ -179,7 +179,12 @@ def test_what_is_skipped_and_what_is_changed_by_hand():
     assert np.array_equal(moments[-1].ground, colony.snapshot().ground)
     assert np.array_equal(moments[-1].trail, colony.snapshot().trail)
     every = record_colony(colony, 7, frame_interval=3)
-    assert [every.sections(k)["clock"][1] for k in range(4)] == [6, 9, 12, 13]
+    assert [unpack(every.header["types"], one)["clock"][1] for one in every.frames[:4]] == [
+        6,
+        9,
+        12,
+        13,
+    ]
 
 
 def test_a_delivery_is_in_the_totals_and_the_events():

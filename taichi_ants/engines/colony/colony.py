@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, get_args
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from taichi_ants import checks, runtime
+from taichi_ants import checks
 from taichi_ants.engines.colony.layout import WorldRow
-from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState
-from taichi_ants.engines.colony.stepping import Stepper, chunks_of, usual_schedule
-from taichi_ants.errors import AntsError, array_of, check_one_of, checked_whole, entries_of, shown
-from taichi_ants.learners import get as get_learner
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.task import Task
+from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState, checked_worlds
+from taichi_ants.engines.colony.stepping import Stepper
+from taichi_ants.errors import AntsError, array_of, checked_whole, entries_of, shown
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
-from taichi_ants.worlds.world import Start, World
+from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]
-Sharing = Literal["shared", "independent", "frozen"]
-SHARINGS: tuple[str, ...] = get_args(Sharing)
-
-# Where actions are given, nobody chooses or learns, and none of these matters.
-_NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
 
 class Colony(ColonyState):
@@ -60,64 +53,9 @@ class Colony(ColonyState):
             does not have; or a world has too few free cells for the ants.
     """
 
-    def __init__(
-        self,
-        world: World | Sequence[World],
-        task: Task | None,
-        training: TrainingConfig | None,
-        seeds: int | Sequence[int] = 0,
-        ants: int = 1,
-        capacity: int | None = None,
-        start: Start = "nest",
-        ends_at_delivery: bool = False,
-        sharing: str = "shared",
-        q_values: np.ndarray | None = None,
-        threads: int | None = None,
-        *,
-        arch: str | None = None,
-        schedule: str | None = None,
-    ) -> None:
-        task = checks.checked_task(Task() if task is None else task)
-        capacity = checks.checked_capacity(task, ants, capacity, start, ends_at_delivery)
-        check_one_of("sharing", sharing, SHARINGS)
-        learns = sharing != "frozen"
-        is_given_actions = training is None and not learns and q_values is None
-        if is_given_actions:
-            training = _NO_TRAINING
-        if not isinstance(training, TrainingConfig):
-            raise AntsError(
-                f"training is {shown(training)}; it must be one TrainingConfig, or None with "
-                'sharing="frozen" and without q_values.'
-            )
-        (training,) = checks.checked_configs(training)
-        if not learns and q_values is None and not is_given_actions:
-            raise AntsError(
-                "sharing is 'frozen', but q_values is None; nobody learns, so give the action "
-                "values that the ants follow."
-            )
-        if learns:
-            checks.check_sharing(get_learner(training.learner), sharing)
-        table = None if q_values is None else checks.checked_q_values(q_values, task)
-        numbers = checks.checked_seeds(seeds)
-        running = runtime.start(threads, arch)
-        schedule = usual_schedule(len(numbers), capacity) if schedule is None else schedule
-        check_one_of("schedule", schedule, ("by_world", "by_chunk"))
-        super().__init__(
-            _checked_worlds(world, len(numbers), learns),
-            task,
-            training,
-            numbers,
-            ants=int(ants),
-            capacity=capacity,
-            start=start,
-            ends_at_delivery=bool(ends_at_delivery),
-            sharing=sharing,
-            q_values=table,
-            is_given_actions=is_given_actions,
-            schedule=schedule,
-            chunks=chunks_of(schedule, running.threads),
-        )
-        self._stepper = Stepper()
+    @cached_property
+    def _stepper(self) -> Stepper:
+        return Stepper()
 
     def begin_episode(
         self, length: int | None = None, world: World | Sequence[World] | None = None
@@ -132,7 +70,7 @@ class Colony(ColonyState):
         Raises:
             AntsError: A world is not allowed.
         """
-        others = None if world is None else _checked_worlds(world, len(self.seeds), self.learns)
+        others = None if world is None else checked_worlds(world, len(self.seeds), self.learns)
         self.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         if others is not None:
             self.delivered += self.deliveries
@@ -263,14 +201,14 @@ class Colony(ColonyState):
                 "episodes."
             )
         for place in worlds:
-            several = _checked_worlds(place, len(self.seeds), self.learns)
+            several = checked_worlds(place, len(self.seeds), self.learns)
             for one, seed in dict.fromkeys(zip(several, self.seeds, strict=True)):
                 one.start(seed, self.ants, self.start)  # whether there is room
         return worlds
 
     def __getstate__(self) -> dict[str, Any]:
         """Return all but what belongs to the Taichi that runs: copies and pickles go on alike."""
-        return {**vars(self), "_stepper": Stepper()}
+        return {name: value for name, value in vars(self).items() if name != "_stepper"}
 
     def __repr__(self) -> str:
         others = len(dict.fromkeys(self.worlds)) - 1
@@ -290,17 +228,3 @@ class Colony(ColonyState):
                 f"deliveries: {now[WorldRow.DELIVERIES]}"
             )
         return "\n    ".join(["Colony(", *lines]) + "\n)"
-
-
-def _checked_worlds(
-    world: World | Sequence[World], n_seeds: int, learns: bool
-) -> tuple[World, ...]:
-    """A world for each seed, all of the same ranges."""
-    given = entries_of(world) or [world] * n_seeds
-    worlds = tuple(checks.checked_world(one, learns) for one in given)
-    if len(worlds) != n_seeds:
-        raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds.")
-    ranges = {world.ranges for world in worlds}
-    if len(ranges) > 1:
-        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
-    return worlds

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from taichi_ants.engines.colony.layout import FoodSourceRow, WorldRow
-from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.worlds.world import World
 
 
@@ -46,16 +45,14 @@ def arrays(
 
 
 def at_start(world: World) -> np.ndarray:
-    """Return what `arrays` needs of a world: a source for each of its foods."""
-    cells = world.grid.index(world.foods)
-    return np.stack([cells, np.full(len(cells), -1), _piles(world.grid, cells)])
+    """Return what `arrays` needs of a world: a source for each of its foods.
 
-
-def _piles(grid: AxialGrid, cells: np.ndarray) -> np.ndarray:
-    """Return the pile of each food: connected cells, numbered in order of their first."""
+    A pile is connected cells; piles are numbered in order of their first.
+    """
     from scipy.sparse import coo_array  # takes a while to import
     from scipy.sparse.csgraph import connected_components
 
+    grid, cells = world.grid, world.grid.index(world.foods)
     place = np.full(grid.size, -1, np.int64)
     place[cells] = np.arange(len(cells))
     neighbours = place[cells[:, None] + grid.offsets[None, :]]
@@ -64,4 +61,5 @@ def _piles(grid: AxialGrid, cells: np.ndarray) -> np.ndarray:
     graph = coo_array((np.ones(len(rows), np.int8), links), shape=(len(cells),) * 2)
     _, labels = connected_components(graph, directed=False)
     _, first, numbers = np.unique(labels, return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(first))[numbers].astype(np.int32)
+    piles = np.argsort(np.argsort(first))[numbers].astype(np.int32)
+    return np.stack([cells, np.full(len(cells), -1), piles])

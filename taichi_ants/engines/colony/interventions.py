@@ -39,15 +39,11 @@ if TYPE_CHECKING:
 REACH = 8  # cells; twice the radius of the largest brush of the page
 
 
-def _steps() -> np.ndarray:
-    """The steps of 1 to `REACH` cells, in the order in which they are tried, axial (n, 2)."""
-    grid = AxialGrid((REACH + 1,) * 3)
-    cells = grid.cells(np.flatnonzero(grid.exists))
-    order = np.lexsort((*cells.T[::-1], cells.max(axis=1)))
-    return axial(cells[order[1:]])  # without the first, which leads nowhere
-
-
-_STEPS = _steps()
+_GRID = AxialGrid((REACH + 1,) * 3)
+_CELLS = _GRID.cells(np.flatnonzero(_GRID.exists))
+_ORDER = np.lexsort((*_CELLS.T[::-1], _CELLS.max(axis=1)))
+# The steps of 1 to `REACH` cells, in the order in which they are tried, axial (n, 2).
+_STEPS = axial(_CELLS[_ORDER[1:]])
 
 
 class Interventions:
@@ -168,20 +164,20 @@ class Interventions:
             )
         slots = np.flatnonzero(arrays["stage"] == Stage.VACANT)[:n]
         numbers = world[WorldRow.NEXT_NUMBER] + np.arange(n)
-        headings: int | np.ndarray
-        if heading is None:
-            headings = choose(self._stream.bits(n) >> np.uint64(32), N_HEADINGS)
-        else:
-            headings = heading
-        for name in colony.columns():
-            arrays[name][slots] = 0
-        arrays["cell"][slots], arrays["heading"][slots] = cells, headings
-        arrays["number"][slots], arrays["action"][slots] = numbers, -1
-        if "next_action" in arrays:
-            arrays["next_action"][slots] = -1
-        arrays["stage"][slots] = Stage.NEWBORN
+        drawn = heading is None
+        headings = choose(self._stream.bits(n) >> np.uint64(32), N_HEADINGS) if drawn else heading
         born = (colony.episode << 32) + numbers.astype(np.int64)
-        arrays["streams"][slots] = stream_state(colony.seeds[0], STREAM_BORN, born)
+        newborn = {
+            "cell": cells,
+            "heading": headings,
+            "number": numbers,
+            "action": -1,
+            "next_action": -1,
+            "stage": Stage.NEWBORN,
+            "streams": stream_state(colony.seeds[0], STREAM_BORN, born),
+        }
+        for name in colony.columns():
+            arrays[name][slots] = newborn.get(name, 0)
         arrays["ground"][cells] = ANT_GROUND
         world[WorldRow.NEXT_NUMBER] += n
         self._count_ants()
@@ -225,17 +221,15 @@ class Interventions:
         self._changed |= n != self.ants
         self.ants = n
         if missing > 0:
-            self.add_ants(self._nearest(free)[:missing])
+            # In the order in which ants would start there.
+            grid = colony.grid
+            words = stream_state(colony.seeds[0], STREAM_START_CELL, grid.number(grid.cells(free)))
+            queen = grid.cells(colony.arrays["worlds"][WorldRow.QUEEN_CELL, 0])
+            far = grid.distances(tuple(queen.tolist()))[free]
+            order = np.lexsort((words, far * (colony.start == "nest")))
+            self.add_ants(free[order[:missing]])
         elif missing < 0:
             self._remove(slots[np.argsort(colony.numbers[0, slots])[missing:]])
-
-    def _nearest(self, cells: np.ndarray) -> np.ndarray:
-        """Cells in the order in which ants would start there."""
-        colony, grid = self.colony, self.colony.grid
-        words = stream_state(colony.seeds[0], STREAM_START_CELL, grid.number(grid.cells(cells)))
-        queen = grid.cells(colony.arrays["worlds"][WorldRow.QUEEN_CELL, 0])
-        far = grid.distances(tuple(queen.tolist()))[cells]
-        return cells[np.lexsort((words, far * (colony.start == "nest")))]
 
     def set_task(self, task: Task) -> None:
         """Set a task that differs in numbers of its pheromone and in whether trails evaporate."""
@@ -245,19 +239,19 @@ class Interventions:
         arrays["trail"][:] = np.where(levels > 0, levels + colony.trail_clock(0), 0)
 
     def set_epsilon(self, epsilon: float) -> None:
-        """The epsilon from now on; it decays no more."""
+        """Set the epsilon from now on; it decays no more."""
         colony = self.colony
         colony.epsilon = epsilon
         colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
 
     def set_learning_rate(self, learning_rate: float) -> None:
-        """The learning rate from now on; it decays no more."""
+        """Set the learning rate from now on; it decays no more."""
         colony = self.colony
         colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
         colony.set_learning_rate(learning_rate)
 
     def state(self) -> str:
-        """A hash of all that goes on: where it is equal, all that follows is equal."""
+        """Return a hash of all that goes on: if it is equal, all that follows is equal."""
         colony = self.colony
         moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
         rest = (self.ants, self._stream.state, colony.task.as_dict(), colony.training.as_dict())
@@ -269,7 +263,7 @@ class Interventions:
         return digest.hexdigest()
 
     def world(self) -> World:
-        """How later episodes begin."""
+        """Return the world in which later episodes begin."""
         first, grid, start = self._first, self.colony.grid, self._start
         trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
         return World(

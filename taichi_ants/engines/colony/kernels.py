@@ -9,7 +9,7 @@ phases in the same order, so that they give the same numbers. The order is that 
 
 from collections.abc import Callable, Iterator
 from functools import cache
-from itertools import chain
+from itertools import chain, groupby
 from typing import Any, NamedTuple
 
 import taichi as ti
@@ -78,7 +78,7 @@ class Variant:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
         self.n_pairs = observation.n_states * ROW  # of a row and an action, and some of no meaning
-        self.sees_percept = views.is_percept(observation)
+        self.sees_percept = observation.name == "paper"  # so that no view is needed
         # Whether the cell of an ant has to tell what the ant carries.
         self.sees_ants = not self.sees_percept or view == "strongest_under_carriers"
         if not self.sees_percept:
@@ -168,11 +168,9 @@ def share_of(c: ti.template(), chunk, n):
 def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
     """Phases in groups that need no barrier inside: of single worlds, all that follow."""
     groups: list[tuple[Phase, ...]] = []
-    for phase in phases:
-        if groups and phase.of == groups[-1][0].of == WORLD:
-            groups[-1] += (phase,)
-        else:
-            groups.append((phase,))
+    for of_worlds, some in groupby(phases, lambda phase: phase.of == WORLD):
+        several = tuple(some)
+        groups += [several] if of_worlds else [(phase,) for phase in several]
     return groups
 
 

@@ -51,8 +51,6 @@ class WorldRow(IntEnum):
     TICKS = auto()  # also the number of the present tick, from 0; its end adds 1
     DELIVERIES = auto()
     FIRST_DELIVERY = auto()
-    MOVES = auto()
-    BLOCKED = auto()
     BIRTHS = auto()
     DEATHS = auto()
     REGROWN = auto()
@@ -60,15 +58,19 @@ class WorldRow(IntEnum):
 
 
 class Tally(IntEnum):
-    """What is counted in a tick: `tallies` has TALLY_WIDTH numbers for each chunk, these first."""
+    """Counts of a tick: `tallies` has TALLY_WIDTH numbers for each chunk, these first.
+
+    Those of `TOTALS` are summed over the episode in 64 bits, rows of `totals` of these numbers.
+    """
 
     RETURNS = 0
-    DELIVERIES = auto()
     MOVES = auto()
     BLOCKED = auto()
+    DELIVERIES = auto()
     DEATHS = auto()
 
 
+TOTALS = (Tally.RETURNS, Tally.MOVES, Tally.BLOCKED)
 # Wide enough that no two chunks share a line of a cache: threads would fight for it.
 TALLY_WIDTH = 16
 
@@ -115,3 +117,18 @@ class SumRow(IntEnum):
 # upper four mark the ant on it, and tell whether it carries food where somebody sees that.
 ANT_STANDS, STANDS_WITH_FOOD = 7, 15
 ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
+
+# Slots from which threads share the ants of a world: of a single one, and of each of many.
+_LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
+_CHUNKS_PER_THREAD = 2
+
+
+def usual_schedule(n_worlds: int, capacity: int) -> str:
+    """Return the faster schedule for so many worlds of so many slots."""
+    large = capacity >= (_LARGE_ALONE if n_worlds == 1 else _LARGE_COLONY)
+    return "by_chunk" if large else "by_world"
+
+
+def chunks_of(schedule: str, threads: int) -> int:
+    """Return into how many chunks the ants of a world are divided."""
+    return _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1

@@ -10,6 +10,7 @@ from taichi.math import popcnt
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     TALLY_WIDTH,
+    TOTALS,
     FoodSourceRow,
     Stage,
     Tally,
@@ -39,9 +40,8 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         first = chunk * TALLY_WIDTH
         deaths = ti.cast(c.tallies[first + Tally.DEATHS], ti.i32)
         gives += ti.cast(c.tallies[first + Tally.DELIVERIES], ti.i32)
-        c.returns[w] += c.tallies[first + Tally.RETURNS]
-        c.worlds[WorldRow.MOVES, w] += ti.cast(c.tallies[first + Tally.MOVES], ti.i32)
-        c.worlds[WorldRow.BLOCKED, w] += ti.cast(c.tallies[first + Tally.BLOCKED], ti.i32)
+        for row in ti.static(TOTALS):
+            c.totals[row, w] += c.tallies[first + row]
         c.worlds[WorldRow.DEATHS, w] += deaths
         c.worlds[WorldRow.LIVING, w] -= deaths
         for row in ti.static(range(len(Tally))):
@@ -91,7 +91,6 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
     c.cell[ant] = cell
     put(c.heading, ant, heading)
     put(c.carries, ant, 0)
-    c.carried[ant] = 0  # the last ant in the slot may have died with food
     put(c.stage, ant, Stage.NEWBORN)
     put(c.action, ant, -1)
     c.age[ant] = 0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -19,14 +19,24 @@ from taichi_ants.engines.colony.layout import (
     BYTE_COLUMNS,
     INTEGER_COLUMNS,
     TALLY_WIDTH,
+    TOTALS,
     Order,
     Stage,
     SumRow,
     WorldRow,
+    chunks_of,
+    usual_schedule,
 )
-from taichi_ants.engines.packing import compass_of, padded
+from taichi_ants.engines.layout import compass_of, padded
 from taichi_ants.engines.records import Record, Snapshot, same
-from taichi_ants.errors import AntsError, check_array, checked_whole
+from taichi_ants.errors import (
+    AntsError,
+    check_array,
+    check_one_of,
+    checked_whole,
+    entries_of,
+    shown,
+)
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
@@ -34,20 +44,20 @@ from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, N_ACTIONS, OBSTACLE, ROW
-from taichi_ants.worlds.world import World
+from taichi_ants.worlds.world import Start, World
 
 State = TypeVar("State", bound="ColonyState")
+Sharing = Literal["shared", "independent", "frozen"]
+SHARINGS: tuple[str, ...] = get_args(Sharing)
 Arrays = dict[str, np.ndarray]
 Which = slice | np.ndarray
 ALL = slice(None)  # the worlds, where a bool (W,) would name some
 
-# Kernels count moves in 32 bits, which 10 000 ants fill in 200 000 ticks; so these counters start
-# again at `_ROUND`, and `rounds` holds how often they did.
-_LARGE = (WorldRow.MOVES, WorldRow.BLOCKED)
-_ROUND = 1 << 30
 _MOST_NUMBERS = 2**31 - 1  # kernels index arrays by 32 bits
+# Where actions are given, nobody chooses or learns, and none of these matters.
+_NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
-_KIND = Kind("colony", 10, "Colony.save")
+_KIND = Kind("colony", 11, "Colony.save")
 # What a file holds besides arrays: arguments of `Colony`, and the progress of the episode.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
@@ -73,65 +83,95 @@ class ColonyEpisodes(Record):
     living: np.ndarray
 
 
+def column(name: str) -> property:
+    """Return a property: a writable view (W, capacity) of an array with an entry for each slot."""
+
+    def view(state: ColonyState) -> np.ndarray:
+        return state.arrays[name].reshape(len(state.seeds), state.capacity)
+
+    return property(view)
+
+
 class ColonyState:
     """The state of a colony of W worlds with `capacity` slots each, in which ants live.
 
-    Attributes:
-        task, training, ants, capacity, start, ends_at_delivery, sharing: As given to `Colony`.
+    Attributes, besides the arguments of `Colony`:
+        learns: Whether the ants learn.
         is_given_actions: Whether ants do what `Colony.act` is given.
         one_a_slot: Whether each slot has its own table of action values, not each world.
-        memory: What the learner keeps with each table.
+        ants_change: Whether ants are born or die.
+        food_changes: Whether food grows back or wanders.
+        memory: The memory that the learner keeps with each table.
         pheromone: The pheromone of the task, which evaporates as the task says of this colony.
+        stored: The names of the arrays that a file holds.
         length: Of the episode in ticks; 0 if it is not known.
         ticks: Since an episode began for all worlds.
         delivered: int64 (W,), food items that were delivered in the episodes before this one.
     """
 
-    arrays: Arrays
-
     def __init__(
         self,
-        worlds: tuple[World, ...],
-        task: Task,
-        training: TrainingConfig,
-        seeds: tuple[int, ...],
+        world: World | Sequence[World],
+        task: Task | None,
+        training: TrainingConfig | None,
+        seeds: int | Sequence[int] = 0,
+        ants: int = 1,
+        capacity: int | None = None,
+        start: Start = "nest",
+        ends_at_delivery: bool = False,
+        sharing: str = "shared",
+        q_values: np.ndarray | None = None,
+        threads: int | None = None,
         *,
-        ants: int,
-        capacity: int,
-        start: str,
-        ends_at_delivery: bool,
-        sharing: str,
-        q_values: np.ndarray | None,
-        is_given_actions: bool,
-        schedule: str,
-        chunks: int,
+        arch: str | None = None,
+        schedule: str | None = None,
     ) -> None:
-        self.task, self.training, self.seeds = task, training, seeds
-        self.ants, self.capacity, self.start = ants, capacity, start
-        self.ends_at_delivery, self.sharing = ends_at_delivery, sharing
-        self.is_given_actions, self.schedule, self.chunks = is_given_actions, schedule, chunks
-        self.one_a_slot = sharing == "independent" or (
-            sharing == "frozen" and q_values is not None and q_values.ndim == 4
-        )
-        self.pheromone = task.pheromone_while(self.learns)
-        self.memory = Memory()
-        if sharing == "independent" or self.plans_together:
-            assert self.learner is not None  # since it learns
-            self.memory = padded(self.learner.memory_for(training, task.n_states))
-        self.arrays = {}
-        self.lay_out(worlds)
-        self.arrays |= (lasting := self._lasting(q_values))
-        # The names of those that a file holds.
-        self.stored = (*self._changing, *lasting)
-        self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
-        self.length = self.ticks = 0
-        self.rounds = np.zeros((len(_LARGE), len(seeds)), np.int64)  # see `_LARGE`
-        self.delivered = np.zeros(len(seeds), np.int64)
+        self.task = checks.checked_task(Task() if task is None else task)
+        self.capacity = checks.checked_capacity(self.task, ants, capacity, start, ends_at_delivery)
+        self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
+        check_one_of("sharing", sharing, SHARINGS)
+        self.sharing, self.learns = sharing, sharing != "frozen"
+        self.is_given_actions = training is None and not self.learns and q_values is None
+        if self.is_given_actions:
+            training = _NO_TRAINING
+        if not isinstance(training, TrainingConfig):
+            raise AntsError(
+                f"training is {shown(training)}; it must be one TrainingConfig, or None with "
+                'sharing="frozen" and without q_values.'
+            )
+        (self.training,) = checks.checked_configs(training)
+        if not self.learns and q_values is None and not self.is_given_actions:
+            raise AntsError(
+                "sharing is 'frozen', but q_values is None; nobody learns, so give the action "
+                "values that the ants follow."
+            )
+        if self.learner:
+            checks.check_sharing(self.learner, sharing)
+        table = None if q_values is None else checks.checked_q_values(q_values, self.task)
+        self.seeds = checks.checked_seeds(seeds)
+        running = runtime.start(threads, arch)
+        schedule = usual_schedule(len(self.seeds), self.capacity) if schedule is None else schedule
+        check_one_of("schedule", schedule, ("by_world", "by_chunk"))
+        self.schedule, self.chunks = schedule, chunks_of(schedule, running.threads)
+        worlds = checked_worlds(world, len(self.seeds), self.learns)
 
-    @property
-    def learns(self) -> bool:
-        """Whether the ants learn."""
-        return self.sharing != "frozen"
+        self.one_a_slot = sharing == "independent" or (
+            not self.learns and table is not None and table.ndim == 4
+        )
+        life = self.task.life
+        self.ants_change = life.births or life.lifespan is not None
+        self.food_changes = life.regrowth is not None or life.wander is not None
+        self.pheromone = self.task.pheromone_while(self.learns)
+        self.memory = Memory()
+        if self.learner and (self.one_a_slot or self.plans_together):
+            self.memory = padded(self.learner.memory_for(self.training, self.task.n_states))
+        self.arrays: Arrays = {}
+        self.lay_out(worlds)
+        self.arrays |= (lasting := self._lasting(table))
+        self.stored = (*self._changing, *lasting)
+        self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
+        self.length = self.ticks = 0
+        self.delivered = np.zeros(len(self.seeds), np.int64)
 
     @property
     def learner(self) -> Learner | None:
@@ -143,20 +183,7 @@ class ColonyState:
         """Whether ants share a table and a model from which they plan."""
         return self.sharing == "shared" and learners.get(self.training.learner).plans
 
-    @property
-    def ants_change(self) -> bool:
-        """Whether ants are born or die."""
-        return self.task.life.births or self.task.life.lifespan is not None
-
-    @property
-    def food_changes(self) -> bool:
-        """Whether food grows back or wanders."""
-        return self.task.life.regrowth is not None or self.task.life.wander is not None
-
     # Views
-
-    def _by_slot(self, name: str) -> np.ndarray:
-        return self.arrays[name].reshape(len(self.seeds), self.capacity)
 
     @property
     def episode(self) -> int:
@@ -178,66 +205,35 @@ class ColonyState:
         """Deliveries of the present episode, int32 (W,); a view."""
         return self.arrays["worlds"][WorldRow.DELIVERIES]
 
+    # By slot, arrays (W, capacity): the number of the last ant in it, int32, -1 for none; the flat
+    # index of its cell, int32; its heading 0 to 5, the paper's state (see `task.states`), its last
+    # action (-1 before the first one) and `Event`, int8; the action that it has drawn ahead of the
+    # next tick, int8, else -1; and the state of its random stream, uint64.
+    numbers, cells, headings = column("number"), column("cell"), column("heading")
+    percepts, actions, events = column("percept"), column("action"), column("event")
+    next_actions, streams = column("next_action"), column("streams")
+    _stages, _loads, _states = column("stage"), column("carries"), column("state")
+
     @property
     def living(self) -> np.ndarray:
         """Slots in which ants live, bool (W, capacity)."""
-        return self._by_slot("stage") == Stage.LIVING
-
-    @property
-    def numbers(self) -> np.ndarray:
-        """Number of the last ant in each slot, int32 (W, capacity), -1 for none; a view."""
-        return self._by_slot("number")
-
-    @property
-    def cells(self) -> np.ndarray:
-        """Flat index of the cell of each ant, int32 (W, capacity); a view."""
-        return self._by_slot("cell")
-
-    @property
-    def headings(self) -> np.ndarray:
-        """Heading of each ant, 0 to 5, int8 (W, capacity); a view."""
-        return self._by_slot("heading")
+        return self._stages == Stage.LIVING
 
     @property
     def carrying(self) -> np.ndarray:
         """Slots whose ant carries food, bool (W, capacity)."""
-        return self._by_slot("carries") == 1
-
-    @property
-    def percepts(self) -> np.ndarray:
-        """The paper's state of each ant, see `task.states`, int8 (W, capacity); a view."""
-        return self._by_slot("percept")
+        return self._loads == 1
 
     @property
     def states(self) -> np.ndarray:
         """State index of each ant, of dead ones the last, int32 (W, capacity)."""
-        return self._by_slot("state" if "state" in self.arrays else "percept").astype(np.int32)
+        return (self._states if "state" in self.arrays else self.percepts).astype(np.int32)
 
     @property
     def draws_ahead(self) -> bool:
         """Whether ants draw their next action while they learn from the last one."""
         learner = self.learner
         return learner is not None and learner.draws_next_action
-
-    @property
-    def actions(self) -> np.ndarray:
-        """Last action of each ant, int8 (W, capacity), -1 before the first one; a view."""
-        return self._by_slot("action")
-
-    @property
-    def next_actions(self) -> np.ndarray:
-        """Actions that were drawn ahead of the next tick, int8 (W, capacity), else -1; a view."""
-        return self._by_slot("next_action")
-
-    @property
-    def events(self) -> np.ndarray:
-        """`Event` of the last action of each ant, int8 (W, capacity); a view."""
-        return self._by_slot("event")
-
-    @property
-    def streams(self) -> np.ndarray:
-        """State of the random stream of each ant, uint64 (W, capacity); a writable view."""
-        return self._by_slot("streams")
 
     @property
     def occupied(self) -> np.ndarray:
@@ -265,14 +261,10 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), see `check_finite`."""
         self.check_finite()
-        counts = {
-            row.name.lower(): self.arrays["worlds"][row][None].copy()
-            for row in WorldRow
-            if row >= WorldRow.TICKS
-        }
-        for rounds, row in zip(self.rounds, _LARGE, strict=True):
-            counts[row.name.lower()] = counts[row.name.lower()] + rounds * _ROUND
-        return ColonyEpisodes(returns=self.arrays["returns"][None].copy(), **counts)
+        totals, worlds = self.arrays["totals"], self.arrays["worlds"]
+        counts = {row.name: totals[row] for row in TOTALS}
+        counts |= {row.name: worlds[row] for row in WorldRow if row >= WorldRow.TICKS}
+        return ColonyEpisodes(**{name.lower(): one[None].copy() for name, one in counts.items()})
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return world number `world` as it is now; arrays are copies."""
@@ -338,7 +330,6 @@ class ColonyState:
     def begin(self, which: Which = ALL) -> None:
         """Set these worlds to the start of an episode; tables, memories and streams stay."""
         self.delivered[which] += self.deliveries[which]
-        self.rounds[:, which] = 0
         self.set_learning_rate(self.learning_rate)
         self._set_to_start(self.arrays, which)
         self._copy_worlds(self.arrays, {"streams": self.arrays["first_streams"]}, which)
@@ -361,18 +352,10 @@ class ColonyState:
         """Keep the streams of the ants that started an episode of these worlds, at its end."""
         ours = np.zeros((len(self.seeds), 1), bool)
         ours[which] = True
-        there = (self._by_slot("stage") != Stage.VACANT) & ours
+        there = (self._stages != Stage.VACANT) & ours
         worlds, slots = np.nonzero(there & (self.numbers >= 0) & (self.numbers < self.ants))
-        first_streams = self._by_slot("first_streams")
+        first_streams = self.arrays["first_streams"].reshape(self.numbers.shape)
         first_streams[worlds, self.numbers[worlds, slots]] = self.streams[worlds, slots]
-
-    def carry_counters(self) -> None:
-        """Move what the largest counters hold into `rounds` before they overflow."""
-        for rounds, row in zip(self.rounds, _LARGE, strict=True):
-            counter = self.arrays["worlds"][row]
-            if counter.max() >= _ROUND:
-                more, counter[:] = np.divmod(counter, _ROUND)
-                rounds += more
 
     def set_learning_rate(self, learning_rate: float) -> None:
         """Set the learning rate and the weights that follow from it."""
@@ -433,8 +416,8 @@ class ColonyState:
             # Integer trails: the clock at which a cell's trail has evaporated; dense: the levels.
             "level" if self.pheromone.dense else "trail": levels.reshape(-1),
             "worlds": rows,
-            # Rewards of all ants in this episode.
-            "returns": np.zeros(len(worlds), np.int64),
+            # Sums over all ants in this episode, see `Tally`.
+            "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, self.n_food_sources, self.grid.size),
         }
 
@@ -585,7 +568,6 @@ class ColonyState:
             "worlds": [world.as_dict() for world in numbers],
             "world_of": [numbers[world] for world in self.worlds],
             "one_a_slot": self.one_a_slot,
-            "rounds": self.rounds.tolist(),
             # Interventions can make more than there are at the start.
             "food_sources": self.n_food_sources,
             **{name: getattr(self, name) for name in (*_OPTIONS, *_PROGRESS)},
@@ -626,16 +608,11 @@ class ColonyState:
                 # Tables of the right shape, until its own are put in.
                 leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
                 options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
-            make: Any = cls  # `Colony`, whose arguments these are
-            colony = make([worlds[w] for w in facts["world_of"]], task, training, **options)
+            colony = cls([worlds[w] for w in facts["world_of"]], task, training, **options)
             colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
             colony.set_learning_rate(checks.checked_share("learning_rate", facts["learning_rate"]))
             colony.length = checked_whole("length", facts["length"], least=0)
             colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
-            rounds = np.array(facts["rounds"], np.int64)
-            if rounds.shape != colony.rounds.shape or rounds.min() < 0:
-                raise ValueError("rounds has another shape, or is below 0")
-            colony.rounds = rounds
             if facts["food_sources"] != colony.n_food_sources:
                 colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:
@@ -656,3 +633,15 @@ class ColonyState:
         )
 
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
+
+
+def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:
+    """A world for each seed, all of the same ranges."""
+    given = entries_of(world) or [world] * n_seeds
+    worlds = tuple(checks.checked_world(one, learns) for one in given)
+    if len(worlds) != n_seeds:
+        raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds.")
+    ranges = {world.ranges for world in worlds}
+    if len(ranges) > 1:
+        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+    return worlds

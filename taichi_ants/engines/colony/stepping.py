@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,25 +14,11 @@ from taichi_ants import runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
 
-# Slots from which threads share the ants of a world: of a single one, and of each of many.
-_LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
-_CHUNKS_PER_THREAD = 2
 # Ants are sorted once they have taken so many steps together, but not too seldom nor too often.
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
 _PIECE_SECONDS = 0.4
 _SPINS = 2**26  # of a thread at a barrier: half a second or more
 _LAUNCHES_BETWEEN_PROBES = 8  # and a probe has so many times fewer ticks
-
-
-def usual_schedule(n_worlds: int, capacity: int) -> str:
-    """Return the faster schedule for so many worlds of so many slots."""
-    large = capacity >= (_LARGE_ALONE if n_worlds == 1 else _LARGE_COLONY)
-    return "by_chunk" if large else "by_world"
-
-
-def chunks_of(schedule: str, threads: int) -> int:
-    """Return into how many chunks the ants of a world are divided."""
-    return _CHUNKS_PER_THREAD * threads if schedule == "by_chunk" else 1
 
 
 class ThreadChoice:
@@ -85,26 +72,19 @@ class Stepper:
         end = state.ticks + n
         if state.schedule == "by_world":
             self._launch_ticks(state, n, parts=len(state.seeds))
+        usual = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
+        interval = max(_FEWEST_TICKS, min(_MOST_TICKS, usual))
         while state.ticks < end:
-            self._share_ticks(state, min(end - state.ticks, self._sort_at_times(state)))
-        state.carry_counters()
+            if state.ticks % interval == 0:
+                state.sort_ants()
+            self._share_ticks(state, min(end - state.ticks, interval - state.ticks % interval))
 
     def launch(self, state: ColonyState, name: str) -> None:
         """Do the phases of this name of `kernels`, or its `ticks`."""
         runtime.start()  # the caller may have reset Taichi, or forked
-        values = {**kernel_numbers(state), **state.arrays}
         if name not in self._launches:
-            self._launches[name] = self._prepared(state, name, values)
-        self._launches[name](values)
-
-    @staticmethod
-    def _sort_at_times(state: ColonyState) -> int:
-        """Sort the ants if it is time; return the number of ticks until it is again."""
-        ticks = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
-        ticks = max(_FEWEST_TICKS, min(_MOST_TICKS, ticks))
-        if state.ticks % ticks == 0:
-            state.sort_ants()
-        return ticks - state.ticks % ticks
+            self._launches[name] = self._prepared(state, name)
+        self._launches[name]({**kernel_numbers(state), **state.arrays})
 
     def _share_ticks(self, state: ColonyState, n: int) -> None:
         """Let up to n ticks pass, each shared by all threads."""
@@ -134,26 +114,20 @@ class Stepper:
         state.ticks += n
 
     @staticmethod
-    def _prepared(state: ColonyState, name: str, values: dict[str, Any]) -> Any:
+    def _prepared(state: ColonyState, name: str) -> Any:
         """Return a kernel that can be launched again and again."""
-        from taichi_ants.engines.arguments import Arguments, Launch
+        from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.colony import kernels
 
+        task, pheromone = state.task, state.pheromone
         variant = kernels.variant(
-            state.learner,
-            state.one_a_slot,
-            state.is_given_actions,
-            state.task.sees,
-            state.pheromone.dense,
-            state.pheromone.view,
-            state.task.traffic,
-            state.ants_change,
-            state.food_changes,
+            *(state.learner, state.one_a_slot, state.is_given_actions, task.sees),
+            *(pheromone.dense, pheromone.view, task.traffic),
+            *(state.ants_change, state.food_changes),
         )
-        kind = Arguments.type_of(values)
         if name == "ticks":
-            return Launch(kernels.ticks(variant, state.schedule == "by_chunk", kind))
-        return Launch(kernels.loops(variant, getattr(kernels, name), kind))
+            return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))
+        return Launch(partial(kernels.loops, variant, getattr(kernels, name)))
 
 
 def _has_barrier(running: runtime.Runtime) -> bool:
@@ -162,8 +136,8 @@ def _has_barrier(running: runtime.Runtime) -> bool:
 
 
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
-    """Return what kernels know besides arrays; -1 stands for an option that is off."""
-    life, memory, off = state.task.life, state.memory, -1
+    """Return the numbers that kernels read besides arrays."""
+    memory = state.memory
     return {
         "n_worlds": len(state.seeds),
         "n_ants": state.ants,  # that start an episode
@@ -173,13 +147,8 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "size": state.grid.size,
         "length": state.length,
         **state.pheromone.numbers,
-        "turns_at_queen": int(state.task.turns_at_queen),
-        "births": int(life.births),
-        "lifespan": life.lifespan or off,
-        "regrowth": off if life.regrowth is None else life.regrowth,
-        "wander": life.wander or off,
+        **state.task.numbers,
         "ends_at_delivery": int(state.ends_at_delivery),
-        "delivery_terminates": int(state.task.delivery != "truncates"),
         "initial_q": state.training.initial_q,
         "discount": state.training.discount,
         "epsilon": state.epsilon,

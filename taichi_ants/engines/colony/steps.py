@@ -116,7 +116,8 @@ def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
         place = here + step_around(c.compass, heading, cells[k])
         standable = (looks_of(c.ground[place]) == EMPTY) | (c.ground[place] >= ANT_GROUND)
         view.levels[k] = ti.select(standable, level_of(c, v, place, clock), 0)
-        view.ants[k] = ant_on(c.ground[place])
+        # 0 if no ant stands there, 1 if one without food does, 2 if one with food does.
+        view.ants[k] = (ti.cast(c.ground[place] >> 4, ti.i32) + 1) >> 3
         view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
         view.codes[k] = looks_of(c.ground[place])
     view.strongest = strongest_of(
@@ -133,18 +134,6 @@ def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
 def looks_of(ground):
     """How a cell looks, without the mark of the ant on it: u8 -> i32."""
     return ti.cast(ground & 15, ti.i32)
-
-
-@ti.func
-def ant_on(ground):
-    """0 if no ant stands on a cell, 1 if one without food does, 2 if one with food does."""
-    return (ti.cast(ground >> 4, ti.i32) + 1) >> 3
-
-
-@ti.func
-def ground_under(carries):
-    """What the cell of an ant holds when nobody wants anything."""
-    return ti.cast(OBSTACLE | (ANT_STANDS << 4) + (carries << 7), ti.u8)
 
 
 @ti.func
@@ -282,7 +271,10 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         deposit(c, v, base + wanted, clock, 0)
         deposit(c, v, base + cell, clock, 0)
         put(c.heading, ant, turn_round(heading))
-    c.ground[base + goes] = ground_under(carries) if ti.static(v.sees_ants) else ANT_GROUND
+    ground = ANT_GROUND
+    if ti.static(v.sees_ants):
+        ground = OBSTACLE | (ANT_STANDS << 4) + (carries << 7)
+    c.ground[base + goes] = ti.cast(ground, ti.u8)
     c.cell[ant] = goes
     put(c.event, ant, event)
     tally(c, Tally.MOVES, chunk, ti.cast(moves, ti.i32))

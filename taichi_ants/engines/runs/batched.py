@@ -1,16 +1,15 @@
-"""Many single ants, each in a world of its own, that do one step at a time; actions come from
-outside."""
+"""Many single ants, each in a world of its own, that do one step at a time by given actions."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.layout import Command
-from taichi_ants.engines.packing import unpack_cells
+from taichi_ants.engines.layout import Command, unpack_cells
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
@@ -49,17 +48,14 @@ class BatchedEnvironments:
         self, worlds: Sequence[World], task: Task, n: int, max_steps: int, ends: str, falls: bool
     ) -> None:
         self.worlds, self.task, self.n = tuple(worlds), task, n
-        self.arrays = self._laid_out(max_steps, ends, falls)
         self._launch: Any = None
-
-    def _laid_out(self, max_steps: int, ends: str, falls: bool) -> dict[str, Any]:
-        common = laid_out(self.worlds, self.task, falls)
-        size, n = common["size"], self.n
+        common = laid_out(self.worlds, task, falls)
+        size = common["size"]
         number = np.arange(n, dtype=np.int32) % len(self.worlds)
         own = np.empty((n, size + 2), np.int32)
         own[:, :size] = common["world"].reshape(-1, size)[number]
         own[:, size:] = size, -1  # nothing has changed, see `step.restore`
-        return {
+        self.arrays: dict[str, Any] = {
             **common,
             "n": n,
             "per_chunk": _PER_CHUNK,
@@ -97,7 +93,7 @@ class BatchedEnvironments:
         self._go(begins, same_step)
 
     def snapshot(self, number: int) -> Snapshot:
-        """The world of an ant as it is now; arrays are copies."""
+        """Return the world of an ant as it is now; arrays are copies."""
         arrays, grid = self.arrays, self.worlds[0].grid
         own = self.arrays["shared_cells"] + number * (grid.size + 2)
         ground, levels = unpack_cells(arrays["cells"][own : own + grid.size])
@@ -112,18 +108,14 @@ class BatchedEnvironments:
         self.arrays["same_step"] = int(same_step)
         with runtime.alone:
             if self._launch is None:
-                self._launch = self._compiled()
+                runtime.start()  # Taichi is imported once it is configured
+                from taichi_ants.engines.arguments import Launch
+                from taichi_ants.engines.runs.kernels import step_kernel
+
+                half, serial = self.task.pheromone.view == "half", self.n <= _PER_CHUNK
+                rules = self.task.sees, self.arrays["deposits"], half, serial
+                self._launch = Launch(partial(step_kernel, *rules))
             self._launch(self.arrays)
-
-    def _compiled(self) -> Any:
-        runtime.start()  # Taichi is imported once it is configured
-        from taichi_ants.engines.arguments import Arguments, Launch
-        from taichi_ants.engines.runs.batched_kernel import step_kernel
-
-        pheromone, kind = self.task.pheromone, Arguments.type_of(self.arrays)
-        deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
-        serial = self.n <= _PER_CHUNK
-        return Launch(step_kernel(self.task.sees, deposits, half, serial, kind))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but what Taichi holds, which is made anew; so copies and pickles go on alike."""

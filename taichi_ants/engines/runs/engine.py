@@ -9,19 +9,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from taichi_ants import learners, runtime
-from taichi_ants.engines.layout import EPSILON_DECAY, N_SETTINGS, OUTCOMES, SETTINGS
-from taichi_ants.engines.packing import compass_of, pack_cells
+from taichi_ants.engines.layout import (
+    EPSILON_DECAY,
+    N_SETTINGS,
+    OUTCOMES,
+    SETTINGS,
+    compass_of,
+    pack_cells,
+)
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Learner
-from taichi_ants.task import Pheromone, Task
+from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -33,26 +40,13 @@ _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # of one array in a launch, which kernels index by 32 bits
 _PARALLEL_RUNS_ON_GPU = 4096
 
-# The arguments of the kernel, n runs of one learner with tables of n_states rows. Arrays of runs
-# are flat, one run behind the other. Each has so many tables, and so many times 8 floats and
-# integers, see `packing.padded`.
+# The arguments of the kernel besides those of world and task: of n runs of one learner with tables
+# of n_states rows. Arrays of runs are flat, one run behind the other. Each has so many tables, and
+# so many times 8 floats and integers, see `layout.padded`.
 _NO_WORK: dict[str, Any] = {
     "n_runs": 0,
     "n_episodes": 0,
-    "max_steps": 0,
-    "size": 0,  # cells of the world
-    # The task.
-    **Pheromone().numbers,
-    "turns_at_queen": 0,
     "regrows": 0,  # 1 if food grows back at once; not while an episode ends at a delivery
-    "delivery_terminates": 0,  # 1 if a delivery is a terminal state
-    "rewards": np.zeros(1, np.int32),  # (8,) by `Event`
-    # The world.
-    "world": np.zeros(1, np.int32),  # (size,) packed cells at the start of an episode
-    "trails": np.zeros(1, np.int32),  # (size,) trails at the start, under food too
-    "closer": np.zeros(1, np.uint8),  # (size,) a bit for each heading that leads nearer the queen
-    "compass": np.zeros(1, np.int32),  # see `rules.actions`
-    # The runs.
     "start_cells": np.zeros(1, np.int32),  # (n,)
     "start_headings": np.zeros(1, np.int32),  # (n,)
     "settings": np.zeros(1, np.float64),  # `layout.SETTINGS`, then the hyperparameters
@@ -68,7 +62,6 @@ _NO_WORK: dict[str, Any] = {
     "integers": np.zeros(1, np.int32),
     "cells": np.zeros(1, np.int32),  # the packed cells of each run, see `step`
     "keeps_tables": 0,  # 1 to write the table after each step
-    # What comes out.
     "outcomes": np.zeros((1, 1, 1), np.int32),  # (3, n, n_episodes): `layout.OUTCOMES`
     "trace": np.zeros((1, 1), np.int32),  # (n * n_episodes * max_steps, columns): `layout.TRACE`
     "trace_chances": np.zeros(1, np.float64),  # the probability with which the action was chosen
@@ -135,12 +128,14 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
     return {
         "size": grid.size,
         **(task.pheromone if falls else task.pheromone.lasting).numbers,
-        "turns_at_queen": int(task.turns_at_queen),
+        **task.numbers,
         "rewards": task.rewards.by_event(),
+        # Of the cells of each world: packed at the start of an episode; trails then, under food
+        # too; a bit for each heading that leads nearer to the queen.
         "world": np.concatenate([pack_cells(world) for world in worlds]),
         "trails": np.concatenate([world.trail_levels() for world in worlds]),
         "closer": np.concatenate([world.closer() for world in worlds]),
-        "compass": compass_of(grid),
+        "compass": compass_of(grid),  # see `rules.actions`
     }
 
 
@@ -151,23 +146,19 @@ class Launcher:
         self, world: World, task: Task, max_steps: int, runs: Runs, traced: bool = False
     ) -> None:
         # Taichi is imported once it is configured, see `runtime`.
-        from taichi_ants.engines.arguments import Arguments, compile_once
+        from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.runs.kernels import run_kernel
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
-        self._runs, self._arguments = runs, Arguments()
+        self._runs = runs
         self._cells, self._headings = world.first_starts(words_of(runs.seeds))
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
-        self._kernel = run_kernel(
-            *(runs.learner, task.sees, deposits, half, traced), self._arguments.type_of(_NO_WORK)
-        )
-        compile_once(self._kernel, lambda: Arguments().pack(_NO_WORK))
+        self._launch = Launch(partial(run_kernel, runs.learner, task.sees, deposits, half, traced))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
-        self._values = _NO_WORK | laid_out([world], task, falls)
-        terminates = int(task.delivery != "truncates")
-        self._values |= {"max_steps": max_steps, "delivery_terminates": terminates}
+        self._values = {**_NO_WORK, **laid_out([world], task, falls), "max_steps": max_steps}
+        self._launch(self._values)  # which compiles it
 
     def launch(self, some: slice, episodes: slice, **arrays: Any) -> None:
         """Do some episodes of some runs; what comes out is written into the arrays."""
@@ -190,7 +181,7 @@ class Launcher:
             values["streams"] = np.ascontiguousarray(runs.streams[some, episodes]).reshape(-1)
         # An array of length 0 cannot be an argument; the single 0 stays.
         self._values.update({name: one for name, one in values.items() if getattr(one, "size", 1)})
-        self._kernel(self._arguments.pack(self._values))
+        self._launch(self._values)
 
 
 def do_episodes(
@@ -216,15 +207,12 @@ def do_episodes(
     widest = max(array[0].size for array in vars(runs.state).values())
     size = size_of_launch(workers, episodes, max_steps, runs.cost, launcher.cells_of_a_run, widest)
     seconds = 0.0
-    for some, part in pieces(len(runs), episodes, *size):
+    for some, part in pieces(len(runs), episodes, *size, progress):
         block = np.empty((len(OUTCOMES), some.stop - some.start, part.stop - part.start), np.int32)
         began = clock()
         launcher.launch(some, part, outcomes=block)
         seconds += clock() - began
         outcomes[:, some, part] = block
-        if progress is not None:
-            done = some.start + (some.stop - some.start) * part.stop / episodes
-            progress(done / len(runs))
     return seconds
 
 
@@ -246,12 +234,17 @@ def size_of_launch(
 
 
 def pieces(
-    n_runs: int, n_episodes: int, runs_each: int, episodes_each: int
+    n_runs: int,
+    n_episodes: int,
+    runs_each: int,
+    episodes_each: int,
+    progress: Progress | None = None,
 ) -> Iterator[tuple[slice, slice]]:
-    """The runs and the episodes of all launches, the episodes of a run in order."""
+    """Yield the runs and the episodes of all launches, the episodes of a run in order."""
     for first in range(0, n_runs, runs_each):
+        end = min(first + runs_each, n_runs)
         for begin in range(0, n_episodes, episodes_each):
-            yield (
-                slice(first, min(first + runs_each, n_runs)),
-                slice(begin, min(begin + episodes_each, n_episodes)),
-            )
+            stop = min(begin + episodes_each, n_episodes)
+            yield slice(first, end), slice(begin, stop)
+            if progress is not None:
+                progress((first + (end - first) * stop / n_episodes) / n_runs)

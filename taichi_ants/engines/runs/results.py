@@ -10,8 +10,7 @@ import numpy as np
 
 from taichi_ants import learners
 from taichi_ants.checks import checked_max_steps, checked_seeds
-from taichi_ants.engines.layout import OUTCOMES
-from taichi_ants.engines.packing import padded
+from taichi_ants.engines.layout import OUTCOMES, padded
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_array, shown
 from taichi_ants.files import PathLike

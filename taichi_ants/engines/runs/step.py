@@ -7,7 +7,7 @@ from typing import Any
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.views import encode_function, is_percept, judge, view_type
+from taichi_ants.engines.views import encode_function, judge, view_type
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import FORWARD, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.events import Event
@@ -54,7 +54,7 @@ def lay(kind: ti.template(), a: ti.template(), base, cell, clock, expiry, carrie
 
 @ti.func
 def ground_of(packed):
-    """What a packed cell holds, see `engines.packing`."""
+    """What a packed cell holds, see `engines.layout`."""
     return (packed >> 31) & packed & 15
 
 
@@ -89,7 +89,7 @@ def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
 @cache
 def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
     """A `ti.func` (a, base, ant, clock, percept) -> the index of the ant's state."""
-    if is_percept(observation):
+    if observation.name == "paper":  # no view is needed
         return _percept_itself
     in_view = observation.cells
     left, forward, right = observation.ahead

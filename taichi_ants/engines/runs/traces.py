@@ -200,25 +200,20 @@ def record_steps(
     episodes: int,
     progress: Progress | None = None,
 ) -> Iterator[tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]]:
-    """The steps of the next episodes of many runs, in pieces; the state of the runs is moved on.
+    """Yield the steps of the next episodes of many runs, in pieces; move the state of the runs on.
 
-    Yields:
-        The columns of a trace, episodes numbered from 0 in each run; float64 (n,), the probability
-        with which the ant chose its action; and int64 (n,), the number of the run. Of a run, pieces
-        come in order.
+    A piece is the columns of a trace, episodes numbered from 0 in each run; the probability of each
+    action, float64 (n,); and the number of the run, int64 (n,). Pieces of a run come in order.
     """
     checks.check_progress(progress)
     runtime.start()
     launcher = Launcher(world, task, max_steps, runs, traced=True)
     runs_each = max(1, min(len(runs), MAX_ROLLOUT_STEPS // max_steps))
     episodes_each = max(1, MAX_ROLLOUT_STEPS // (runs_each * max_steps))
-    for some, part in pieces(len(runs), episodes, runs_each, episodes_each):
+    for some, part in pieces(len(runs), episodes, runs_each, episodes_each, progress):
         columns, _, chances, run = _launch(launcher, runs, some, part, max_steps)
         columns["episodes"] += part.start
         yield columns, chances, run + some.start
-        if progress is not None:
-            done = some.start + (some.stop - some.start) * part.stop / episodes
-            progress(done / len(runs))
 
 
 def _launch(

@@ -86,7 +86,15 @@ def continue_training(
     if not isinstance(result, TrainingResult):
         raise AntsError(f"result is {shown(result)}; give what train has returned.")
     checks.checked_configs(result.configs)
-    _check_memory(result)
+    state = result.state
+    given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
+    for config in result.configs:
+        needed = astuple(memory_for([config], result.task.n_states))
+        if not all(map(operator.ge, given, needed)):  # kernels would write outside of it
+            raise AntsError(
+                f"learner {config.learner!r} has come to need more memory than when this training "
+                "began; train anew."
+            )
     kept = replace(result, state=copy.deepcopy(result.state))
     return _train(kept, episodes, threads, arch, progress)
 
@@ -114,7 +122,10 @@ def _train(
         costs.append(learner.cost(learner.settings(result.configs[group[0]])) * len(group))
     done, seconds = 0.0, 0.0
     for group, cost in zip(groups.values(), costs, strict=True):
-        chosen, where = [result.configs[c] for c in group], _place(group)
+        chosen = [result.configs[c] for c in group]
+        # A slice copies nothing.
+        in_a_row = group[-1] + 1 - group[0] == len(group)
+        where = slice(group[0], group[-1] + 1) if in_a_row else group
         runs = Runs.learning(chosen, result.seeds, state.part(where))
         share = cost / sum(costs)
         part = progress and partial(_report, progress, done, share)
@@ -130,28 +141,9 @@ def _train(
     return replace(result, **joined, seconds=seconds)
 
 
-def _place(group: list[int]) -> slice | list[int]:
-    """Where configurations are: a slice, which copies nothing, if one follows the other."""
-    first, end = group[0], group[-1] + 1
-    return slice(first, end) if end - first == len(group) else group
-
-
 def _report(progress: Progress, done: float, share: float, part: float) -> None:
     """Report the progress of one part of the work as that of all."""
     progress(done + share * part)
-
-
-def _check_memory(result: TrainingResult) -> None:
-    """Refuse learners for whose memory there is no room; kernels would write outside of it."""
-    state = result.state
-    given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
-    for config in result.configs:
-        needed = astuple(memory_for([config], result.task.n_states))
-        if not all(map(operator.ge, given, needed)):
-            raise AntsError(
-                f"learner {config.learner!r} has come to need more memory than when this training "
-                "began; train anew."
-            )
 
 
 def evaluate(

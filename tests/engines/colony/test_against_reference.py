@@ -23,7 +23,6 @@ KERNELS = [
     ("sarsa", "shared", "ants_seen", True),
     ("expected_sarsa", "shared", "five_cells", False),
     ("dyna_q", "shared", "trail_levels", True),
-    ("q_learning", "independent", "ants_seen", False),
     ("dyna_q", "independent", "ants_seen", False),
     ("double_q", "independent", "paper", True),
     ("sarsa_lambda", "independent", "paper", False),
@@ -48,7 +47,7 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK = (0, 1, 8, 11, 12)
+QUICK = (0, 1, 7, 10, 11)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 MARKED = [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in KERNELS]
 

@@ -7,7 +7,7 @@ import pytest
 
 from taichi_ants import Colony, TrainingConfig, World
 from taichi_ants.grid.randomness import GAMMA, mix
-from taichi_ants.task import Life, Task
+from taichi_ants.task import Life, Pheromone, Task
 from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
@@ -132,6 +132,20 @@ def test_food_that_is_taken_grows_back_at_once():
     colony = act(world, [PICK_UP], Life(regrowth=0))
     assert colony.snapshot().ground[world.grid.index((3, 2, 0))] == FOOD
     assert colony.outcome().regrown[0, 0] == 1
+
+
+def test_a_steep_deposit_after_long_carrying_leaves_nothing():
+    """Slope times ticks does not fit into 32 bits."""
+    world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0)])
+    task = Task(pheromone=Pheromone(deposit="fading", level=250, slope=100))
+    colony = Colony(world, task, None, ants=1, sharing="frozen")
+    colony.begin_episode()
+    colony.arrays["carries"][:] = 1
+    colony.arrays["carried"][:] = 30_000_000
+    colony.arrays["percept"][:] = 64  # with food, and three empty cells ahead
+    colony.act(np.array([[FORWARD]]))
+    assert ants(colony)[0][0] == (3, 2, 0)
+    assert not colony.snapshot().trail.any()
 
 
 def normal(cell: tuple[int, int, int]) -> list[int]:

@@ -68,7 +68,7 @@ def test_diffusion_keeps_the_mass(rate):
     assert levels_after(pheromone, 300).sum(dtype=np.float64) == pytest.approx(400, rel=1e-4)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     seed=st.integers(0, 10_000),
     ants=st.integers(1, 25),

@@ -9,8 +9,6 @@ import pytest
 from random_colonies import random_colony
 
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
-from taichi_ants.engines.colony import state as colony_state
-from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.files import archives
 from taichi_ants.task import Life, Task
 
@@ -134,25 +132,24 @@ def reread(colony: Colony, folder) -> Colony:
     return Colony.load(folder / "x.npz")
 
 
-def test_moves_are_counted_beyond_32_bits(tmp_path, monkeypatch) -> None:
-    """As kernels count them: with counters that begin anew, here after 50 instead of 2**30."""
+def test_moves_are_counted_beyond_32_bits(tmp_path) -> None:
+    """10 000 ants fill 32 bits in 200 000 ticks."""
     config = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)
-    plain, rounded = (Colony(worlds.paper(), None, config, (0, 1), 20) for _ in range(2))
+    plain, long = (Colony(worlds.paper(), None, config, (0, 1), 20) for _ in range(2))
     plain.begin_episode()
     plain.tick(40)
-    monkeypatch.setattr(colony_state, "_ROUND", 50)
-    rounded.begin_episode()
-    rounded.tick(25)
-    rounded.save(tmp_path / "a.npz")
-    rounded = Colony.load(tmp_path / "a.npz")
-    rounded.tick(15)
-    assert rounded.arrays["worlds"][[WorldRow.MOVES, WorldRow.BLOCKED]].max() < 50
-    now, expected = rounded.outcome(), plain.outcome()
-    assert now.moves.dtype == np.int64
-    assert (now.moves == expected.moves).all()
-    assert (now.blocked == expected.blocked).all()
+    long.begin_episode()
+    long.tick(25)
+    before = 2**31 - 100
+    long.arrays["totals"] += before
+    long.save(tmp_path / "a.npz")
+    long = Colony.load(tmp_path / "a.npz")
+    long.tick(15)
+    now, expected = long.outcome(), plain.outcome()
+    assert (now.moves == expected.moves + before).all()
+    assert (now.blocked == expected.blocked + before).all()
     assert expected.moves.min() > 100
-    rounded.begin_some(np.array([True, False]))
-    assert rounded.outcome().moves.tolist() == [[0, expected.moves[0, 1]]]
-    rounded.begin_episode()
-    assert rounded.outcome().moves.tolist() == [[0, 0]]
+    long.begin_some(np.array([True, False]))
+    assert long.outcome().moves.tolist() == [[0, expected.moves[0, 1] + before]]
+    long.begin_episode()
+    assert long.outcome().moves.tolist() == [[0, 0]]

@@ -15,7 +15,7 @@ from random_colonies import random_colony
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
-from taichi_ants.engines.colony import stepping
+from taichi_ants.engines.colony import layout
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Life
@@ -58,7 +58,7 @@ def assert_same(one: Colony, other: Colony) -> None:
 )
 def test_threads_and_schedules_give_the_same(task, monkeypatch):
     """Many chunks; without births ants would be sorted, if nobody gave their actions by slot."""
-    monkeypatch.setattr(stepping, "_CHUNKS_PER_THREAD", 8)
+    monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
     expected = pass_ticks(begun(threads=1, task=task))
     assert expected.arrays["worlds"][WorldRow.TICKS].tolist() == [40, 32, 28]
     assert expected.arrays["episodes"].tolist() == [0, 1, 0]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import pytest
 from random_worlds import random_world
 
 from taichi_ants import Task, TrainingConfig, rollout, trace_training, train
@@ -106,23 +105,21 @@ def test_there_are_a_hundred():
     assert len(CARRYING) == 36
 
 
-@pytest.mark.parametrize("heading", range(6))
-def test_micro_worlds_reach_every_state(heading):
-    for state in REACHABLE_STATES:
-        places = queens(state, heading)
-        assert places, f"no world shows {state_name(state)}"
-        for queen in {places[0], places[len(places) // 2], places[-1]}:
-            world = micro_world(state, heading, queen)
-            assert seen(world, state >= 64) == state, (state_name(state), queen)
+def test_micro_worlds_reach_every_state():
+    for number, state in enumerate(REACHABLE_STATES):
+        for heading in range(6):
+            places = queens(state, heading)
+            assert places, f"no world shows {state_name(state)}"
+            world = micro_world(state, heading, places[(7 * number + heading) % len(places)])
+            assert seen(world, state >= 64) == state, state_name(state)
 
 
-@pytest.mark.parametrize("heading", range(6))
-def test_no_micro_world_shows_another_carrying_state(heading):
+def test_no_micro_world_shows_another_carrying_state():
     """The same construction finds no place for the queen in the 28 others."""
     others = set(range(64, N_STATES)) - set(CARRYING)
     assert len(others) == 28
     for state in others:
-        assert not queens(state, heading), state_name(state)
+        assert not any(queens(state, heading) for heading in range(6)), state_name(state)
 
 
 def test_obstacles_of_all_kinds():
@@ -140,7 +137,7 @@ def test_obstacles_of_all_kinds():
 def test_random_worlds_show_no_other_state():
     """Random walks and learning ants, in all kinds of worlds."""
     met: set[int] = set()
-    for number in range(120):
+    for number in range(60):
         config = TrainingConfig("sarsa", 0.5, 0.9, 1.0 if number % 2 else 0.3, 1.0)
         world = random_world(number + 3000, 6)
         task = Task(evaporation_in_training=number % 3 == 0)
@@ -159,7 +156,7 @@ def test_training_touches_no_other_row():
     ]
     others = sorted(set(range(N_STATES)) - set(REACHABLE_STATES))
     touched = np.zeros(N_STATES, bool)
-    for number in range(40):
+    for number in range(16):
         world = random_world(number + 5000, 8)
         task = Task(evaporation_in_training=number % 2 == 0)
         result = train(world, configs, range(6), 15, 80, task)

@@ -1,0 +1,269 @@
+"""The twins of the package's learners.
+
+All numbers are np.float32, with one rounding per operation; the order of the operations is part of
+the rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from taichi_ants.errors import AntsError
+from taichi_ants.reference.ants import Pair, Transition
+from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.task.constants import N_ACTIONS
+
+if TYPE_CHECKING:
+    from taichi_ants.learners.config import TrainingConfig
+
+
+class Learner:
+    """A learner, its table of action values, and the memory of its kind.
+
+    A simple learner has its own `next_value`; one with a memory overrides `learn`, and `begin_run`
+    or `begin`.
+
+    Attributes:
+        draws_next_action: Whether a' is drawn before the update, and executed (as SARSA does).
+        shares: Whether all ants of a world can learn into one table: the update is `error` alone.
+        hyperparameters: Those that only this learner has, with their defaults.
+        rows: The table, n_states lists of 5 np.float32, several times faster here than an array.
+        model: The last transition of each visited pair, in the order of first visit; of learners
+            that plan.
+    """
+
+    draws_next_action = False
+    shares = True
+    hyperparameters: ClassVar[Mapping[str, float]] = {}
+
+    def __init__(
+        self, config: TrainingConfig, n_states: int, q_values: np.ndarray | None = None
+    ) -> None:
+        """Begin with a copy of a table (n_states, 5) or with `initial_q`; without memories."""
+        self.name = config.learner
+        given = dict(config.hyperparameters)
+        for name in given.keys() - self.hyperparameters.keys():
+            raise AntsError(f"{name!r} is no hyperparameter of the learner {self.name!r}.")
+        self.settings = {**self.hyperparameters, **given}
+        self.learning_rate = np.float32(config.learning_rate)
+        self.discount = np.float32(config.discount)
+        if q_values is None:
+            q_values = np.full((n_states, N_ACTIONS), config.initial_q)
+        self.rows = [list(row) for row in np.asarray(q_values, np.float32)]
+        self.model: dict[Pair, Transition] = {}
+        self.begin_run()
+        self.begin()
+
+    def table(self) -> np.ndarray:
+        """Return a copy of the table, float32 (n_states, 5)."""
+        return np.array(self.rows, np.float32)
+
+    def begin_run(self) -> None:
+        """Make the memory that lives through all episodes."""
+
+    def begin(self) -> None:
+        """Make the memory of an episode, at its start."""
+
+    def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
+        """Learn from a transition, with draws of the ant's stream; return its TD error."""
+        error = self.error(step, epsilon)
+        self.update(step.pair, self.learning_rate, error)
+        return error
+
+    def error(self, step: Transition, epsilon: float) -> np.float32:
+        """Return the TD error of a transition by the present table."""
+        next_value = self.next_value(step, np.float32(epsilon))
+        target = np.float32(step.reward) + self.discount_of(step) * next_value
+        return target - self.rows[step.state][step.action]
+
+    def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
+        """Return the value of the next state by the present table."""
+        raise NotImplementedError
+
+    def discount_of(self, step: Transition) -> np.float32:
+        """Return the discount of what comes after a step: 0 where it terminated."""
+        return np.float32(0) if step.terminated else self.discount
+
+    def update(self, pair: Pair, weight: np.float32, error: np.float32) -> None:
+        """Add weight * error to the value of a pair."""
+        state, action = pair
+        self.rows[state][action] = self.rows[state][action] + weight * error
+
+
+class QLearning(Learner):
+    """Q-learning (Watkins 1989): the next state is worth its best action's value."""
+
+    def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
+        return max(self.rows[step.next_state])
+
+
+class Sarsa(Learner):
+    """SARSA (Rummery and Niranjan 1994): the next state is worth the value of the action there."""
+
+    draws_next_action = True
+
+    def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
+        return self.rows[step.next_state][step.next_action or 0]  # none where it terminated
+
+
+class ExpectedSarsa(Learner):
+    """Expected SARSA (van Seijen et al. 2009): the next state is worth the policy's expectation."""
+
+    def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
+        q0, q1, q2, q3, q4 = self.rows[step.next_state]
+        best = max(q0, q1, q2, q3, q4)
+        mean = ((((q0 + q1) + q2) + q3) + q4) * np.float32(0.2)
+        return best + epsilon * (mean - best)
+
+
+class DynaQ(QLearning):
+    """Dyna-Q (Sutton 1990): Q-learning, and `planning_steps` updates from pairs of the model."""
+
+    hyperparameters: ClassVar = {"planning_steps": 5}
+
+    def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
+        error = super().learn(step, epsilon, stream)
+        self.remember(step)
+        for _ in range(int(self.settings["planning_steps"])):
+            seen = self.draw_seen(stream)
+            self.update(seen.pair, self.learning_rate, self.error(seen, epsilon))
+        return error
+
+    def remember(self, step: Transition) -> None:
+        """Store a transition; it replaces the one of this pair that was seen before."""
+        self.model[step.pair] = step
+
+    def draw_seen(self, stream: RandomStream) -> Transition:
+        """Draw one of the transitions of the model."""
+        high, _ = stream.draw()
+        return list(self.model.values())[pick(high, len(self.model))]
+
+
+class DoubleQ(Learner):
+    """Double Q-learning (van Hasselt 2010): one table chooses the best action, the other values it.
+
+    The ants act by the mean of the two.
+    """
+
+    shares = False
+
+    def begin_run(self) -> None:
+        self._tables = [[list(row) for row in self.rows] for _ in "AB"]
+
+    def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
+        high, _ = stream.draw()
+        chosen = pick(high, 2)
+        updated, other = self._tables[chosen], self._tables[1 - chosen]
+        next_values = updated[step.next_state]
+        best = next_values.index(max(next_values))
+        next_value = other[step.next_state][best]
+        target = np.float32(step.reward) + self.discount_of(step) * next_value
+        state, action = step.pair
+        error = target - updated[state][action]
+        updated[state][action] = updated[state][action] + self.learning_rate * error
+        a, b = self._tables
+        self.rows[state][action] = (a[state][action] + b[state][action]) * np.float32(0.5)
+        return error
+
+
+class SarsaLambda(Sarsa):
+    """SARSA(lambda) with replacing traces (Singh and Sutton 1996), of which a short list is kept.
+
+    Hence it updates the last pairs of the episode too.
+    """
+
+    shares = False
+    hyperparameters: ClassVar = {"trace_decay": 0.9, "trace_length": 32}
+
+    def begin(self) -> None:
+        self._traces: list[tuple[Pair, np.float32]] = []  # newest first
+
+    def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
+        error = self.error(step, epsilon)
+        fade = self.discount * np.float32(self.settings["trace_decay"])
+        older = [(pair, trace * fade) for pair, trace in self._traces if pair != step.pair]
+        length = int(self.settings["trace_length"])
+        self._traces = [(step.pair, np.float32(1)), *older][:length]
+        scaled = self.learning_rate * error
+        for pair, trace in self._traces:
+            self.update(pair, scaled, trace)
+        return error
+
+
+class NStepSarsa(Sarsa):
+    """n-step SARSA (Sutton and Barto, chapter 7): targets of n rewards, and a value after them.
+
+    A pair is updated n steps later, or at the end of the episode.
+    """
+
+    shares = False
+    hyperparameters: ClassVar = {"n_steps": 4}
+
+    def begin(self) -> None:
+        self._waiting: list[Transition] = []  # for their update, oldest first
+
+    def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
+        # The error returned is that of one-step SARSA, before the update.
+        error = self.error(step, epsilon)
+        self._waiting.append(step)
+        ends = step.terminated or step.truncated
+        while self._waiting and (ends or len(self._waiting) == self.settings["n_steps"]):
+            value = self.next_value(self._waiting[-1], np.float32(epsilon))
+            for later in reversed(self._waiting):
+                value = np.float32(later.reward) + self.discount_of(later) * value
+            state, action = self._waiting.pop(0).pair
+            self.update((state, action), self.learning_rate, value - self.rows[state][action])
+        return error
+
+
+class PrioritizedSweeping(DynaQ):
+    """Prioritized sweeping (Moore and Atkeson 1993): plans first where the error is largest.
+
+    All updates come from the model, that of the present step too.
+    """
+
+    shares = False
+    hyperparameters: ClassVar = {"planning_steps": 5, "threshold": 0.0001}
+
+    def begin_run(self) -> None:
+        self._priorities: dict[Pair, np.float32] = {}  # in the order of the model
+
+    def learn(self, step: Transition, epsilon: float, stream: RandomStream) -> np.float32:
+        error = self.error(step, epsilon)
+        self.remember(step)
+        self._priorities.setdefault(step.pair, np.float32(0))
+        if self._matters(error):
+            self._priorities[step.pair] = abs(error)
+        for _ in range(int(self.settings["planning_steps"])):
+            first = max(self._priorities, key=self._priorities.__getitem__)
+            if self._priorities[first] > 0:
+                self._sweep(first, epsilon)
+        return error
+
+    def _matters(self, error: np.float32) -> bool:
+        return bool(abs(error) > np.float32(self.settings["threshold"]))
+
+    def _sweep(self, pair: Pair, epsilon: float) -> None:
+        """Update a pair; pairs that lead to its state may have got an error by this."""
+        self._priorities[pair] = np.float32(0)
+        self.update(pair, self.learning_rate, self.error(self.model[pair], epsilon))
+        for before, seen in self.model.items():
+            if not seen.terminated and seen.next_state == pair[0]:
+                error = self.error(seen, epsilon)
+                if self._matters(error):
+                    self._priorities[before] = max(self._priorities[before], abs(error))
+
+
+LEARNERS: dict[str, type[Learner]] = {
+    "q_learning": QLearning,
+    "sarsa": Sarsa,
+    "expected_sarsa": ExpectedSarsa,
+    "dyna_q": DynaQ,
+    "double_q": DoubleQ,
+    "sarsa_lambda": SarsaLambda,
+    "n_step_sarsa": NStepSarsa,
+    "prioritized_sweeping": PrioritizedSweeping,
+}
