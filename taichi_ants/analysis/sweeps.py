@@ -109,11 +109,8 @@ def report(
 def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: str) -> None:
     """Draw a measure against the first setting that varies, a line for each value of the others.
 
-    Args:
-        path: The file (.png).
-        settings: The settings that vary, for each of P points.
-        values: The measure, float64 (P, S), for S seeds.
-        words: The name of the measure, for the title and the y-axis.
+    `settings` are those that vary, for each of P points, `values` the measure, float64 (P, S), of S
+    seeds, and `words` its name.
 
     Raises:
         AntsError: The file (.png) cannot be written.
@@ -168,7 +165,6 @@ def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> No
 
 
 def _far_apart(numbers: Sequence[float]) -> bool:
-    """Return whether numbers need a logarithmic axis."""
     return min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
 
 

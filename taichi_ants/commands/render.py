@@ -1,9 +1,9 @@
-"""Pictures of ants: an episode, a colony, learning made visible, or a policy sheet.
+"""Draw an episode, a colony, learning, or a policy.
 
-All but learning follow a policy from a file, or one that is trained on the spot. The ending of
---out chooses the kind of file: .gif, .mp4, .png for a picture of the end, .html for a page that
-plays an episode or a colony, and without an ending a folder of PNG pictures.
-`%(prog)s episode --help` tells what it has to offer.
+Except for `learning`, ants follow a policy from a file, or one that the command trains first. The
+suffix of --out selects the kind of file: .gif or .mp4 for an animation, .png for a picture of the
+end, and .html for a page that plays an episode or a colony. Without a suffix, the command writes a
+folder of PNG pictures. See `%(prog)s episode --help`, for example, for the options of an episode.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ if TYPE_CHECKING:
     from taichi_ants.rendering import Checkpoint
     from taichi_ants.rendering.snapshots import CaptionedSnapshot
 
-# Without options that change them.
+# The defaults, which options change.
 TASK, TRAINING = Task(), TrainingConfig("sarsa", 0.001, 0.9, 0.3, 0.99)
-KINDS = {  # what each subcommand shows, and how it is called
-    "episode": ("One ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
-    "colony": ("Many ants that follow one policy", "--ants 200 --out ants.gif"),
-    "learning": ("One ant before and after it learns, side by side", "--checkpoints 0 5 500"),
-    "sheet": ("What a policy does in each state", "--policy my.npz --out sheet.png"),
+KINDS = {  # subcommands with their help and an example
+    "episode": ("Draw an ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
+    "colony": ("Draw many ants that follow one policy", "--ants 200 --out ants.gif"),
+    "learning": ("Draw an ant before and after it learns", "--checkpoints 0 5 500"),
+    "sheet": ("Draw the best action in each state", "--policy my.npz --out sheet.png"),
 }
 
 
 def _size(text: str) -> tuple[int, int]:
     width, cross, height = text.lower().partition("x")
     if not (cross and width.isdecimal() and height.isdecimal()):
-        raise argparse.ArgumentTypeError(f"{text!r} is no size, write it as 1280x720")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size; write 1280x720, for example")
     return int(width), int(height)
 
 
@@ -62,30 +62,29 @@ _SEEDS: dict[str, Any] = {"type": whole_number(1, 10_000), "default": 200, "meta
 _CHECKPOINTS = {"nargs": "+", "type": whole_number(0), "metavar": "N"}
 _PLAIN = {"action": "store_false", "dest": "overlay"}
 
-# Each option: the kinds of pictures that it is for, by their first letters, what it does, and how
-# it is read.
+# Option -> initials of the subcommands that have it, its help, and arguments of `add_argument`.
 _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
-    "--out": ("ecls", "file or folder", {"metavar": "PATH"}),
-    "--title": ("ecls", "a line above all", {"metavar": "TEXT"}),
+    "--out": ("ecls", "file or folder to write", {"metavar": "PATH"}),
+    "--title": ("ecls", "title above the picture", {"metavar": "TEXT"}),
     "--world": ("ecls", WORLDS, {"default": "paper"}),
-    "--seed": ("ecls", "seed of training and of what is shown", _SEED),
-    "--seeds": ("l", "train seeds 0 to N - 1, show the median run and count the others", _SEEDS),
-    "--plugin": ("ecls", "a Python file with learners, worlds, observations", _FILE),
-    "--ants": ("c", "how many", {**_COUNT, "default": 80}),
-    "--follow": ("c", "number of an ant whose view is shown", {**_SEED, "default": None}),
-    "--max-steps": ("el", "step limit of the episode shown", _LENGTH),
-    "--ticks": ("c", "length of an episode", _LENGTH),
+    "--seed": ("ecls", "seed of the training and of the picture", _SEED),
+    "--seeds": ("l", "train seeds 0 to N - 1, draw the median run and count the others", _SEEDS),
+    "--plugin": ("ecls", "load learners, observations or worlds (.py)", _FILE),
+    "--ants": ("c", "number of ants", {**_COUNT, "default": 80}),
+    "--follow": ("c", "draw the view of the ant with this index", {**_SEED, "default": None}),
+    "--max-steps": ("el", "step limit of the episode in the picture", _LENGTH),
+    "--ticks": ("c", "ticks of an episode", _LENGTH),
     "--epsilon": ("ecl", "probability of a random action", {**_NUMBER, "default": 0.0}),
-    "--policy": ("ecs", "a policy file (.npz); without one, it is trained", _FILE),
-    "--episodes": ("ecs", "of training", {**_COUNT, "default": 500}),
-    "--checkpoints": ("l", "looks at the ant after so many episodes of training", _CHECKPOINTS),
-    "--size": ("ecl", "in pixels", {"type": _size, "metavar": "WxH"}),
-    "--fps": ("ecl", "pictures a second", {**_NUMBER, "default": 8.0}),
-    "--frame-interval": ("c", "ticks from one picture to the next", {**_COUNT, "default": None}),
-    "--no-overlay": ("ec", "the world alone, without text and marks", _PLAIN),
+    "--policy": ("ecs", "follow a policy file (.npz) instead of training a policy", _FILE),
+    "--episodes": ("ecs", "training episodes", {**_COUNT, "default": 500}),
+    "--checkpoints": ("l", "draw the ant after these numbers of training episodes", _CHECKPOINTS),
+    "--size": ("ecl", "width and height in pixels", {"type": _size, "metavar": "WxH"}),
+    "--fps": ("ecl", "frames per second", {**_NUMBER, "default": 8.0}),
+    "--frame-interval": ("c", "ticks per frame", {**_COUNT, "default": None}),
+    "--no-overlay": ("ec", "draw only the world, without text and marks", _PLAIN),
 }
-_OF_TRAINING = ("--episodes", "--checkpoints", "--training.", "--task.")  # of no use to a policy
-# Where a kind has defaults of its own.
+_OF_TRAINING = ("--episodes", "--checkpoints", "--training.", "--task.")  # no effect on a policy
+# Defaults of the subcommands, if they differ.
 _DEFAULTS: dict[str, dict[str, Any]] = {
     "episode": {"out": "results/renders/episode.gif", "size": "1280x720"},
     "colony": {
@@ -101,7 +100,7 @@ _DEFAULTS: dict[str, dict[str, Any]] = {
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     for kind, (shows, example) in KINDS.items():
@@ -117,28 +116,26 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     settings, given = parser.parse_given(arguments)
     for flag in given.values():
         if flag.startswith(_OF_TRAINING) and getattr(settings, "policy", None):
-            parser.error(f"{flag} is of training, but --policy is trained, so leave one out")
+            parser.error(f"{flag} has no effect with --policy (no training); remove one of them")
         if flag in ("--follow", "--title") and not getattr(settings, "overlay", True):
-            parser.error(f"--no-overlay leaves out what {flag} shows, so leave out one of them")
+            parser.error(f"--no-overlay hides {flag}; remove one of them")
         if flag == "--seeds" and settings.seed is not None:
-            parser.error(
-                "--seeds chooses the seed that is shown, but --seed names it; leave one out"
-            )
+            parser.error("--seeds and --seed both select the run to draw; remove one of them")
         if flag in ("--size", "--fps", "--no-overlay") and is_page(settings):
-            parser.error(f"{flag} is of pictures, but --out names a page, so leave {flag} out")
+            parser.error(f"{flag} has no effect on a page (.html); leave it out")
     if settings.kind == "colony" and settings.frame_interval is None:
-        # A page tells what each ant does in a tick.
+        # A page shows the action of each ant in each tick.
         settings.frame_interval = 1 if is_page(settings) else 4
     return settings
 
 
 def is_page(settings: argparse.Namespace) -> bool:
-    """Whether a page is asked for, of a kind that there is one of."""
+    """Return whether the settings ask for a page."""
     return settings.kind in ("episode", "colony") and Path(settings.out).suffix.lower() == ".html"
 
 
 def show(settings: argparse.Namespace) -> None:
-    """Make what was asked for, and say what it is."""
+    """Draw the picture, animation or page, and print a summary."""
     from taichi_ants.rendering import check_animation, check_picture
     from taichi_ants.rendering.scene import check_size
     from taichi_ants.rendering.writers import is_picture
@@ -159,7 +156,7 @@ def show(settings: argparse.Namespace) -> None:
 
 
 def show_episode(settings: argparse.Namespace, world: World) -> str:
-    """Write an episode as a page or an animation, or its end as a picture."""
+    """Return a summary of an episode, after writing it as a page, an animation or a picture."""
     from taichi_ants.errors import count
     from taichi_ants.rendering import Episode
     from taichi_ants.viewer import record_episode, save_page
@@ -177,10 +174,7 @@ def show_episode(settings: argparse.Namespace, world: World) -> str:
 
 
 def show_colony(settings: argparse.Namespace, world: World) -> str:
-    """Let a colony learn together, then write an episode in which it follows what it has learned.
-
-    As a single picture, the episode is shown at its last tick.
-    """
+    """Return a summary of a colony's episode, after writing a page, an animation or a picture."""
     from taichi_ants import Colony
     from taichi_ants.errors import count
     from taichi_ants.rendering import colony_snapshots
@@ -205,7 +199,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> str:
 
 
 def show_learning(settings: argparse.Namespace, world: World) -> str:
-    """Write the same ant after more and more episodes, side by side."""
+    """Return a summary of an ant's training, after writing an animation of its checkpoints."""
     from taichi_ants import learners
     from taichi_ants.errors import count
     from taichi_ants.rendering import learning_frames
@@ -221,7 +215,7 @@ def show_learning(settings: argparse.Namespace, world: World) -> str:
 
 
 def show_sheet(settings: argparse.Namespace, world: World) -> str:
-    """Write what a policy does in each state."""
+    """Return a summary of a policy sheet, after writing it."""
     from taichi_ants.rendering import policy_sheet, save_picture
 
     q_values, task, title = find_policy(settings, world)
@@ -230,14 +224,14 @@ def show_sheet(settings: argparse.Namespace, world: World) -> str:
 
 
 def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray, Task, str]:
-    """The action values (n_states, 5) to follow, their task, and a title that says whence."""
+    """Return the action values (n_states, 5) to follow, their task, and a title."""
     from taichi_ants import Colony, Life, learners, load_policy, train
     from taichi_ants.errors import count
 
     if settings.policy:
         policy = load_policy(settings.policy)
         title = settings.title or f"Following {Path(settings.policy).name}"
-        # An episode is of one ant: nothing comes and goes.
+        # An episode has one ant, without births, deaths, or food that grows back.
         alone = settings.kind == "episode"
         return policy.q_values, replace(policy.task, life=Life()) if alone else policy.task, title
     config, seed, episodes = training_config(settings), settings.seed, settings.episodes
@@ -254,17 +248,16 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
 
 
 def _task(settings: argparse.Namespace) -> Task:
-    """The task with what options change."""
     return TASK.but(**given_settings(settings).get("task", {}))
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
-    """Return the learner with what options change."""
+    """Return the training with the settings of the command line."""
     return TRAINING.but(**given_settings(settings).get("training", {}))
 
 
 def noted_checkpoints(settings: argparse.Namespace, world: World) -> tuple[int, list[Checkpoint]]:
-    """The seed, and the checkpoints of its ant, with its behaviour and those of other seeds."""
+    """Return the seed, and its ant's checkpoints with notes on its behaviour and on other seeds."""
     from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
     from taichi_ants.rendering import learning_checkpoints, typical_seed
 
@@ -308,7 +301,6 @@ def _save_snapshots(
 
 
 def _save(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) -> None:
-    """Write n pictures as an animation."""
     from taichi_ants.rendering import PAUSE, save_animation
 
     def counted() -> Iterator[np.ndarray]:
@@ -321,5 +313,5 @@ def _save(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n: int) 
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
-    run_command(lambda: show(parse_arguments(arguments)), "Stopped; nothing was left behind.")
+    """Run the command."""
+    run_command(lambda: show(parse_arguments(arguments)), "Stopped; no files were written.")

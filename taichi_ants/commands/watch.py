@@ -1,8 +1,8 @@
-"""Ants that one watches and changes while they run, in a browser.
+"""Watch and change ants in a browser while they run.
 
-Prints the address of a page that this machine alone can open. The page chooses world, rules and
-policy, lets time pass, draws rock, food, trails and ants, and saves the session, which replays to
-the same bits. Ends with Ctrl-C, and when the page says so. See docs/watching.md.
+The command prints the address of a page that only this machine can open. On the page, you choose
+world, rules and policy, run the ants, draw rock, food, trails and ants, and save the session, which
+replays to the same bits. Press Ctrl-C or use the page to end the command. See docs/watching.md.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from taichi_ants.task import Life, queueing
 if TYPE_CHECKING:
     from taichi_ants.learners.policies import Policy
 
-_POLICIES = Path(__file__).parents[2] / "experiments" / "policies"  # of a clone
+_POLICIES = Path(__file__).parents[2] / "experiments" / "policies"  # only in a clone
 _LEADS = """<!doctype html>
 <meta charset="utf-8">
 <meta name="referrer" content="no-referrer">
@@ -49,22 +49,23 @@ START: dict[str, Any] = {
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
     files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
-    add("--policy", **files, help="policies that the page offers besides those of a clone")
-    add("--session", metavar="FILE", help="a saved session to go on with")
-    add("--port", type=whole_number(0, 65535), default=0, metavar="N", help="0: one that is free")
-    add("--no-browser", action="store_true", help="open none; none is opened without a terminal")
+    add("--policy", **files, help="offer policy files in addition to those of a clone")
+    add("--session", metavar="FILE", help="resume a saved session")
+    port = "port of the page; 0 selects a free one"
+    add("--port", type=whole_number(0, 65535), default=0, metavar="N", help=port)
+    add("--no-browser", action="store_true", help="do not open a browser")
     add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
-    add("--plugin", metavar="FILE", help="a Python file with learners, worlds, observations")
+    add("--plugin", metavar="FILE", help="load learners, observations or worlds (.py)")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
 
 
 def watch(settings: argparse.Namespace) -> None:
-    """Serve the page until it is time to end."""
+    """Serve the page until Ctrl-C, the page or --duration ends the command."""
     from taichi_ants import runtime
     from taichi_ants.live.choices import Choices
     from taichi_ants.live.server import Room
@@ -80,7 +81,7 @@ def watch(settings: argparse.Namespace) -> None:
         session = Session(choices.setup(START))
     prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
     room = Room(session, choices, settings.port, prepare)
-    print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
+    print(f"{room.url}\nOpen this address in a browser. Press Ctrl-C to end.", flush=True)
     with ExitStack() as opened:
         if not settings.no_browser and sys.stdout.isatty():
             opened.enter_context(_opened(room.url))
@@ -95,7 +96,7 @@ def watch(settings: argparse.Namespace) -> None:
 
 
 def policies(given: list[str]) -> dict[str, Policy]:
-    """Those that were given and those of a clone, by the names of their files."""
+    """Return the given policies and those of a clone, by file name without suffix."""
     from taichi_ants import load_policy
 
     paths = [*sorted(_POLICIES.glob("*.npz")), *map(Path, given)]
@@ -104,10 +105,10 @@ def policies(given: list[str]) -> dict[str, Policy]:
 
 @contextmanager
 def _opened(url: str) -> Iterator[None]:
-    """Open a browser, if there is one, on a private file that leads to the address.
+    """Open a browser, if there is one, on a private file that redirects to the address.
 
-    Other users of the machine can read the command line of the browser, but not this file. It is
-    deleted at the end.
+    Other users of the machine can read the browser's command line, which has a token in the
+    address, but not this file.
     """
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
@@ -123,5 +124,5 @@ def _opened(url: str) -> Iterator[None]:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
+    """Run the command."""
     run_command(lambda: watch(parse_arguments(arguments)))

@@ -62,7 +62,6 @@ def colony_page(
 
 
 def _statements(findings: Judged) -> Statements:
-    """Return the findings, with the verdict on the largest colony."""
     lines = []
     for (world_kind, series), by_sizes in findings.items():
         unit = MEASURES[series.measure]

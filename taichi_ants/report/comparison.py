@@ -134,7 +134,6 @@ def comparison_page(
 
 
 def _claims(results: Results) -> Statements:
-    """Return the claims, with a column of verdicts for each delivery setting."""
     lines = []
     for claim, findings in results.audit.items():
         told = [

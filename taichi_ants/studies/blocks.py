@@ -20,13 +20,7 @@ _ABOUT = "about"
 def kept(path: Path, about: Any, make: Callable[[], Outcome]) -> Outcome:
     """Return the arrays of a block (.npz); make and save them if they are missing or damaged.
 
-    Args:
-        path: The file.
-        about: Everything that determines the arrays, in types that JSON has.
-        make: A function that returns the arrays.
-
-    Raises:
-        AntsError: The file cannot be written.
+    `about` is everything that determines them. Raises AntsError if the file cannot be written.
     """
     digest = hashlib.sha256(files.to_json(about).encode()).hexdigest()
     if path.exists():

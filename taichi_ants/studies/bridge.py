@@ -63,14 +63,8 @@ def followed(
 ) -> dict[str, np.ndarray]:
     """Return the `crossings` of trained colonies on each bridge; save them in `path` or read them.
 
-    Args:
-        path: The file of the block.
-        design: The design of the colonies.
-        learned: The point in which they were trained.
-        seeds: Their seeds.
-        q_values: Their tables of action values, float32 (seeds, n_states, 5).
-        ticks: The length of an evaluation; `LATE` takes twice as long.
-        where: The arguments `threads` and `arch` of colonies.
+    Training in the point `learned` gave the tables `q_values`, float32 (seeds, n_states, 5). An
+    episode has `ticks`, twice as many on `LATE`; `where` has the arguments `threads` and `arch`.
     """
 
     def counted() -> dict[str, np.ndarray]:
@@ -95,13 +89,9 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
 
     An ant crosses when it enters one room and was in the other before; its branch is the last one
     that it was in. Only foragers that enter the food room and carriers that enter the queen's room
-    count.
-
-    Args:
-        colony: A colony with the schedule "by_world", in which ants keep their slots.
-        bridge: The arguments of `double_bridge`.
-        ticks: The length of the episode.
-        opens: Rock closes the short branch until this tick; if above 0, there must be one world.
+    count. Rock closes the short branch until tick `opens`; if above 0, there must be one world. The
+    colony has the schedule "by_world", in which ants keep their slots; `bridge` has the arguments
+    of `double_bridge`.
 
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.

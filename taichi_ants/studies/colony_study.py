@@ -136,7 +136,6 @@ def place(world_kind: str, seed: int) -> World:
 
 
 def _drawn(world_kind: str, seeds: Iterable[int]) -> tuple[World, ...] | None:
-    """Return worlds of a kind; None for the paper's, which is the only one of its kind."""
     return None if world_kind == "paper" else tuple(place(world_kind, seed) for seed in seeds)
 
 

@@ -116,17 +116,9 @@ def live(
 ) -> None:
     """Run a colony for `ticks` ticks, or until `stopped()` is true, and write its files.
 
-    The colony is saved even if drawing fails.
-
-    Args:
-        colony: The colony.
-        ticks: The number of ticks.
-        progress: A function of the finished share.
-        stopped: A function that returns whether to stop.
-        save: The file of the colony.
-        render: A picture (.png) of the end, or an animation (.gif, .mp4, a folder).
-        figure: A figure (.png) of deliveries over time, with its numbers (.csv) next to it.
-        frame_interval: The number of ticks per frame of an animation.
+    `save` is the file of the colony, which is saved even if drawing fails. `render` is a picture
+    (.png) of the end, or an animation (.gif, .mp4, a folder). `figure` (.png) shows deliveries over
+    time; their numbers are in a file with the same name (.csv).
     """
     from taichi_ants.rendering import colony_snapshots, frames, save_animation, save_picture
     from taichi_ants.rendering.writers import is_picture
@@ -157,7 +149,6 @@ def live(
 
 
 def _save(colony: Colony, path: str | None) -> None:
-    """Save a colony, unless `path` is None; create the folder if needed."""
     if path is not None:
         files.check_writable_folder(Path(path).parent)
         colony.save(path)

@@ -216,7 +216,6 @@ def _check_once(name: str, values: list) -> None:
 
 
 def _grid(grid: Any, fixed: Settings) -> list[Settings]:
-    """Return all combinations of the settings that vary."""
     if not isinstance(grid, dict) or not grid:
         raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
     values = {name: _listed(value) for name, value in flat(grid).items()}
@@ -270,7 +269,6 @@ def _own(kind: str) -> list[str]:
 
 
 def _rather(name: str, kind: str, known: list[str]) -> str:
-    """Return the rest of a message about a wrong name, with similar names."""
     for other in KINDS:
         if name in _own(other):
             return f"of kind {kind!r}, but of {other!r}; leave it out"
@@ -284,7 +282,6 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
 
 
 def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
-    """Return the world of some settings, or one for each seed."""
     preset, drawn = given.pop("preset", "paper"), "seed" in given
     first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
     if checked_flag("world.per_seed", per_seed) and kind == "runs":

@@ -175,20 +175,26 @@ WRONG = {
         "checkpoints are (5, 2); they must ascend",
     ),
     "steps": (["episode", "--max-steps", "0"], "from 1 to"),
-    "training of a policy": (["sheet", "--policy", "a.npz", "--episodes", "5"], "--episodes is of"),
+    "training of a policy": (
+        ["sheet", "--policy", "a.npz", "--episodes", "5"],
+        "--episodes has no effect",
+    ),
     "learner of a policy": (
         ["colony", "--training.learner=sarsa", "--policy", "a.npz"],
-        "--training.learner is of",
+        "--training.learner has no effect",
     ),
     "observation of a policy": (
         ["episode", "--policy", "a.npz", "--task.observation", "paper"],
-        "--task.observation is of training",
+        "--task.observation has no effect with --policy",
     ),
     "view of a plain picture": (
         ["colony", "--no-overlay", "--follow", "0"],
-        "--no-overlay leaves out what --follow shows",
+        "--no-overlay hides --follow",
     ),
-    "title of a plain picture": (["episode", "--no-overlay", "--title", "a"], "what --title shows"),
+    "title of a plain picture": (
+        ["episode", "--no-overlay", "--title", "a"],
+        "--no-overlay hides --title",
+    ),
     "wrong number": (
         ["sheet", "--training.discount", "y", "--out", "{}/a.png"],
         "is 'y'; it must be",
@@ -235,7 +241,7 @@ def test_stopped_midway_it_leaves_nothing_behind(
         finally:
             running.kill()
     assert running.returncode == status
-    assert errors == "Stopped; nothing was left behind.\n"
+    assert errors == "Stopped; no files were written.\n"
     assert files_in(tmp_path) == []
 
 
@@ -291,7 +297,7 @@ def test_help_needs_little(run, kernels) -> None:
 def test_a_seed_that_is_named_is_not_chosen(capsys) -> None:
     with pytest.raises(SystemExit):
         render.parse_arguments(["learning", "--seed", "7", "--seeds", "20"])
-    assert "--seeds chooses the seed that is shown, but --seed names it" in capsys.readouterr().err
+    assert "--seeds and --seed both select the run to draw" in capsys.readouterr().err
 
 
 def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many_ants(

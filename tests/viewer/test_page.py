@@ -143,9 +143,9 @@ def test_the_command_writes_pages(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["episode", "--size", "300x300"], "--size is of pictures"),
-        (["colony", "--fps", "9"], "--fps is of pictures"),
-        (["episode", "--no-overlay"], "--no-overlay is of pictures"),
+        (["episode", "--size", "300x300"], "--size has no effect on a page"),
+        (["colony", "--fps", "9"], "--fps has no effect on a page"),
+        (["episode", "--no-overlay"], "--no-overlay has no effect on a page"),
     ],
 )
 def test_options_of_pictures_are_refused(arguments, message, capsys):

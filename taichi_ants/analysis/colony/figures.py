@@ -29,7 +29,6 @@ def draw_all(rows: Rows) -> dict[str, Figure]:
 
 
 def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
-    """Return a figure of deliveries of the largest colonies, with a panel per kind of world."""
     panels: dict[str, dict[Design, ConditionRow]] = {}
     for row in sorted(rows, key=lambda row: row.condition.ants):
         if row.design in designs:  # larger colonies replace smaller ones
@@ -81,7 +80,6 @@ def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
 def _lines(
     title: str, designs: Sequence[Design], measures: Sequence[str], rows: Rows
 ) -> Figure | None:
-    """Return a figure of measures against the number of ants, a column per kind of world."""
     world_kinds = [
         one for one in study.WORLD_KINDS if any(row.condition.world_kind == one for row in rows)
     ]

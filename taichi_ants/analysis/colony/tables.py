@@ -64,7 +64,6 @@ def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, An
 
 
 def _stacked(measured: Measured) -> dict[str, np.ndarray]:
-    """Return the measures as arrays (conditions, seeds)."""
     return {name: np.stack([one[name] for one in measured.values()]) for name in study.OF_STUDY}
 
 
@@ -140,7 +139,6 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
 
 
 def _basis(rows: Sequence[ConditionRow]) -> str:
-    """Return a note with the number of seeds and the exploration rate."""
     return f"{seeds_in_words(rows[0].seeds)}, exploration rate {study.EVALUATION_EPSILON:g}"
 
 
@@ -213,7 +211,6 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
 def _compared(
     by_condition: Mapping[Condition, ConditionRow], world_kind: str, series: Series, sizes: Sizes
 ) -> tuple[float, float]:
-    """Return the two means that a series compares."""
     first, second = (
         by_condition[Condition(world_kind, *design, n)].estimates[series.measure].mean
         for design, n in zip((series.first, series.second), sizes, strict=True)

@@ -81,7 +81,6 @@ def _epsilon_at_table_2(grids: Grids, measure: str, variant: Variant) -> np.ndar
 
 
 def _effect_of(factor: str, sign: int = 1) -> Read:
-    """Return the effect of a hyperparameter: upper minus lower value, or the reverse."""
     lower, upper = FACTORS[factor][::sign]
     return Read(
         f"{factor.replace('_', ' ')} {upper:g} minus {lower:g}, mean of 8 pairs",
@@ -263,6 +262,5 @@ def more_dependent(measure: str, factor: str, *both: tuple[Variant, Variant]) ->
 
 
 def _first_minus_second(estimates: np.ndarray, statistic: Callable[..., Any]) -> np.ndarray:
-    """Return a statistic of the first half of the rows minus that of the second half."""
     first, second = np.split(estimates, 2)
     return statistic(first, axis=0) - statistic(second, axis=0)

@@ -109,7 +109,6 @@ def _mean(one: Estimator) -> str:
 
 
 def _glance(lines: Sequence[Line]) -> Table:
-    """Return a table of returns and steps of the learners and of the paper."""
     shown = lines[:MOST_LINES]
     beside = any(line.paper for line in lines)
     paper = ("paper",) if beside else ()
