@@ -1,6 +1,6 @@
-"""Make all pictures of the README and the docs, in `renders/` and `docs/figures/`, again.
+"""Draw all pictures of the README and the docs, in `renders/` and `docs/figures/`.
 
-`render.py` draws the pictures in `renders/`, with the arguments below. The pictures in
+`render.py` draws the pictures in `renders/`, with arguments from this script. The pictures in
 `docs/figures/` are from the results in `results/compare`, `results/colony` and `results/bridge`,
 and from a run of a million ants. If results are missing, the script runs the study first. The
 comparison takes less than a minute on two cores; see docs/colony.md and docs/bridge.md for the

@@ -1,11 +1,10 @@
 """Learn offline from recorded data, and evaluate policies from data.
 
-The script prints three tables, with means and 95 % intervals over seeds. See docs/offline.md.
-
-- (a) The share of rollouts with a delivery, for policies learned offline, by behaviour policy,
-  number of transitions and learner, and for online Q-learning with as many transitions.
-- (b) The quality of off-policy evaluation as a ranking of ten policies.
-- (c) The deliveries of a colony with policies learned from data of ants that are born and die.
+The script prints three tables, with means and 95 % intervals over seeds. Table (a) has the share of
+rollouts that deliver with policies learned offline, by behaviour policy, number of transitions and
+learner, and with online Q-learning after as many transitions. Table (b) shows how well off-policy
+evaluation ranks ten policies. Table (c) has the deliveries of a colony with policies learned from
+data of ants that are born and die. See docs/offline.md.
 """
 
 from __future__ import annotations

@@ -1,14 +1,11 @@
 """Run ants whose pheromones are utilities (Panait and Luke 2004) on the maps of the package.
 
-The script prints a row for each kind of world and number of ants that fit into a cell:
-
-- deliveries per 1000 ticks with their 95 % interval over seeds, and the tick of the first delivery;
-- the number of colonies whose path was ever a shortest one, and after how many ticks (the median);
-- the length of the path at the end, as a multiple of the shortest (the mean of the colonies that
-  have a path, and their number).
-
+The script prints a row for each kind of world and number of ants that fit into a cell. It has the
+deliveries per 1000 ticks with their 95 % interval over seeds, and the tick of the first delivery.
 The path of a colony is a walk from the nest to food and back that always follows the highest
-utility. See docs/baselines.md.
+utility. The row also has the number of colonies that ever had a shortest path, and the median of
+the ticks when they first had it. The last columns are the length of paths at the end, as a multiple
+of the shortest (the mean of the colonies with a path), and their number. See docs/baselines.md.
 """
 
 from __future__ import annotations

@@ -39,10 +39,10 @@ if TYPE_CHECKING:
 # The defaults, which options change.
 TASK, TRAINING = Task(), TrainingConfig("sarsa", 0.001, 0.9, 0.3, 0.99)
 KINDS = {  # subcommands with their help and an example
-    "episode": ("Draw an ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
-    "colony": ("Draw many ants that follow one policy", "--ants 200 --out ants.gif"),
-    "learning": ("Draw an ant before and after it learns", "--checkpoints 0 5 500"),
-    "sheet": ("Draw the best action in each state", "--policy my.npz --out sheet.png"),
+    "episode": ("draw an ant that follows a policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
+    "colony": ("draw many ants that follow one policy", "--ants 200 --out ants.gif"),
+    "learning": ("draw an ant before and after it learns", "--checkpoints 0 5 500"),
+    "sheet": ("draw the best action in each state", "--policy my.npz --out sheet.png"),
 }
 
 
@@ -105,7 +105,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     for kind, (shows, example) in KINDS.items():
         example = f"Example: %(prog)s {example}"
-        one = kinds.add_parser(kind, help=shows, description=f"{shows}.", epilog=example)
+        about = f"{shows.capitalize()}."
+        one = kinds.add_parser(kind, help=shows, description=about, epilog=example)
         for flag, (where, words, reading) in _OPTIONS.items():
             if kind[0] in where:
                 one.add_argument(flag, **{"help": words, **reading})

@@ -88,7 +88,7 @@ def what_is_seen(
         if code == DELIVERS:
             title = f"{variant.label}: policy"
             sheet = play(policy_sheet, policy.q_values, title, task=point.task)
-            sheets.append((f"What an ant has learned: {whose}", sheet))
+            sheets.append((f"The policy of an ant: {whose}", sheet))
     drawn = draw(drawings_of, comparison, baselines)
     return lambda: Seen(
         drawn(),

@@ -24,10 +24,10 @@ AGAIN = "Stopped; finished parts are saved. Run the same command again to resume
 
 
 class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
-    """A formatter that shows defaults, except None, False and empty lists."""
+    """A formatter that shows defaults, except None, flags and empty lists."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        silent = action.default in (None, []) or action.default is False
+        silent = action.default in (None, []) or isinstance(action.default, bool)
         if isinstance(action.default, (list, tuple)) and not silent:
             return f"{action.help} (default: {' '.join(map(str, action.default))})"
         return action.help if silent else super()._get_help_string(action)

@@ -161,6 +161,6 @@ def test_little_is_told_of_little() -> None:
     assert "nan" not in re.sub(r"<script.*?</script>|<style.*?</style>", "", told, flags=re.S)
     assert "table 2, beside ours" not in told
     assert 'class="player"' not in told
-    assert any(caption.startswith("What they do") for caption in tables(told))
+    assert any(caption.startswith("Behaviour, in") for caption in tables(told))
     assert '<svg class="interval"' not in told
     assert "not tested" in told

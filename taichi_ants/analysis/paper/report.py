@@ -101,7 +101,7 @@ def behaviour_counts(comparison: Comparison) -> Table:
         for code, name in enumerate(BEHAVIOURS)
         if any(code in done for done in by_setting)
     ]
-    return Table("", ("What the final policies do", *settings), rows)
+    return Table("", ("Behaviour of final policies", *settings), rows)
 
 
 def _mean(one: Estimator) -> str:
@@ -243,7 +243,8 @@ def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans])
         "Return: mean of the last 50 training episodes, of the episode that is followed, and of "
         "the greedy evaluation. summary.csv has the counts of all configurations.",
     )
-    return Table("What they do, in the configurations above", headers, rows, notes, text_columns=3)
+    title = "Behaviour, in the configurations above"
+    return Table(title, headers, rows, notes, text_columns=3)
 
 
 def baseline_table(baselines: Sequence[Baseline]) -> Table:

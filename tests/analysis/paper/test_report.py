@@ -147,7 +147,7 @@ def test_it_counts_what_the_ants_do(comparison: Comparison) -> None:
     behaviours[shown, 4:], policy_returns[shown, 4:] = CIRCLES, 220
     behaviours[shown - 1, :3] = WALKS  # in another configuration, not shown
     mixed = replace(comparison, behaviours=behaviours, policy_returns=policy_returns)
-    table = section(render(mixed), "What they do")
+    table = section(render(mixed), "Behaviour, in")
     terminates = table[table.index("terminates") :]
     trained = mixed.measures["return_last50"][shown]
     lines = terminates[terminates.index("Dyna-Q (p5)") :].splitlines()
@@ -165,7 +165,7 @@ def test_means_that_no_run_has_are_marked(comparison: Comparison, text: str) -> 
     behaviours = comparison.behaviours.copy()
     behaviours[shown_position(comparison, "terminates", DYNA_P5), 0] = OTHER
     marked = render(replace(comparison, behaviours=behaviours))
-    for start in ("Return, last 50", "Greedy evaluation", "What they do"):
+    for start in ("Return, last 50", "Greedy evaluation", "Behaviour, in"):
         rows = [line for line in section(marked, start).splitlines() if "Dyna-Q (p5)" in line]
         marks = {(line.startswith("Dyna-Q (p5) +"), "terminates" in line) for line in rows}
         assert marks == {(False, False), (True, True)}, start
