@@ -59,7 +59,7 @@ TASKS = {
     "netlogo, in queues": replace(task.queueing(), pheromone=NETLOGO),
 }
 TICKS, EPISODES = 1000, 4
-MEASURES = {EVALUATION_EPSILON: "deliveries", 0.0: "greedy"}  # of the study, by exploration rate
+MEASURES = {EVALUATION_EPSILON: "deliveries", 0.0: "greedy"}  # study's, by exploration rate
 HEAD = (
     "world    rules              epsilon  deliveries  interval      worst  first  blocked"
     "  learned  learned - fixed"

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # A behaviour is an index into this list.
 BEHAVIOURS = ("delivers", "walks the trail", "circles with food", "other")
 DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))
-NAMES = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # of columns, files
+NAMES = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # in columns and file names
 # For reports. Of an episode without a delivery, the second half counts.
 DEFINITIONS = (
     "the episode ends with a delivery",

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 WIDTH = 9.0
 DPI = 180
 
-# Those colours of Okabe and Ito and of Tol that people with any colour deficiency distinguish best:
-# the first two, four or five.
+# The first two, four or five of these are the colours of Okabe and Ito and of Tol that people with
+# any colour deficiency distinguish best.
 BLUE, ORANGE, RED, WINE, SKY = "#0072B2", "#E69F00", "#CC3311", "#882255", "#56B4E9"
 INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 # Colours of lines, in this order.

@@ -71,7 +71,7 @@ def followed(
         found = {}
         for name, bridge in bridges(design).items():
             late, parts, world = name == LATE, [], double_bridge(**bridge)
-            # Interventions act on colonies of one world.
+            # Interventions need a colony with a single world.
             each = [slice(s, s + 1) for s in range(len(seeds))] if late else [slice(None)]
             for some in each:
                 given = world, seeds[some], q_values[some], False

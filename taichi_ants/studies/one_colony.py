@@ -142,7 +142,7 @@ def live(
             who = _who(colony.ants * len(colony.seeds), colony)
             save_figure(spans(totals), who, figure)
     except (AntsError, OSError):
-        # Drawing happens between ticks, so the colony is intact and may have taken hours.
+        # The colony is intact, because drawing happens between ticks, and may have taken hours.
         _save(colony, save)
         raise
     _save(colony, save)

@@ -336,7 +336,7 @@ class Study(Generic[PointKind]):
                 found.setdefault(name, np.empty(shape, array.dtype))[some, at] = array
         if order == self.points:
             return found
-        place = {point: number for number, point in enumerate(order)}  # some may occur twice
+        place = {point: number for number, point in enumerate(order)}  # points may repeat
         return {name: array[[place[one] for one in self.points]] for name, array in found.items()}
 
     def in_blocks(

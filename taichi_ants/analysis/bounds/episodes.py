@@ -118,7 +118,7 @@ class EpisodeBounds:
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import dijkstra
 
-        # tocsr adds up edges between the same states; these are loops, which no shortest path has.
+        # tocsr adds up parallel edges. Only loops have any, and no shortest path has a loop.
         actions, n = self._chances.tocoo(), self._chances.shape[1]
         costs = _STEP - self._rewards.reshape(-1)[actions.row]
         graph = coo_array((costs, (actions.row % n, actions.col)), shape=(n, n)).tocsr()

@@ -70,7 +70,7 @@ def _at(grid: np.ndarray, point: GridPoint) -> np.ndarray:
 def _held_out(grids: Grids, measure: str, variant: Variant) -> np.ndarray:
     """Return a measure on odd seeds, where even seeds return most, float64 (seeds / 2,)."""
     choosing = grids("return_last50", variant)[..., ::2].mean(axis=-1)
-    best = np.unravel_index(choosing.argmax(), choosing.shape)  # if any is nan, a nan
+    best = np.unravel_index(choosing.argmax(), choosing.shape)  # argmax prefers nan
     return grids(measure, variant)[best][1::2]
 
 
