@@ -194,7 +194,8 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
     if 1 < seeds < FEW_SEEDS:
         notes += [
             f"Few seeds ({seeds}): if one run in a hundred is an outlier, most intervals of the "
-            "mean miss it. Intervals of the IQM hold from 10 seeds on (docs/statistics.md)."
+            "mean miss the true mean. Intervals of the IQM are valid from 10 seeds on "
+            "(docs/statistics.md)."
         ]
     starred = [
         f"  {line.label}, {line.delivery}: {line.summary.row.point.label}"
@@ -218,7 +219,7 @@ def greedy_table(lines: Sequence[Line]) -> Table:
         both = (text for one in (gains, steps) for text in (_mean(one), number(one.iqm)))
         rows.append([line.label, line.delivery, *both, number(food.mean, 2)])
     low, high = GREEDY_STEPS
-    note = f"The paper, in its world: about {GREEDY_RETURN} reward in {low} to {high} steps."
+    note = f"The paper, in its world: a return of about {GREEDY_RETURN} in {low} to {high} steps."
     return Table("Greedy evaluation, configurations as above", headers, rows, [note], 2)
 
 
