@@ -41,7 +41,7 @@ def test_its_tables():
     assert memory.rows == [["an ant", "40", "-"]]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_command(capfd, tmp_path, monkeypatch):
     page = tmp_path / "page.md"
     page.write_text("<!-- growth -->\n<!-- /growth -->\n")

@@ -174,7 +174,7 @@ finally:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="tells what a process has taken")
 def test_a_process_with_many_seeds_stays_small(kernels, tmp_path):
     """All of a command, with statistics."""

@@ -34,7 +34,7 @@ def remember(patch: pytest.MonkeyPatch) -> None:
     for owner, name in (
         *((runner.RunPoint, "do"), (runner.ColonyPoint, "do"), (results, "what_policies_do")),
         *((baselines, "bound_rows"), (baselines, "policy_rows")),
-        *((colony_study, "_pool"), (colony_study, "limits_of")),
+        *((colony_study, "_drawn"), (colony_study, "limits_of")),
     ):
         known = _remembered(getattr(owner, name))
         patch.setattr(owner, name, staticmethod(known) if isinstance(owner, type) else known)
