@@ -1,15 +1,15 @@
-"""Ant colony optimisation on the maps of the package: who finds the shortest way, and when.
+"""Measure how soon Ant System and MAX-MIN Ant System find a shortest path on maps of the package.
 
-Prints, for Ant System and MAX-MIN Ant System in each world, how many colonies find a shortest way
-from the queen to food, in which iteration (the median of those that do), and how long the tours of
-the first and the last iteration are. See docs/baselines.md.
+For each method and world, the script prints the number of colonies that find a shortest path from
+the queen to food, and the median of the iterations in which they find it. It also prints the mean
+length of the tours in the first and the last iteration. See docs/baselines.md.
 """
 
 from __future__ import annotations
 
 from taichi_ants.studies.interruption import stoppable
 
-with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     from itertools import product
 
@@ -23,22 +23,24 @@ HEAD = f"{'world':20} {'method':11} shortest  found by  iteration  first and las
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
     places = ("paper", "double_bridge")
     add("--worlds", nargs="+", default=places, metavar="WORLD", help="names or map files")
-    add("--iterations", type=whole_number(1), default=500, metavar="N", help="of each colony")
-    add("--ants", type=whole_number(1), default=32, metavar="N", help="of each colony")
-    add("--colonies", type=whole_number(1), default=20, metavar="N", help="in each world")
-    add("--evaporation", type=float, metavar="RHO", help="(default: 0.5, of max_min 0.02)")
-    add("--seed", type=whole_number(), default=0, help="of all colonies")
+    number = whole_number(1)
+    add("--iterations", type=number, default=500, metavar="N", help="iterations of a colony")
+    add("--ants", type=number, default=32, metavar="N", help="ants of a colony")
+    add("--colonies", type=number, default=20, metavar="N", help="colonies in each world")
+    evaporation = "share that evaporates per iteration (default: 0.5; max_min: 0.02)"
+    add("--evaporation", type=float, metavar="RHO", help=evaporation)
+    add("--seed", type=whole_number(), default=0, help="seed of all colonies")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """A row for each world and method, once all are known to be allowed."""
+    """Print a row for each world and method, after checking all of them."""
     places = {name: worlds.build(name, settings.seed) for name in settings.worlds}
     rows: list[str] = []
     with progress_bar("Ant colony optimisation") as progress:
@@ -49,7 +51,7 @@ def print_table(settings: argparse.Namespace) -> None:
 
 
 def row(settings: argparse.Namespace, world: World, method: Method) -> str:
-    """What the colonies of one method find in one world."""
+    """Return the row of a method in a world."""
     names = ("iterations", "ants", "colonies", "evaporation", "seed", "threads")
     result = search(world, method, **{name: getattr(settings, name) for name in names})
     found = result.found[result.found > 0]

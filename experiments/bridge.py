@@ -1,4 +1,4 @@
-"""Colonies on a double bridge: does the shorter branch win?
+"""Train colonies on a double bridge, and measure whether the shorter branch wins.
 
 python experiments/bridge.py --quick
 """

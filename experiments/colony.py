@@ -1,4 +1,4 @@
-"""The scaling study of the colony, or one colony of any size.
+"""Study how colonies scale, or run one colony of any size.
 
 python experiments/colony.py study --quick
 python experiments/colony.py live --ants 1000

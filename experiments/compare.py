@@ -1,4 +1,4 @@
-"""The paper's comparison of Q-learning, SARSA and Dyna-Q, over many seeds, with honest statistics.
+"""Repeat the paper's comparison of Q-learning, SARSA and Dyna-Q with many seeds.
 
 python experiments/compare.py --quick
 """

@@ -1,6 +1,6 @@
-"""Ants with a fixed rule: deliveries of a colony that learns nothing.
+"""Measure the deliveries of ants that follow a fixed rule and do not learn.
 
-All ants follow `trail_follower`, a rule that is written by hand, and explore with the rate of
+All ants follow `trail_follower`, a rule written by hand, and explore with the rate of
 --epsilon. The script prints that rule, then deliveries per 1000 ticks with their 95 % interval over
 seeds, the worst seed, the tick of the first delivery, and the share of blocked moves. Worlds, seeds
 and random numbers are those of the evaluation in `colony.py study`. With --study, it also prints
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from taichi_ants.studies.interruption import stoppable
 
-with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     import math
     from collections.abc import Mapping, Sequence
@@ -40,8 +40,8 @@ with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard
     if TYPE_CHECKING:
         from taichi_ants.engines.colony.colony import ColonyEpisodes
 
-# NetLogo's model Ants: in each tick 10 % of a trail evaporates and half of it spreads. An ant there
-# adds 60, and smells 0.05; here it smells 1.
+# NetLogo's model Ants: in each tick, 10 % of a trail evaporates and half of it spreads. Ants there
+# add 60 and smell 0.05. Here they smell 1, so they add 1200.
 NETLOGO = Pheromone(
     evaporation="exponential",
     half_life=math.log(0.5) / math.log(0.9),
@@ -59,7 +59,7 @@ TASKS = {
     "netlogo, in queues": replace(task.queueing(), pheromone=NETLOGO),
 }
 TICKS, EPISODES = 1000, 4
-MEASURES = {EVALUATION_EPSILON: "deliveries", 0.0: "greedy"}  # of the study, by exploration rate
+MEASURES = {EVALUATION_EPSILON: "deliveries", 0.0: "greedy"}  # study's, by exploration rate
 HEAD = (
     "world    rules              epsilon  deliveries  interval      worst  first  blocked"
     "  learned  learned - fixed"
@@ -78,11 +78,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         "metavar": "NAME",
         "default": tuple(WORLD_KINDS),
     }
-    add("--worlds", **worlds, help="kinds of world, as of colony.py study --world-kinds")
-    add("--ants", type=whole_number(1), default=64, metavar="N", help="of each colony")
-    add("--seeds", type=whole_number(2), default=20, metavar="N", help="how many, from 0 on")
-    add("--epsilon", type=float, nargs="+", default=[0.0, 0.01], metavar="X", help="one or more")
-    add("--study", type=Path, metavar="FOLDER", help="results of colony.py study, for comparison")
+    add("--worlds", **worlds, help="kinds of world, as in colony.py study --world-kinds")
+    add("--ants", type=whole_number(1), default=64, metavar="N", help="ants of a colony")
+    add("--seeds", type=whole_number(2), default=20, metavar="N", help="number of seeds, from 0")
+    epsilons = "exploration rates"
+    add("--epsilon", type=float, nargs="+", default=[0.0, 0.01], metavar="X", help=epsilons)
+    add("--study", type=Path, metavar="FOLDER", help="compare with results of colony.py study")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
 
@@ -126,7 +127,7 @@ def read_study(folder: Path) -> Learned:
 
 
 def row(outcome: ColonyEpisodes, learned: Mapping[int, float]) -> str:
-    """Return what the ants of one kind of world do; `learned` has deliveries of others by seed."""
+    """Return a row of the table; `learned` has deliveries of the study's ants by seed."""
     deliveries = outcome.deliveries.mean(axis=0) * 1000 / TICKS
     # An episode without any delivery counts with all its ticks.
     first = np.where(outcome.first_delivery < 0, TICKS, outcome.first_delivery).mean()
@@ -140,8 +141,8 @@ def row(outcome: ColonyEpisodes, learned: Mapping[int, float]) -> str:
     missing = set(range(len(deliveries))) - learned.keys()
     if missing:
         raise AntsError(
-            f"the study lacks seed {min(missing)}; take its number of seeds with --seeds, or run "
-            "it with more."
+            f"the study has no seed {min(missing)}; reduce --seeds to its number of seeds, or run "
+            "the study with more."
         )
     taught = np.array([learned[seed] for seed in range(len(deliveries))])
     more = taught - deliveries

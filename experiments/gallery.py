@@ -1,16 +1,17 @@
-"""Makes all pictures of the README and the docs anew: those of `renders/` and of `docs/figures/`.
+"""Draw all pictures of the README and the docs, in `renders/` and `docs/figures/`.
 
-`render.py` makes those of `renders/`, with the arguments below. Those of `docs/figures/` come from
-the finished studies in `results/compare`, `results/colony` and `results/bridge`, and from a run of
-a million ants. If a study is missing, the command runs it first: the comparison takes less than a
-minute on two cores; see docs/colony.md and docs/bridge.md for the other two.
+`render.py` draws the pictures in `renders/`, with arguments from this script. The pictures in
+`docs/figures/` are from the results in `results/compare`, `results/colony` and `results/bridge`,
+and from a run of a million ants. If results are missing, the script runs the study first. The
+comparison takes less than a minute on two cores; see docs/colony.md and docs/bridge.md for the
+other two.
 """
 
 from __future__ import annotations
 
 from taichi_ants.studies.interruption import stoppable
 
-with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     import io
     import shutil
@@ -27,7 +28,7 @@ with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard
 ROOT = Path(__file__).parents[1]
 _MAP = str(ROOT / "experiments" / "maps" / "garden.txt")
 
-# That of the study's median seed: 64 ants that queue, trained together in worlds of far piles.
+# The policy of the study's median seed: 64 ants with rules for queues, trained on far piles.
 _POLICY = str(ROOT / "experiments" / "policies" / "far_piles.npz")
 _COLONY = [
     *("colony", "--policy", _POLICY, "--world", "far_piles", "--world.seed", "3", "--ants", "64"),
@@ -51,14 +52,14 @@ GALLERY: dict[str, list[str]] = {
 }
 
 
-# The page of the same colony, while an ant of it is followed, and the live page after some episodes
-# of learning; they need Chromium and Playwright.
+# The page of the same colony with a followed ant, and the live page after some episodes of
+# learning; they need Chromium and Playwright.
 VIEWER, LIVE = "viewer.png", "live.png"
 _FOLLOWED, _TICK, _WINDOW = 12, 330, (1280, 760)
 _LEARNED, _LIVE_WINDOW = 25_000, (1440, 860)
 _WALL = (3, 12, 0), (0, 11, 4)  # cells between which a wall of rock is drawn
 
-# Tracked figure -> the figure of a study that it is.
+# Figure in docs/figures -> figure in results.
 FIGURES = {
     "learning_curves.png": "compare/figures/learning_curves.png",
     "return_against_deliveries.png": "compare/figures/return_against_deliveries.png",
@@ -78,20 +79,17 @@ MILLION = [
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--folder", type=Path, default=ROOT, help="put renders/ and docs/figures/ there")
-    add(
-        "--no-figures",
-        action="store_true",
-        help="only renders/ and pictures of pages, half a minute",
-    )
+    add("--folder", type=Path, default=ROOT, help="write renders/ and docs/figures/ here")
+    skip = "make only renders/ and pictures of pages, in half a minute"
+    add("--no-figures", action="store_true", help=skip)
     return parser.parse_args(arguments)
 
 
 def make_gallery(settings: argparse.Namespace) -> None:
-    """Make all pictures; the ones that exist are replaced."""
+    """Make all pictures, and replace existing ones."""
     for name, arguments in GALLERY.items():
         path = settings.folder / "renders" / name
         render.show(render.parse_arguments([*arguments, "--out", str(path)]))
@@ -105,14 +103,14 @@ def make_gallery(settings: argparse.Namespace) -> None:
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """A browser, if there is one; else None."""
+    """Yield a browser, or None if there is none."""
     path = shutil.which("chromium") or shutil.which("google-chrome")
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
         path = None
     if path is None:
-        print(f"{VIEWER} and {LIVE} are left out: they need Chromium and Playwright")
+        print(f"Skipped {VIEWER} and {LIVE}, which need Chromium and Playwright.")
         yield None
         return
     with sync_playwright() as playwright:
@@ -122,7 +120,7 @@ def chromium() -> Iterator[Any]:
 
 
 def opened(browser: Any, url: str, window: tuple[int, int]) -> Any:
-    """A page in a window of that size, with the world drawn."""
+    """Return a page in a window of this size, after the world is drawn."""
     width, height = window
     page = browser.new_page(viewport={"width": width, "height": height}, bypass_csp=True)
     page.goto(url)
@@ -143,7 +141,7 @@ def make_viewer(folder: Path, browser: Any) -> None:
 
 
 def make_live(folder: Path, browser: Any) -> None:
-    """Take a picture of the live page, where ants have learned and a wall has just been drawn."""
+    """Take a picture of the live page, after ants have learned and a wall has been drawn."""
     from taichi_ants.live.choices import Choices
     from taichi_ants.live.server import Room
     from taichi_ants.live.session import Session
@@ -154,7 +152,7 @@ def make_live(folder: Path, browser: Any) -> None:
     thread = threading.Thread(target=room.run, daemon=True)
     thread.start()
     page = opened(browser, room.url, _LIVE_WINDOW)
-    page.fill("#speed", "100")  # as fast as it can
+    page.fill("#speed", "100")  # as fast as possible
     page.click("#play")
     page.wait_for_function(f"live.state.ticks >= {_LEARNED}")
     page.fill("#speed", "90")
@@ -192,9 +190,9 @@ def _keep(picture: bytes, path: Path) -> None:
 
 
 def make_figures(folder: Path) -> None:
-    """Keep some figures of the studies, and of a million ants; a missing study is run first.
+    """Copy figures of the studies and of a million ants, after running missing studies.
 
-    They are kept in 256 colours, so that their history stays small.
+    They have 256 colours, so that their history in Git stays small.
     """
     from PIL import Image
 

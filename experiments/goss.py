@@ -1,15 +1,15 @@
-"""The double bridge of Goss and others: how often a colony's ants take the shorter branch.
+"""Simulate the double bridge of Goss and others, and print the shares of the shorter branch.
 
-Prints the distribution of colonies by the share of ants on the short branch, for branches whose
-lengths have the ratio r, beside the published one, and the standard error for so many colonies. In
-the last rows the short branch is missing at first and opens late. See docs/baselines.md.
+For branches with a ratio r of their lengths, the script prints the distribution of colonies by the
+share of ants on the short branch, the published distribution, and the standard error. In the last
+rows, the short branch opens late. See docs/baselines.md.
 """
 
 from __future__ import annotations
 
 from taichi_ants.studies.interruption import stoppable
 
-with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
 
     from taichi_ants.baselines.goss import (
@@ -24,43 +24,46 @@ with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard
     from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 AS_PUBLISHED = 1000  # ants that choose
-MOST_CHOICES = 1 << 32  # of all colonies; each takes a byte
+MOST_CHOICES = 1 << 32  # of all colonies together; each takes a byte
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--colonies", type=whole_number(1, 10_000_000), default=100_000, help="for each ratio")
+    colonies = "number of colonies for each ratio"
+    add("--colonies", type=whole_number(1, 10_000_000), default=100_000, help=colonies)
     add(
         "--choices",
         type=whole_number(4, 10_000_000),
         default=AS_PUBLISHED,
         metavar="N",
-        help="ants that choose in each colony, an even number, of which the second half counts "
-        "(default: %(default)s, as published); where the short branch opens late, N choose before "
-        "and N after",
+        help="even number of ants that choose in each colony, of which the second half counts "
+        "(default: %(default)s, as published); if the short branch opens late, N choose before "
+        "and N after that",
     )
-    add("--seed", type=whole_number(), default=0, help="of all colonies")
+    add("--seed", type=whole_number(), default=0, help="seed of all colonies")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """Print a row for each ratio, and the published one if as many ants choose."""
+    """Print a row for each ratio, and the published row if `--choices` is as published."""
     n, colonies = settings.choices, settings.colonies
     if n % 2:
-        raise AntsError(f"--choices is {n}; it must be even, as many leave the nest as the food.")
+        raise AntsError(
+            f"--choices is {n}; it must be even, because as many ants leave the nest as the food."
+        )
     if 2 * n * colonies > MOST_CHOICES:
         raise AntsError(
-            f"--choices {n} with --colonies {colonies} takes {2 * n * colonies / 1e9:.0f} GB; "
-            f"their product may be at most {MOST_CHOICES // 2}, so take fewer of either."
+            f"--choices {n} with --colonies {colonies} needs {2 * n * colonies / 1e9:.0f} GB; "
+            f"their product must be at most {MOST_CHOICES // 2}, so reduce either of them."
         )
     rows = [(str(r), r, 0, published) for r, published in PUBLISHED.items()]
     rows += [(f"{LATE_RATIO}, opens late", LATE_RATIO, n, PUBLISHED_LATE)]
     print(
-        f"percent of colonies by the share of ants {n // 2 + 1} to {n} on the short branch; where "
-        f"it opens after\nant {n}, of ants {n + n // 2 + 1} to {2 * n}\n"
+        f"Percentage of colonies by the share of ants {n // 2 + 1} to {n} on the short branch.\n"
+        f"If that branch opens after ant {n}: ants {n + n // 2 + 1} to {2 * n}.\n"
     )
     classes = (f"{low}-{low + 20} %" for low in range(0, 100, 20))
     print(f"  {'r':25}" + "".join(f"{one:>9}" for one in classes))
@@ -72,10 +75,10 @@ def print_table(settings: argparse.Namespace) -> None:
             shown["published"] = published
         for kind, row in shown.items():
             print(f"  {name:15} {kind:9}" + "".join(f"{percent:9.1f}" for percent in row))
-    # A share p of N colonies has the standard error sqrt(p (1 - p) / N), most with p one half.
+    # A share p of N colonies has the standard error sqrt(p (1 - p) / N), the largest with p = 1/2.
     print(
-        f"\nour shares are of {count(colonies, 'colony')} for each r: their standard error is at "
-        f"most {50 / colonies**0.5:.1f} points"
+        f"\nOur shares are of {count(colonies, 'colony')} for each r, with a standard error of at "
+        f"most {50 / colonies**0.5:.1f} percentage points."
     )
 
 

@@ -1,7 +1,7 @@
-"""What ants gain from seeing more: all observations with all learners, at equal numbers of ticks.
+"""Compare all observations with all learners, at equal numbers of ticks.
 
-The sweep is experiments/sweeps/observations.toml; copy and change it for your own, which
-experiments/sweep.py runs. See docs/observations.md.
+The sweep is experiments/sweeps/observations.toml. For your own sweep, copy and change that file,
+and run it with experiments/sweep.py. See docs/observations.md.
 """
 
 from pathlib import Path

@@ -1,16 +1,17 @@
-"""Learning from data alone: how many, of whom, and can a policy be judged before it is tried?
+"""Learn offline from recorded data, and evaluate policies from data.
 
-Prints three tables. (a) How often policies deliver that were learned offline, by the number of
-transitions, who made them, and the learner, beside online Q-learning after as many. (b) How well
-off-policy evaluation ranks ten policies. (c) What a colony delivers with policies learned from data
-of ants that appear and die. Means with 95 % intervals over seeds. See docs/offline.md.
+The script prints three tables, with means and 95 % intervals over seeds. Table (a) has the share of
+rollouts that deliver with policies learned offline, by behaviour policy, number of transitions and
+learner, and with online Q-learning after as many transitions. Table (b) shows how well off-policy
+evaluation ranks ten policies. Table (c) has the deliveries of a colony with policies learned from
+data of ants that are born and die. See docs/offline.md.
 """
 
 from __future__ import annotations
 
 from taichi_ants.studies.interruption import stoppable
 
-with stoppable():  # all this takes a moment, in which Ctrl-C shall be heard too
+with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     from collections.abc import Callable
     from dataclasses import replace
@@ -40,7 +41,7 @@ with stoppable():  # all this takes a moment, in which Ctrl-C shall be heard too
     WORLD = worlds.paper()
     FORAGING = load_policy(Path(__file__).parent / "policies" / "foraging.npz")
 
-STILL = Task(evaporation_in_evaluation=False)  # trails stay, as where ants learn
+STILL = Task(evaporation_in_evaluation=False)  # without evaporation, as in training
 ONLINE = TrainingConfig("q_learning", 0.1, 0.9, epsilon=0.3, epsilon_decay=0.99)
 LEARNERS: dict[str, Callable[..., np.ndarray]] = {
     "batch Q-learning": lambda data: offline.batch_q_learning(data, sweeps=20, by_run=True),
@@ -49,7 +50,7 @@ LEARNERS: dict[str, Callable[..., np.ndarray]] = {
 }
 SIZES = (1000, 3000, 10_000, 30_000, 100_000)
 
-# Off-policy evaluation: target policies explore a little, and values hardly see past 100 steps.
+# Off-policy evaluation: target policies explore a little; rewards after 100 steps hardly count.
 HORIZON, DISCOUNT, EPSILON = 100, 0.95, 0.1
 INTERVALS = {"resamples": 40, "level": 0.9}
 JUDGES: dict[str, Callable[..., offline.PolicyValues]] = {
@@ -63,16 +64,16 @@ LIFESPANS, TICKS, COLONY_SIZES = (None, 100, 50), 250, (3000, 15_000)
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--seeds", type=whole_number(2), default=10, metavar="N", help="how many, from 0 on")
-    add("--markdown", action="store_true", help="print tables for documents")
+    add("--seeds", type=whole_number(2), default=10, metavar="N", help="number of seeds, from 0")
+    add("--markdown", action="store_true", help="print tables as Markdown")
     return parser.parse_args(arguments)
 
 
 def print_tables(settings: argparse.Namespace) -> None:
-    """The three tables, each as soon as it is done."""
+    """Print the three tables, each as soon as it is finished."""
     seeds = range(settings.seeds)
     for title, table_of in (("data", learning), ("evaluation", judging), ("colonies", dying)):
         with progress_bar(title) as progress:
@@ -82,13 +83,13 @@ def print_tables(settings: argparse.Namespace) -> None:
 
 
 def shown(values: np.ndarray, digits: int = 2) -> str:
-    """The mean over seeds with its interval."""
+    """Return a mean over seeds with its interval as text."""
     (low,), (high,) = bootstrap_interval(np.asarray(values, float)[None])
     return f"{number(np.mean(values), digits)} {interval(low, high, digits)}"
 
 
 def learning(seeds: range, progress: Callable[[float], None]) -> Table:
-    """(a) The share of rollouts that deliver."""
+    """Return table (a), the share of rollouts that deliver."""
     good = train(WORLD, ONLINE, seeds).q_values[0]
     sources: dict[str, Callable[[], Dataset]] = {
         "random": lambda: record(WORLD, None, 250, seeds, task=STILL),
@@ -100,7 +101,7 @@ def learning(seeds: range, progress: Callable[[float], None]) -> Table:
     def delivered(q_values: np.ndarray) -> np.ndarray:
         return evaluate(WORLD, q_values, 20, seeds, task=STILL).deliveries.mean(axis=1)
 
-    # A learner that goes over its own history once has learned what it learned online.
+    # One sweep over its own history gives a learner the same table as online learning.
     history = sources["a learner's history"]()
     online = [
         delivered(offline.batch_q_learning(history.first(n), sweeps=1, by_run=True)) for n in SIZES
@@ -124,7 +125,7 @@ def learning(seeds: range, progress: Callable[[float], None]) -> Table:
 
 
 def judging(seeds: range, progress: Callable[[float], None]) -> Table:
-    """(b) Rank correlation of estimated with true values, and what goes with it."""
+    """Return table (b), the rank correlation of estimated and true values, loss and coverage."""
     stages = [train(WORLD, ONLINE, (1000, 1001), n).q_values[0] for n in (1, 3, 10, 100)]
     policies = np.concatenate([[random_policy(), trail_follower()], *stages])
     true = np.array([_returns(q, 5000, 999, EPSILON).mean() for q in policies])
@@ -147,9 +148,9 @@ def judging(seeds: range, progress: Callable[[float], None]) -> Table:
             progress(len(rows) / (9 * len(JUDGES)))
     columns = ("Behaviour", "method", "episodes", "rank correlation", "loss", "covered %", "sample")
     notes = (
-        f"True values, of discount {DISCOUNT}: {', '.join(number(v) for v in np.sort(true))}.",
-        "Loss: how much less the policy is worth that is judged best than the best one. Covered: "
-        "true values that lie in their 90 % bootstrap interval over episodes. Sample: the median "
+        f"True values, with discount {DISCOUNT}: {', '.join(number(v) for v in np.sort(true))}.",
+        "Loss: the value of the best policy minus that of the policy with the best estimate. "
+        "Covered: true values in their 90 % bootstrap interval over episodes. Sample: the median "
         "effective sample size.",
     )
     return Table("(b) Ranking ten policies before they are tried", columns, rows, notes, 2)
@@ -164,7 +165,7 @@ def _sampled(*given: object, weighted: bool) -> offline.PolicyValues:
 
 
 def _scores(found: offline.PolicyValues, true: np.ndarray) -> tuple[float, ...]:
-    """Rank correlation (Spearman), loss, share of intervals that cover, effective sample size."""
+    """Return Spearman's correlation, loss, coverage of intervals, and effective sample size."""
     from scipy.stats import rankdata
 
     ranks = np.corrcoef(rankdata(found.value), rankdata(true))[0, 1] if np.ptp(found.value) else 0.0
@@ -174,7 +175,7 @@ def _scores(found: offline.PolicyValues, true: np.ndarray) -> tuple[float, ...]:
 
 
 def dying(seeds: range, progress: Callable[[float], None]) -> Table:
-    """(c) What 64 ants deliver by what was learned from data of ants that do not live long."""
+    """Return table (c), deliveries of 64 ants with policies from data of ants that die early."""
     rows = []
     cases = [(epsilon, lifespan) for epsilon in (0.3, 0.7) for lifespan in LIFESPANS]
     for done, (epsilon, lifespan) in enumerate(cases):
@@ -183,7 +184,7 @@ def dying(seeds: range, progress: Callable[[float], None]) -> Table:
         while data is None or np.bincount(data.run).min() < max(COLONY_SIZES):
             data = record_colony(_colony(seeds, life, epsilon), episodes, TICKS)
             episodes *= 2
-        # The mistake that is easily made: death as a state after which nothing comes.
+        # A common mistake: death as a terminal state.
         dies = data.truncated & (data.step + 1 < TICKS)
         mistaken = replace(
             data, terminated=data.terminated | dies, truncated=data.truncated & ~dies
@@ -198,14 +199,14 @@ def dying(seeds: range, progress: Callable[[float], None]) -> Table:
             rows.append([f"epsilon {epsilon:g}", lived, f"{n}", *cells])
         progress((done + 1) / len(cases))
     own = shown(_delivered(seeds, FORAGING.q_values), 0)
-    notes = (f"The behaviour policy itself, without exploring, delivers {own}.",)
+    notes = (f"The behaviour policy itself, without exploration, delivers {own}.",)
     columns = ("Behaviour", "ants live", "transitions", *LEARNERS, "death as an end", "states seen")
-    title = "(c) Foods per 1000 ticks, of 64 ants that live for ever, by data of those that do not"
+    title = "(c) Deliveries per 1000 ticks of 64 ants that do not die, by data of ants that do"
     return Table(title, columns, rows, notes, 2)
 
 
 def _colony(seeds: range, life: Life, epsilon: float, q_values: np.ndarray | None = None) -> Colony:
-    """64 ants that follow a policy, that of the foraging rules if none is given."""
+    """Return 64 ants that follow a policy, by default that of the foraging rules."""
     table = FORAGING.q_values if q_values is None else q_values
     training = TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0)
     task = replace(FORAGING.task, life=life)
@@ -214,7 +215,7 @@ def _colony(seeds: range, life: Life, epsilon: float, q_values: np.ndarray | Non
 
 
 def _delivered(seeds: range, q_values: np.ndarray) -> np.ndarray:
-    """Foods in 1000 ticks, by colony."""
+    """Return the deliveries in 1000 ticks of each colony."""
     return _colony(seeds, Life(regrowth=0), 0.01, q_values).run(1, 1000).deliveries[0]
 
 

@@ -1,6 +1,6 @@
-"""Pictures of ants: an episode, a colony, learning made visible, or a policy sheet.
+"""Draw an episode, a colony, learning, or a policy.
 
-`render.py episode --help` tells the options of an episode, and so on.
+See `render.py episode --help`, for example, for the options of an episode.
 """
 
 from taichi_ants.commands import run

@@ -1,4 +1,4 @@
-"""A sweep over any settings of the world, the task, the learner or the colony, from a TOML file.
+"""Sweep any settings of the world, the task, the learner or the colony, from a TOML file.
 
 python experiments/sweep.py experiments/sweeps/learning_rates.toml
 """

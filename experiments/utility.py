@@ -1,18 +1,18 @@
-"""Ants for which pheromone is a utility (Panait and Luke 2004) on the maps of the package.
+"""Run ants whose pheromones are utilities (Panait and Luke 2004) on the maps of the package.
 
-Prints, for each kind of world and number of ants that fit into a cell: deliveries per 1000 ticks
-with their 95 % interval over seeds, the tick of the first delivery, in how many colonies the path
-found was ever a shortest, after how many ticks (the median of those), and how long it is at the
-end, as a multiple of the shortest (the mean of the colonies that have one, and how many do). The
-path found is a walk from the nest to food and back that always takes the highest utility. See
-docs/baselines.md.
+The script prints a row for each kind of world and number of ants that fit into a cell. It has the
+deliveries per 1000 ticks with their 95 % interval over seeds, and the tick of the first delivery.
+The path of a colony is a walk from the nest to food and back that always follows the highest
+utility. The row also has the number of colonies that ever had a shortest path, and the median of
+the ticks when they first had it. The last columns are the length of paths at the end, as a multiple
+of the shortest (the mean of the colonies with a path), and their number. See docs/baselines.md.
 """
 
 from __future__ import annotations
 
 from taichi_ants.studies.interruption import stoppable
 
-with stoppable():  # these imports take a moment, in which Ctrl-C shall be heard too
+with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     from itertools import product
 
@@ -35,23 +35,25 @@ HEAD = "world   room  deliveries  interval      first  found by  tick  length  a
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--ants", type=whole_number(1), default=64, metavar="N", help="of each colony")
-    add("--room", type=whole_number(1), nargs="+", default=[1, 10], metavar="N", help="in a cell")
-    add("--ticks", type=whole_number(1), default=1000, metavar="N", help="how long")
-    add("--seeds", type=whole_number(2), default=20, metavar="N", help="how many, from 0 on")
-    add("--discount", type=float, default=0.9, metavar="X", help="of what is backed up")
-    add("--evaporation", type=float, default=0.001, metavar="X", help="the share lost per tick")
-    add("--exploration", type=float, default=0.1, metavar="X", help="share of random steps")
-    add("--momentum", type=float, default=0.8, metavar="X", help="to go on where nothing leads")
+    number, room = whole_number(1), "largest numbers of ants in a cell"
+    add("--ants", type=number, default=64, metavar="N", help="ants of a colony")
+    add("--room", type=number, nargs="+", default=[1, 10], metavar="N", help=room)
+    add("--ticks", type=number, default=1000, metavar="N", help="ticks to run")
+    add("--seeds", type=whole_number(2), default=20, metavar="N", help="number of seeds, from 0")
+    add("--discount", type=float, default=0.9, metavar="X", help="discount of backed-up utilities")
+    add("--evaporation", type=float, default=0.001, metavar="X", help="share lost per tick")
+    add("--exploration", type=float, default=0.1, metavar="X", help="probability of a random step")
+    momentum = "probability of going straight on if no utility is known"
+    add("--momentum", type=float, default=0.8, metavar="X", help=momentum)
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
     return parser.parse_args(arguments)
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """A row for each kind of world and room of a cell, once all are known to be allowed."""
+    """Print a row for each kind of world and room of a cell, after building all worlds."""
     places = {kind: [build(n) for n in range(settings.seeds)] for kind, build in WORLDS.items()}
     rows: list[str] = []
     with progress_bar("Ants that back up utilities") as progress:
@@ -63,14 +65,14 @@ def print_table(settings: argparse.Namespace) -> None:
 
 
 def run(settings: argparse.Namespace, world: World, seed: int, room: int) -> Foraging:
-    """Four colonies in one world."""
+    """Return the outcome of four colonies in one world."""
     names = ("ticks", "ants", "discount", "evaporation", "exploration", "momentum", "threads")
     given = {name: getattr(settings, name) for name in names}
     return forage(world, colonies=EPISODES, capacity=room, seed=seed, **given)
 
 
 def row(outcomes: list[Foraging]) -> str:
-    """What all colonies in a kind of world did."""
+    """Return the row of a kind of world."""
     deliveries = 1000 * np.array([one.deliveries.mean() for one in outcomes])
     (low,), (high,) = bootstrap_interval(deliveries[None])
     first = np.concatenate([one.first_delivery for one in outcomes])

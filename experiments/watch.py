@@ -1,6 +1,6 @@
-"""Ants that one watches and changes while they run, in a browser.
+"""Watch and change ants in a browser while they run.
 
-`watch.py --help` tells the options; docs/watching.md tells what the page can do.
+See `watch.py --help` for the options, and docs/watching.md for the page.
 """
 
 from taichi_ants.commands import run

@@ -1,7 +1,7 @@
-"""An example of a learner of one's own: hysteretic Q-learning (Matignon et al. 2007).
+"""An example of your own learner: hysteretic Q-learning (Matignon et al. 2007).
 
-It learns from bad surprises more slowly than from good ones, which helps where other ants, not the
-ant's own action, may be to blame. Try it beside Q-learning:
+It learns more slowly from negative TD errors than from positive ones, which helps if other ants may
+have caused a bad outcome. To compare it with Q-learning:
 
     python experiments/compare.py --plugin experiments/plugins/hysteretic.py \
         --learners q_learning hysteretic --out results/hysteretic
@@ -11,14 +11,14 @@ import taichi as ti
 
 from taichi_ants.learners import register, td_learner
 
-PATIENCE = 0.2  # the share of a bad surprise that is learned
+PATIENCE = 0.2  # factor on negative TD errors
 
 
 @ti.func
 def td_error(value, reward, discount, next_values, next_action, epsilon):
-    """The TD error of Q-learning, made smaller where it is negative."""
+    """Return the TD error of Q-learning, reduced if it is negative."""
     error = reward + discount * next_values.max() - value
     return ti.select(error < 0, PATIENCE * error, error)
 
 
-register(td_learner("hysteretic", td_error, summary="Q-learning that is slow to give up"))
+register(td_learner("hysteretic", td_error, summary="Q-learning that is slow to lower values"))

@@ -1,4 +1,4 @@
-"""What to make of results: statistics over seeds, baselines, figures, the paper's claims tested.
+"""Analysis of results: statistics over seeds, baselines, figures, and tests of the paper's claims.
 
-Imports no Taichi; matplotlib and SciPy are imported where they are used.
+It does not import Taichi; it imports matplotlib and SciPy only where it uses them.
 """

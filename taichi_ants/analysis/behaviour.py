@@ -1,8 +1,8 @@
 """Behaviours of ants that follow a final policy: deliver, or collect small rewards without end.
 
-The step onto a trail (T), and with food the step nearer to the queen (S), are paid, so that a
-policy can live on walking to and fro, or in circles. A mean over such runs and runs that deliver
-means nothing: runs are counted by what they do.
+A step onto a trail (T) is rewarded, and so is a carrier's step towards the queen (S). A policy can
+therefore collect rewards by walking to and fro or in circles, without a delivery. The mean of such
+runs and of runs that deliver describes neither, so runs are counted by behaviour.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from taichi_ants.task.constants import N_STATES, RIGHT, SEES_LURE
 if TYPE_CHECKING:
     from taichi_ants.engines.runs.traces import Trace
 
-# A behaviour is a number, its place in this list.
+# A behaviour is an index into this list.
 BEHAVIOURS = ("delivers", "walks the trail", "circles with food", "other")
 DELIVERS, WALKS, CIRCLES, OTHER = range(len(BEHAVIOURS))
-NAMES = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # of columns, files
-# For reports; of an episode without delivery its second half counts.
+NAMES = tuple(name.replace(" ", "_") for name in BEHAVIOURS)  # in columns and file names
+# For reports. Of an episode without a delivery, the second half counts.
 DEFINITIONS = (
     "the episode ends with a delivery",
     "without food, at least every fourth step leads onto a trail",
@@ -31,10 +31,10 @@ _PAID_SHARE = 0.25
 
 
 def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return what the ant does in each of m episodes, and what it earns, whatever steps are paid.
+    """Return the behaviour and the return of the ant in each of m episodes.
 
-    Places in `BEHAVIOURS`, int8 (m,), and returns, int64 (m,). An episode without delivery uses
-    all of its steps, `max_steps`.
+    Behaviours are indices into `BEHAVIOURS`, int8 (m,); returns are int64 (m,). An episode without
+    a delivery has `max_steps` steps.
     """
     episode = np.asarray(trace.episodes) - trace.episodes[0]
     late = np.asarray(trace.steps) >= max_steps // 2
@@ -43,7 +43,7 @@ def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
         return np.bincount(episode[which], minlength=episode[-1] + 1)
 
     carries = trace.percepts >= N_STATES // 2
-    # Paid is a move onto a cell that looks T or S.
+    # Moves onto a cell of the kind T or S are rewarded.
     ahead = trace.percepts >> (4 - 2 * np.minimum(trace.actions, RIGHT)) & 3
     paid = late & (trace.actions <= RIGHT) & (ahead == SEES_LURE)
     steps, with_food = count(late), count(late & carries)
@@ -56,6 +56,6 @@ def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def counts(behaviours: np.ndarray) -> dict[int, int]:
-    """How many runs do what, without what nobody does, in the order of `BEHAVIOURS`."""
+    """Return the number of runs by behaviour, in the order of `BEHAVIOURS`, without zeros."""
     number_of = np.bincount(np.ravel(behaviours), minlength=len(BEHAVIOURS)).tolist()
     return {code: number for code, number in enumerate(number_of) if number}

@@ -1,4 +1,4 @@
-"""The double bridge: the share of a colony's ants that crosses by the short branch."""
+"""Results of the double bridge: the share of a colony's ants that take the short branch."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ if TYPE_CHECKING:
 
 SHORT_RIGHT, SHORT_LEFT, EQUAL = "23 and 36", "36 and 23", "23 and 23, food ahead"
 EQUAL_ASIDE = "23 and 23, food aside"
-LATE = "36, later 23 too"  # the short branch opens when half of the time is over
+LATE = "36, later 23 too"  # the short branch opens halfway through the evaluation
 BRIDGES = (SHORT_RIGHT, SHORT_LEFT, EQUAL, EQUAL_ASIDE, LATE)
 LOADS = ("foragers", "carriers")
-WINDOWS = 10  # of an evaluation; the late share is that of the second half
+WINDOWS = 10  # parts of an evaluation; the late share is that of the second half
 
 
 @dataclass(frozen=True)
 class Design:
-    """The rules by which a colony lives, and the bridge on which it learns.
+    """The rules of a colony and the bridge on which it learns.
 
     Attributes:
         rules: "queueing" or "foraging", see `taichi_ants.task`.
-        aside: Of the bridge, see `worlds.double_bridge`.
-        slope: Of the trail; its level is such that an ant lays it for 50 ticks.
-        evaporation: "linear", by 1 a tick, "none", or the half-life in ticks as a number.
+        aside: The argument of `worlds.double_bridge`.
+        slope: The slope of the trail. The deposit is chosen so that an ant lays it for 50 ticks.
+        evaporation: "linear" (by 1 per tick), "none", or the half-life in ticks as a number.
     """
 
     rules: str = "queueing"
@@ -48,7 +48,7 @@ class Design:
     evaporation: str = "linear"
 
 
-# What is varied, each alone, from the design that all compare with.
+# Settings and the values to which each is changed alone, from the default design.
 PANELS: dict[str, tuple[Any, ...]] = {
     "ants": (8, 16, 32, 64),
     "slope": (1, 2, 5, 10, 20),
@@ -61,7 +61,7 @@ DESIGNS = tuple(
         + [replace(Design(), **{name: one}) for name, some in PANELS.items() for one in some]
     )
 )
-# Those whose colonies are also followed where the short branch opens late.
+# Designs that are also evaluated on a bridge whose short branch opens late.
 LATE_DESIGNS = (Design(), *OTHERS, Design(evaporation="none"))
 
 # Crossings by design and bridge, int64 (windows, loads, branches, seeds), the short branch first.
@@ -69,9 +69,9 @@ Crossings = Mapping[Design, Mapping[str, np.ndarray]]
 
 
 def bridges(design: Design) -> dict[str, dict[str, Any]]:
-    """Return the bridges on which its colonies are followed: the arguments of `double_bridge`.
+    """Return the bridges on which a design is evaluated, as arguments of `double_bridge`.
 
-    On the bridge `LATE` the short branch is rock for the first half of the time.
+    On the bridge `LATE`, rock closes the short branch for the first half of the time.
     """
     unequal: dict[str, Any] = {"short": 23, "long": 36, "aside": design.aside}
     equal = {"short": 23, "long": 23}
@@ -84,17 +84,17 @@ def bridges(design: Design) -> dict[str, dict[str, Any]]:
 
 
 def length(bridge: str, ticks: int) -> int:
-    """Return for how many ticks colonies are followed on a bridge, of those that the study asks."""
+    """Return the length in ticks of the evaluation on a bridge; `LATE` takes twice as long."""
     return 2 * ticks if bridge == LATE else ticks
 
 
 def late_shares(crossed: np.ndarray) -> np.ndarray:
-    """The share by the short branch in the second half, float64 (loads, seeds), nan where none."""
+    """Return the short branch's share in the second half, float64 (loads, seeds), nan if none."""
     return _shares(crossed[len(crossed) // 2 :].sum(axis=0))
 
 
 def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, Any]]:
-    """A row for each design, bridge, seed, load and window, with both counts."""
+    """Return a row for each design, bridge, seed, load and window, with the counts of crossings."""
     return [
         {
             **asdict(design),
@@ -113,7 +113,7 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
 def write_results(
     folder: Path, found: Crossings, seeds: Sequence[int], ticks: int, draws: bool
 ) -> None:
-    """Write counts, report and figures; colonies were followed for so many `ticks`."""
+    """Write counts, report and, if `draws`, figures of evaluations of `ticks` ticks."""
     table = rows(found, seeds, ticks)
     files.write_csv(folder / "shares.csv", table, list(table[0]))
     files.write_text(folder / REPORT, report(found, ticks))
@@ -124,7 +124,7 @@ def write_results(
 
 
 def report(found: Crossings, ticks: int) -> str:
-    """Return the late shares of all designs, and those after a late opening, as tables of text."""
+    """Return tables of the late shares of all designs and of the shares after a late opening."""
     headers = [*asdict(Design())]
     lines, late = [], []
     for design, bridges in found.items():
@@ -140,17 +140,17 @@ def report(found: Crossings, ticks: int) -> str:
                 late.append([*row, load, *means, _cell(last), colonies])
     means_of = _means(found)
     shares = Table(
-        f"Who crosses by the short branch, second half: {means_of}",
+        f"Share of the short branch, second half: {means_of}",
         [*headers, "branches", *(f"{load}, %" for load in LOADS)],
         lines,
         text_columns=len(headers) + 1,
     )
     edges = [w * 2 * ticks // WINDOWS for w in range(WINDOWS // 2 + 1)]
     since = Table(
-        f"Who crosses by the short branch that opens after {ticks} ticks, by ticks since then",
+        f"Share of a short branch that opens after {ticks} ticks, by ticks since then",
         [*headers, "%", *(f"{a} to\n{b}" for a, b in pairwise(edges)), "colonies\nabove 50 %"],
         late,
-        [f"{sentence(means_of)}. Colonies: by the last column of ticks."],
+        [f"{sentence(means_of)}. Colonies are counted in the last column of ticks."],
         text_columns=len(headers) + 1,
     )
     return plain_text([shares, since], 120)
@@ -164,13 +164,13 @@ def _cell(values: np.ndarray) -> str:
 def _means(found: Crossings) -> str:
     seeds = next(iter(found[Design()].values())).shape[-1]
     if seeds < LEAST_SEEDS:
-        few = f"too few for intervals (take {LEAST_SEEDS} or more)"
+        few = f"too few for intervals (use {LEAST_SEEDS} or more)"
         return f"means over {count(seeds, 'seed')}, {few}"
     return f"means over {seeds} seeds with 95 % intervals"
 
 
 def draw(path: Path, found: Crossings, ticks: int) -> None:
-    """Draw the shares over time on three bridges, and what else moves them."""
+    """Draw the shares over time on three bridges, and against three settings."""
     titles = {
         SHORT_RIGHT: "Short branch to the right",
         SHORT_LEFT: "Short branch to the left",
@@ -193,7 +193,7 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
         caption = (
             f"{sentence(_means(found))}. Above: {Design().ants} ants.\n"
             "Below, food aside: one setting varies; second half of the time, mean of both mirror "
-            "images.\nEvaporation: none, 1 a tick (linear), or a half-life in ticks."
+            "images.\nEvaporation: none, 1 per tick (linear), or a half-life in ticks."
         )
         for axes in (above[0], below[0]):
             axes.set(ylabel="% by the short branch", ylim=(0, 103))
@@ -203,7 +203,7 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
 
 
 def _of_both_sides(found: Crossings, name: str, value: Any) -> np.ndarray:
-    """The late shares where one setting is varied, the mean of both mirror images."""
+    """Return the late shares with one setting changed, as the mean of both mirror images."""
     bridges = found[replace(Design(), **{name: value})]
     return np.mean([late_shares(bridges[one]) for one in (SHORT_RIGHT, SHORT_LEFT)], axis=0)
 
@@ -225,9 +225,9 @@ def draw_late(path: Path, found: Crossings, ticks: int) -> None:
             axes.set(title=title, xlabel="tick", xticks=[0, ticks, 2 * ticks])
         several[0].set(ylabel="% by the short branch", ylim=(0, 103))
         caption = (
-            f"{sentence(_means(found))}; {Design().ants} ants that have "
-            "learned with both branches open, and learn no more.\nIn the model of Goss and others "
-            "no colony goes over to a short branch that opens late."
+            f"{sentence(_means(found))}; {Design().ants} ants that have learned with both branches "
+            "open and follow their final policy.\nIn the model of Goss and others, no colony "
+            "switches to a short branch that opens late."
         )
         title = "Who takes a short branch that opens late"
         style.frame(figure, title, caption, style.legend_entries(several))
@@ -235,7 +235,7 @@ def draw_late(path: Path, found: Crossings, ticks: int) -> None:
 
 
 def _draw_shares(axes: Axes, crossed: Mapping[str, np.ndarray], ticks: int) -> None:
-    """Draw shares over time, by the words that are added to the names of the loads."""
+    """Draw shares over time; the keys of `crossed` are appended to the names of the loads."""
     middle = [(w + 0.5) * ticks / WINDOWS for w in range(WINDOWS)]
     lines = {
         f"{load}{words}": (middle, _shares(counts)[:, k])
@@ -247,7 +247,7 @@ def _draw_shares(axes: Axes, crossed: Mapping[str, np.ndarray], ticks: int) -> N
 
 
 def _draw_lines(axes: Axes, lines: Mapping[str, tuple[Sequence[Any], np.ndarray]]) -> None:
-    """Draw shares (places, seeds) at their places, by label."""
+    """Draw lines by label, each as positions on the x-axis and shares (positions, seeds)."""
     axes.axhline(50, color=style.GREY, linewidth=0.7, linestyle="dashed")
     points = {
         label: [(place, *_percent(values)) for place, values in zip(places, shares, strict=True)]
@@ -257,13 +257,13 @@ def _draw_lines(axes: Axes, lines: Mapping[str, tuple[Sequence[Any], np.ndarray]
 
 
 def _shares(crossed: np.ndarray) -> np.ndarray:
-    """The share by the short branch, float64 (..., seeds), nan where nobody crossed."""
+    """Return the share of the short branch, float64 (..., seeds), nan without a crossing."""
     total = crossed.sum(axis=-2)
     return np.where(total > 0, crossed[..., 0, :] / np.maximum(total, 1), np.nan)
 
 
 def _percent(shares: np.ndarray) -> tuple[float, float, float]:
-    """The mean over seeds in which ants crossed, with its interval; nan for too few seeds."""
+    """Return the mean over seeds with crossings and its interval, nan for too few seeds."""
     there = shares[np.isfinite(shares)]
     low, high = bootstrap_interval(there[None]) if len(there) >= LEAST_SEEDS else ([np.nan],) * 2
     mean = there.mean() if there.size else np.nan

@@ -1,4 +1,4 @@
-"""Figures as markup for pages: vectors, in the colours and the letters of the page."""
+"""Figures as SVG for HTML pages, in the colours and the font of the page."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Colours of the figures -> those of the page, which differ in light and dark.
+# Colours of figures -> CSS variables of the page, which differ in light and dark mode.
 COLOURS = {
     INK: "ink",
     GREY: "faint",
@@ -27,11 +27,11 @@ COLOURS = {
     WINE: "plot-wine",
     SKY: "plot-sky",
 }
-_MANY = 500  # marks
+_MANY = 500  # marks of a line, from which overlapping ones are left out
 
 
 class Drawing(NamedTuple):
-    """A figure for a page: its name, title and caption, and the rest as SVG."""
+    """A figure for a page: its name, its title and caption as text, and the rest as SVG."""
 
     name: str
     title: str
@@ -40,7 +40,7 @@ class Drawing(NamedTuple):
 
 
 def drawing(name: str, figure: Figure) -> Drawing:
-    """A figure of `style.frame` as markup. Title and caption are taken out of the figure itself."""
+    """Return a figure of `style.frame` as markup; this removes title and caption from `figure`."""
     from matplotlib import rc_context
 
     [legend] = figure.legends
@@ -50,7 +50,7 @@ def drawing(name: str, figure: Figure) -> Drawing:
     for axis in figure.axes:
         _thin(axis)
     text = io.StringIO()
-    # Text stays text, and the names inside of a figure are those of no other one.
+    # Text remains text; the salt makes the ids of each figure unique on the page.
     with styled(), rc_context({"svg.fonttype": "none", "svg.hashsalt": name}):
         figure.savefig(text, format="svg", transparent=True, metadata={"Date": None})
     return Drawing(name, title, " ".join(caption.split()), _for_page(text.getvalue(), title))
@@ -62,8 +62,8 @@ def drawings(figures: Mapping[str, Figure]) -> list[Drawing]:
 
 
 def _thin(axis: Axes) -> None:
-    """Of many marks, leave out those that lie within half a point of another one."""
-    axis.get_xlim(), axis.get_ylim()  # until they are asked for, they may be old
+    """Remove marks within half a point of another one, to keep the page small."""
+    axis.get_xlim(), axis.get_ylim()  # matplotlib updates the limits only when they are read
     for line in axis.lines:
         data = np.asarray(line.get_xydata())
         if len(data) > _MANY:
@@ -73,12 +73,12 @@ def _thin(axis: Axes) -> None:
 
 
 def _for_page(svg: str, title: str) -> str:
-    """The element of an SVG file, with short numbers and without what the page says itself."""
+    """Return the element of an SVG file with rounded numbers and the styles of the page."""
     svg = svg[svg.index("<svg") :].strip().replace("xlink:href", "href")
     svg = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", svg, flags=re.S)
     svg = re.sub(r' font-family: [^;"]*;', "", svg)
     svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
-    # Places and paths in tenths of a point.
+    # Coordinates and paths in tenths of a point.
     svg = re.sub(
         r' (?:d|x|y|transform)="[^"]*"',
         lambda found: re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.1f}", found[0]),
@@ -98,7 +98,7 @@ _USE = re.compile(r'href="([^"]*)" x="([^"]*)" y="([^"]*)"(?: style="([^"]*)")?'
 
 
 def _marks(found: re.Match) -> str:
-    """Marks that look alike: their look once."""
+    """Return a group of equal marks that share one style attribute."""
     uses = _USE.findall(found[0])
     [(mark, look), *others] = {(mark, look) for mark, _, _, look in uses}
     if others or "opacity" not in look:

@@ -1,8 +1,8 @@
 """Contrasts and their verdicts.
 
 Contrasts that are judged together get intervals at a level corrected for their number (Bonferroni):
-with a probability of at least 95 % all hold at once, however they depend on each other. Where a
-contrast rests on the IQM, that decides, and the mean is judged besides.
+all hold at once with a probability of at least 95 %, even if they depend on each other. A contrast
+is judged by its IQM or its mean over seeds; if by its IQM, it is also judged by its mean.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from taichi_ants.analysis.statistics import (
 from taichi_ants.errors import count
 
 SIMULTANEOUS_LEVEL = 0.95
-# With fewer, intervals miss more often than they say, and are too wide to be an answer; see
+# With fewer, intervals cover less than their level and are too wide for a verdict; see
 # docs/statistics.md.
 LEAST_SEEDS = 10
 UNBOUNDED = (-np.inf, np.inf)
 
 
 class Verdict(str, Enum):
-    """What the data say, the strongest objection first; "undecided" is not a finding."""
+    """A verdict on a contrast, in order from the strongest objection to support."""
 
     NOT_TESTED = "not tested"
     TOO_FEW = "too few seeds"
@@ -44,10 +44,10 @@ class Verdict(str, Enum):
 class Criterion:
     """The range in which the effect must lie, and the differences that are too small to matter.
 
-    A verdict is the region that holds the whole interval: the range (supported), the margin on
-    either side of 0 (equivalent), or what is neither (contradicted). If the interval reaches into
-    two of them, the contrast is undecided. A difference must exceed `low`, which is at least its
-    `margin`; an effect that is not a difference has None.
+    The verdict is "supported" if the whole interval lies in the range, "equivalent" if it lies
+    within the margin on either side of 0, "contradicted" if it lies outside of both, and else
+    "undecided". A difference must exceed `low`, which is at least its `margin`; the `margin` of an
+    effect that is not a difference is None.
     """
 
     low: float
@@ -67,7 +67,7 @@ class Criterion:
 
     @property
     def words(self) -> str:
-        """Its name in tables."""
+        """The criterion in words, for tables."""
         if self.margin is not None:
             limit = "" if self.high == np.inf else f" and at most {self.high:g}"
             return f"above {self.low:g}{limit}, margin {self.margin:g}"
@@ -85,15 +85,15 @@ def above(margin: float = 0.0) -> Criterion:
 
 @dataclass(frozen=True, eq=False)
 class Contrast:
-    """A number of each seed, and what its estimate over seeds shall fulfil.
+    """A number for each seed, and the criterion for its estimate over seeds.
 
     Attributes:
-        label: Such as "Q-learning minus SARSA".
-        values: Float64 (seeds,); (k, seeds) with `of_estimates`. nan where there are none.
-        uses_iqm: Whether it rests on the interquartile mean (IQM) over seeds.
-        possible: The range that the estimate cannot leave; its interval is cut off there.
-        of_estimates: For a question about the estimates themselves (how unequal are 8 effects?), as
-            seeds' noise would count too: a smooth function of them, float (k, ...) -> float (...).
+        label: The name in tables, for example "Q-learning minus SARSA".
+        values: Float64 (seeds,), or (k, seeds) with `of_estimates`; nan where a value is missing.
+        uses_iqm: Whether it is judged by the interquartile mean (IQM) over seeds.
+        possible: The range of possible estimates; the interval is clipped to it.
+        of_estimates: A smooth function of k estimates, float (k, ...) -> float (...), if the
+            contrast is about these (are 8 effects unequal?); per seed, noise would count too.
     """
 
     label: str
@@ -105,16 +105,16 @@ class Contrast:
 
     @property
     def seeds(self) -> int:
-        """How many seeds it rests on."""
+        """The number of seeds."""
         return self.values.shape[-1]
 
     @property
     def missing(self) -> bool:
-        """Whether there are no values, or some are nan."""
+        """Whether there are no values or any of them is nan."""
         return not self.seeds or bool(np.isnan(self.values).any())
 
     def reading(self, uses_iqm: bool) -> tuple[np.ndarray, bool]:
-        """Numbers to be averaged over seeds, float64 (seeds,), and whether by their IQM."""
+        """Return the numbers to average over seeds, float64 (seeds,), and whether by their IQM."""
         if self.of_estimates is None:
             return self.values, uses_iqm
         values = interquartile_values(self.values) if uses_iqm else self.values
@@ -125,8 +125,8 @@ class Contrast:
 class Finding:
     """The result of a contrast: verdict, estimate over seeds, and interval at `level`.
 
-    Numbers that are not tested are nan. `by_mean` is the finding by the mean on a contrast that
-    rests on the IQM.
+    If the contrast is not tested, the numbers are nan. `by_mean` is the finding by the mean on a
+    contrast that is judged by the IQM.
     """
 
     contrast: Contrast
@@ -139,7 +139,7 @@ class Finding:
 
 
 def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
-    """The findings on contrasts that are judged together, in their order."""
+    """Return the findings on contrasts that are judged together, in their order."""
     readings = {
         (place, uses_iqm): contrast.reading(uses_iqm)
         for place, contrast in enumerate(contrasts)
@@ -170,19 +170,19 @@ def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
 
 
 def seeds_in_words(seeds: int) -> str:
-    """Return such as "20 seeds", with a warning if they are fewer than `LEAST_SEEDS`."""
+    """Return "20 seeds", for example, with a warning if they are fewer than `LEAST_SEEDS`."""
     return count(seeds, "seed") + (", too few for a verdict" if seeds < LEAST_SEEDS else "")
 
 
 def weakest(findings: Sequence[Finding]) -> Finding:
-    """Of contrasts that must all hold, the one with the strongest objection; so for the mean."""
+    """Return the finding with the strongest objection; its `by_mean` is chosen in the same way."""
     first = min(findings, key=_strength)
     by_mean = [one.by_mean for one in findings if one.by_mean is not None]
     return replace(first, by_mean=min(by_mean, key=_strength) if by_mean else None)
 
 
 def _strength(finding: Finding) -> tuple[int, float]:
-    """The verdict's place, and how far the effect lies inside of the range."""
+    """Return a sort key: the verdict, then the distance of the effect to the end of the range."""
     low, high = finding.contrast.criterion.low, finding.contrast.criterion.high
     inside = min(finding.effect - low, high - finding.effect)
     return list(Verdict).index(finding.verdict), inside

@@ -1,20 +1,19 @@
-"""Estimates over seeds and their intervals: what they are for and cover is in docs/statistics.md.
+"""Estimates over seeds and their intervals; docs/statistics.md has their uses and coverage.
 
-Two estimators, the mean and the interquartile mean (IQM), which is the mean of the middle half of
-the runs (Agarwal et al. 2021). Each has two intervals:
+There are two estimators: the mean, and the interquartile mean (IQM), which is the mean of the
+middle half of the runs (Agarwal et al. 2021). Each has two intervals:
 
-- The bootstrap's. For the mean it is BCa with the expansion of Hesterberg (2015): the normal
-  quantile z in the percentile levels is replaced by sqrt(n / (n - 1)) times the t quantile with
-  n - 1 degrees of freedom. For the IQM it is the percentile interval, as in rliable.
-- Student's t. For the IQM it is that of Tukey and McLaughlin (1963).
+- Bootstrap. For the mean it is BCa with the expansion of Hesterberg (2015), which replaces the
+  normal quantile z in the percentile levels. The replacement is sqrt(n / (n - 1)) times the t
+  quantile with n - 1 degrees of freedom. For the IQM it is the percentile interval, as in rliable.
+- Student's t. For the IQM it is the interval of Tukey and McLaughlin (1963).
 
-Tables and figures show the first. Verdicts on claims use the hull of both, at a level corrected
-for their number: far in the tails a bootstrap of few seeds ends at its most extreme resample,
-where the t interval goes on; where ties fill the middle half, the t interval is a point, while
-the bootstrap knows how near the tails are.
+Tables and figures show the bootstrap interval. Verdicts on claims use the hull of both, at a level
+corrected for their number, because each can be too short. A bootstrap of few seeds never exceeds
+its most extreme resample, and the t interval is a point if the middle half consists of ties.
 
-The resampling weights of a number of seeds come from a fixed generator and serve all rows, so that
-results are reproducible.
+The resampling weights come from a fixed random generator and depend only on the number of seeds, so
+that results are reproducible.
 """
 
 from __future__ import annotations
@@ -32,16 +31,16 @@ RANDOM_SEED = 20_250_801
 TIE_TOLERANCE = 1e-9
 _BLOCK_ROWS = 256
 _BLOCK_DRAWS = 4096
-_BLOCK_WEIGHTS = 1 << 19  # as float 4 MB, which caches hold
-_MOST_KEPT = 1 << 27  # weights, of a byte each
+_BLOCK_WEIGHTS = 1 << 19  # 4 MB as float64, which fits into processor caches
+_MOST_KEPT = 1 << 27  # weights of one byte each, in memory
 
 
 @lru_cache(maxsize=2)
 def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> np.ndarray:
-    """Return the counts of n seeds in each resample, uint8 (resamples, n), read-only.
+    """Return how often each of n seeds is in each resample, uint8 (resamples, n), read-only.
 
-    With `iqm` these are counts of the seeds, *in ascending order of their values*, in the middle
-    half of each resample. Sorting a resample keeps that order, so these hold for all rows.
+    With `iqm`, only the middle half of each resample counts, and seeds must be *in ascending order
+    of their values*. Sorting a resample does not change that order, so all rows can share them.
     """
     counts = np.empty((resamples, n), np.uint8)
     for start, block in _drawn(n, resamples, iqm):
@@ -51,9 +50,9 @@ def resampling_counts(n: int, resamples: int = RESAMPLES, iqm: bool = False) -> 
 
 
 def _drawn(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]]:
-    """The same in blocks: the number of the first resample of each, and its counts."""
+    """Yield blocks of `resampling_counts`: the index of the first resample, and the counts."""
     random = np.random.default_rng((RANDOM_SEED, n))
-    size = min(_BLOCK_DRAWS, max(1, _BLOCK_WEIGHTS // n))  # with any, the numbers are the same
+    size = min(_BLOCK_DRAWS, max(1, _BLOCK_WEIGHTS // n))  # the size does not change the numbers
     for start in range(0, resamples, size):
         shape = min(size, resamples - start), n
         drawn = random.integers(0, n, size=shape)
@@ -67,9 +66,9 @@ def _drawn(n: int, resamples: int, iqm: bool) -> Iterator[tuple[int, np.ndarray]
 
 
 def interquartile_mean(values: np.ndarray) -> np.ndarray:
-    """Mean of (rows, seeds) over seeds without the lowest and the highest quarter, float64 (rows,).
+    """Return the IQM of values (rows, seeds) over seeds, float64 (rows,), nan for rows with a nan.
 
-    A quarter of n seeds is rounded down, as in rliable. Rows with a nan give nan.
+    It leaves out the lowest and the highest quarter of n seeds, n // 4 each, as in rliable.
     """
     ordered = np.sort(np.asarray(values, float), axis=1)
     cut = ordered.shape[1] // 4
@@ -78,10 +77,10 @@ def interquartile_mean(values: np.ndarray) -> np.ndarray:
 
 
 def interquartile_values(values: np.ndarray) -> np.ndarray:
-    """Values (rows, seeds) that have the interquartile mean as their mean, and its spread.
+    """Return values (rows, seeds) whose mean is the IQM and whose spread is that of the IQM.
 
-    They are the winsorised values (moved to the ends of the middle half) around the IQM, stretched
-    by what the trimming takes away.
+    They are winsorised (moved to the ends of the middle half), shifted to the IQM, and stretched to
+    make up for the trimming.
     """
     values = np.asarray(values, float)
     ordered, cut = np.sort(values, axis=1), values.shape[1] // 4
@@ -89,14 +88,15 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
     moved = np.clip(values, *ends)
     stretch = values.shape[1] / (values.shape[1] - 2 * cut)
     moved = (moved - moved.mean(axis=1, keepdims=True)) * stretch
-    moved[ends[0][:, 0] == ends[1][:, 0]] = 0.0  # free of rounding errors
+    moved[ends[0][:, 0] == ends[1][:, 0]] = 0.0  # without rounding errors
     return interquartile_mean(values)[:, None] + moved
 
 
 def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray]:
-    """Columns of a table, float64 (rows,) each: estimates of values (rows, seeds) with intervals.
+    """Return estimates of values (rows, seeds) with intervals, float64 (rows,) by column name.
 
-    "mean", "ci_low", "ci_high"; with the IQM also "iqm", "iqm_ci_low", "iqm_ci_high".
+    The columns are "mean", "ci_low", "ci_high"; with `uses_iqm` also "iqm", "iqm_ci_low" and
+    "iqm_ci_high".
     """
     values = np.asarray(values, float)
     columns = {"mean": values.mean(axis=1)}
@@ -108,7 +108,7 @@ def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray
 
 
 def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Numbers (rows,) computed from values (rows, seeds), 0 where they are rounding errors."""
+    """Return numbers (rows,) that were computed from values (rows, seeds), rounding errors as 0."""
     tiny = TIE_TOLERANCE * np.abs(values).max(axis=1)
     return np.where(np.abs(numbers) <= tiny, 0.0, numbers)
 
@@ -116,10 +116,10 @@ def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
 def bootstrap_interval(
     values: np.ndarray, level: float = 0.95, resamples: int = RESAMPLES, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Bootstrap interval of the mean over seeds (expanded BCa), or of the IQM (percentiles).
+    """Return the bootstrap interval of the mean over seeds (expanded BCa) or the IQM (percentiles).
 
-    Returns the ends for each row of values (rows, seeds), float64 (rows,) each: nan for fewer than
-    two seeds and for rows with a nan, a single point where all seeds agree.
+    Both ends are float64 (rows,), for values (rows, seeds). They are nan for fewer than two seeds
+    and for rows with a nan, and equal if all seeds of a row are.
     """
     values = _rows(values)
     rows, n = values.shape
@@ -135,8 +135,8 @@ def _rows(values: np.ndarray) -> np.ndarray:
     rows = np.asarray(values, float)
     if rows.ndim != 2:
         raise AntsError(
-            f"values has shape {rows.shape}; it must be (rows, seeds), so give values[None] for a "
-            "single row."
+            f"values has shape {rows.shape}, but must have the shape (rows, seeds); pass "
+            "values[None] for a single row."
         )
     return rows
 
@@ -144,7 +144,7 @@ def _rows(values: np.ndarray) -> np.ndarray:
 def student_interval(
     values: np.ndarray, level: float = 0.95, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Student's t interval of the mean over seeds, or Tukey and McLaughlin's of the IQM."""
+    """Return Student's t interval of the mean over seeds, or Tukey and McLaughlin's of the IQM."""
     from scipy.special import stdtrit
 
     values = _rows(values)
@@ -163,10 +163,10 @@ def student_interval(
 def cautious_interval(
     values: np.ndarray, level: float, resamples: int = RESAMPLES, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The hull of both intervals, on which verdicts rest.
+    """Return the hull of the bootstrap and the t interval, which verdicts use.
 
-    That all n seeds agree by chance, although half of all seeds would differ, has probability
-    2^(1-n) (the sign test). If this is not below 1 - level, the interval is unbounded.
+    If half of all seeds differed from the others, n seeds would agree by chance with probability
+    2^(1-n) (the sign test). If they agree and this is above 1 - level, the interval is unbounded.
     """
     values = np.asarray(values, float)
     n = values.shape[1]
@@ -180,17 +180,17 @@ def cautious_interval(
 
 
 def all_equal(values: np.ndarray) -> np.ndarray:
-    """Whether a row's seeds agree up to rounding errors, bool (rows,)."""
+    """Return whether all seeds of a row agree up to rounding errors, bool (rows,)."""
     return np.ptp(values, axis=1) <= TIE_TOLERANCE * np.abs(values).max(axis=1)
 
 
 def jackknife_values(
     statistic: Callable[[np.ndarray], np.ndarray], values: np.ndarray
 ) -> np.ndarray:
-    """Pseudo-values of a smooth function of means over seeds, one for each seed; nan of one seed.
+    """Return a pseudo-value for each seed, of a smooth function of means over seeds.
 
-    Their mean is the statistic, float (..., k) -> float (k,), with its bias of order 1/n removed,
-    and their spread is that of the statistic; so they can be averaged like any other effect.
+    Their mean is the statistic, float (..., k) -> float (k,), without its bias of order 1/n, and
+    their spread is that of the statistic. With a single seed they are nan.
     """
     n = values.shape[-1]
     if n < 2:
@@ -207,7 +207,7 @@ def _bca(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
     deviations = np.where(all_equal(values)[:, None], 0.0, values - mean)
     draws = _resampled_means(deviations, resamples)
 
-    # Bias correction: where the mean lies among the resampled means, ties counted by half.
+    # Bias correction: the share of resampled means below the mean; ties count by half.
     tie = TIE_TOLERANCE * np.abs(deviations).max(axis=1, keepdims=True)
     ends = zip(draws, tie, strict=True)
     twice = [np.count_nonzero(row < -end) + np.count_nonzero(row <= end) for row, end in ends]
@@ -222,7 +222,7 @@ def _bca(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
     half = np.sqrt(n / (n - 1)) * stdtrit(n - 1, (1 + level) / 2)
     quantile = shift + np.array([-half, half])
     stretch = 1 - acceleration * quantile
-    # Past its pole the transformation has run through infinity: the end of the distribution.
+    # Beyond its pole, the transformation is at infinity: the end of the distribution.
     stretched = np.copysign(np.inf, quantile)
     np.divide(quantile, stretch, out=stretched, where=stretch > 0)
     return mean + _at_level(draws, ndtr(shift + stretched))
@@ -239,7 +239,7 @@ def _percentile(values: np.ndarray, level: float, resamples: int) -> np.ndarray:
 
 
 def _resampled_means(deviations: np.ndarray, resamples: int, iqm: bool = False) -> np.ndarray:
-    """Float64 (rows, resamples), relative to each row's mean; with `iqm` of ascending rows."""
+    """Return means, float64 (rows, resamples); with `iqm`, rows must be in ascending order."""
     n = deviations.shape[1]
     draws = np.empty((len(deviations), resamples))
     if n * resamples > _MOST_KEPT:
@@ -255,7 +255,7 @@ def _resampled_means(deviations: np.ndarray, resamples: int, iqm: bool = False) 
 
 
 def _at_level(draws: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """Sort rows (rows, resamples) and return their quantiles at levels (rows, k), as Weibull."""
+    """Sort `draws` (rows, resamples) and return their quantiles (Weibull's) at levels (rows, k)."""
     last = draws.shape[1] - 1
     place = np.clip(levels * (last + 2) - 1, 0, last)
     left = np.nan_to_num(np.floor(place)).astype(int)

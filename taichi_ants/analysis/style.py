@@ -1,4 +1,4 @@
-"""How the figures look: colours, markers, fonts, and how a figure is made and saved."""
+"""The style of the figures: colours, markers and fonts; functions that make and save figures."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from matplotlib.axis import XAxis, YAxis
     from matplotlib.figure import Figure
 
-# 9 inches are about 900 pixels where a README shows the figure; twice that for sharp screens.
+# 9 inches are about 900 pixels, the width of a README; the DPI doubles that for sharp screens.
 WIDTH = 9.0
 DPI = 180
 
-# Of Okabe and Ito's and Tol's colours those that stay furthest apart for people with any colour
-# deficiency, in this order: two, four or five of them.
+# The first two, four or five of these are the colours of Okabe and Ito and of Tol that people with
+# any colour deficiency distinguish best.
 BLUE, ORANGE, RED, WINE, SKY = "#0072B2", "#E69F00", "#CC3311", "#882255", "#56B4E9"
 INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
-# Of lines, in this order.
+# Colours of lines, in this order.
 COLOURS = (BLUE, ORANGE, RED, WINE, SKY, "#CC79A7", INK, "#009E73", "#999933", GREY)
 
 
@@ -37,14 +37,14 @@ def _settings() -> Mapping[Any, Any]:
 
 
 def styled() -> AbstractContextManager:
-    """The context in which figures are made and saved."""
+    """Return the matplotlib context in which to make and save figures."""
     from matplotlib import rc_context
 
     return rc_context(dict(_settings()))
 
 
 def use() -> None:
-    """Let all figures of a session look like the project's; for notebooks."""
+    """Apply the style of the project to all figures of a notebook."""
     from matplotlib import rcParams
     from matplotlib.rcsetup import cycler
 
@@ -54,7 +54,7 @@ def use() -> None:
 
 
 def new_figure(height: float) -> Figure:
-    """An empty figure of full width and the height in inches, outside of any global state."""
+    """Return an empty figure of full width and the height in inches, without pyplot's state."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -63,7 +63,7 @@ def new_figure(height: float) -> Figure:
 
 
 def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist]) -> None:
-    """Title and legend above everything else, the caption below in lines of 120 characters."""
+    """Add a title and a legend above the panels and a caption of 120-character lines below."""
     widest = max(map(len, entries), default=0)
     columns = int(WIDTH / (0.6 + 0.068 * widest))  # inches at 9 points
     bold = {"size": 12, "weight": "bold"}
@@ -73,13 +73,13 @@ def frame(figure: Figure, title: str, caption: str, entries: Mapping[str, Artist
         "borderpad": 0.2,
     }
     look |= {"loc": "outside upper left", "alignment": "left", "title_fontproperties": bold}
-    # The title is the legend's: the layout engine would put a title of the figure on top of it.
+    # The title belongs to the legend, which the layout engine would draw over a figure's title.
     figure.legend(entries.values(), entries.keys(), title=title, **look)
     figure.supxlabel(caption, x=0.008, ha="left", fontsize=8, color=GREY)
 
 
 def logarithmic(axis: XAxis | YAxis, steps: Sequence[float]) -> None:
-    """Make an x- or y-axis logarithmic, with plain numbers at steps (1 to 9) of each decade."""
+    """Make an axis logarithmic, with plain numbers at `steps` (1 to 9) of each decade."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     axis.axes.set(**{f"{axis.axis_name}scale": "log"})
@@ -89,7 +89,7 @@ def logarithmic(axis: XAxis | YAxis, steps: Sequence[float]) -> None:
 
 
 def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
-    """What is labelled in any of the panels, each label once."""
+    """Return the artists with a label in any panel, by label."""
     entries: dict[str, Artist] = {}
     for axis in axes:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
@@ -98,7 +98,7 @@ def legend_entries(axes: Iterable[Axes]) -> dict[str, Artist]:
 
 
 def save_all(figures: Mapping[str, Figure], folder: str | Path) -> None:
-    """Write figures as PNG files into a folder, which is made if needed.
+    """Write figures as PNG files into a folder, which is created if needed.
 
     Raises:
         AntsError: The folder or a file in it cannot be written.
@@ -109,7 +109,7 @@ def save_all(figures: Mapping[str, Figure], folder: str | Path) -> None:
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG; raises AntsError if it cannot be written."""
+    """Write a figure as a PNG file; raise AntsError if that fails."""
     how: dict[str, Any] = {"format": "png", "dpi": DPI, "facecolor": "white"}
     with styled():
         write_atomically(path, lambda file: figure.savefig(file, **how))

@@ -1,4 +1,4 @@
-"""A sweep as tables and a figure: a measure of each seed against the settings that vary."""
+"""Tables and a figure of a sweep: a measure of each seed against the settings that vary."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Settings = Mapping[str, Any]
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # 7 with 10 colours: 70 lines look different
-_TERMINAL = 200  # columns, at most
-_WIDE = 20  # a ratio of numbers from which their axis is logarithmic
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # 7 with 10 colours give 70 different lines
+_TERMINAL = 200  # the maximum number of columns
+_WIDE = 20  # the ratio of largest to smallest from which an axis is logarithmic
 
 
 def seed_rows(
     settings: Sequence[Settings], seeds: Sequence[int], values: Mapping[str, np.ndarray]
 ) -> Iterator[dict[str, Any]]:
-    """Yield a row for each point and seed: what varies, the seed, measures float64 (P, S)."""
+    """Yield a row for each point and seed: settings, seed and measures, from float64 (P, S)."""
     for p, one in enumerate(settings):
         for s, seed in enumerate(seeds):
             yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
 class Estimator(NamedTuple):
-    """A measure over seeds: mean, IQM if it has one, and 95 % intervals, nan of one seed."""
+    """Estimates of a measure over seeds: mean, IQM or None, 95 % intervals (nan for one seed)."""
 
     mean: float
     ci_low: float
@@ -50,7 +50,7 @@ class Estimator(NamedTuple):
 
 
 def centre_columns(found: Mapping[str, Estimator]) -> dict[str, float]:
-    """Return the columns of several measures in a table."""
+    """Return the columns of a table for the estimates of several measures."""
     return {
         f"{name}_{field}": value
         for name, one in found.items()
@@ -62,9 +62,9 @@ def centre_columns(found: Mapping[str, Estimator]) -> dict[str, float]:
 def centres_of(
     values: Mapping[str, np.ndarray], with_iqm: Sequence[str] = ()
 ) -> list[dict[str, Estimator]]:
-    """Return the measures of each point over its seeds, by name, from float64 (points, seeds).
+    """Return estimates for each point, by measure, from values float64 (points, seeds).
 
-    Those of `with_iqm` have an interquartile mean.
+    Only the measures in `with_iqm` get an interquartile mean.
     """
     columns = {name: estimates(array, name in with_iqm).values() for name, array in values.items()}
     rows = {name: np.transpose([*several]).tolist() for name, several in columns.items()}
@@ -73,7 +73,7 @@ def centres_of(
 
 
 def columns_of(rows: Sequence[Settings]) -> list[str]:
-    """The names in rows, in order of appearance."""
+    """Return the names in rows, in order of appearance."""
     return list(dict.fromkeys(name for row in rows for name in row))
 
 
@@ -85,7 +85,7 @@ def report(
 ) -> str:
     """Return the means with their intervals as a table for a terminal.
 
-    Notes say of each point how its first measure compares with that at the value `against`.
+    `notes` has the verdict of each point: its first measure, compared with the value `against`.
     """
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}
@@ -109,7 +109,8 @@ def report(
 def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: str) -> None:
     """Draw a measure against the first setting that varies, a line for each value of the others.
 
-    Of P points: what varies, and the measure, float64 (P, S), of which `words` say what it is.
+    `settings` are those that vary, for each of P points, `values` the measure, float64 (P, S), of S
+    seeds, and `words` its name.
 
     Raises:
         AntsError: The file (.png) cannot be written.
@@ -133,9 +134,9 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
 
 
 def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> None:
-    """Draw means with intervals: by label, of each point its place, mean and the interval's ends.
+    """Draw means with intervals, by label: for each point, x, mean, and the ends of the interval.
 
-    Where places are no numbers there are no lines, but points beside each other.
+    If any x is not a number, the points of a label are not joined by a line.
     """
     places = [place for points in lines.values() for place, *_ in points]
     numbers = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in places)
@@ -164,18 +165,17 @@ def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> No
 
 
 def _far_apart(numbers: Sequence[float]) -> bool:
-    """Whether numbers are shown on a logarithmic axis."""
     return min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
 
 
 def _spread(values: np.ndarray) -> str:
     seeds = values.shape[1]
-    few = f" (too few for these: take {LEAST_SEEDS} or more)" if seeds < LEAST_SEEDS else ""
+    few = f" (too few for these: use {LEAST_SEEDS} or more)" if seeds < LEAST_SEEDS else ""
     return f"Means over {seeds} seeds with 95 % intervals{few}" if seeds > 1 else "One seed"
 
 
 def short(name: str, names: Sequence[str]) -> str:
-    """The last part of a name, if no other of the names has the same."""
+    """Return the last part of a name if it is unique among `names`, else the whole name."""
     last = name.rpartition(".")[2]
     return last if sum(one.rpartition(".")[2] == last for one in names) == 1 else name
 

@@ -1,4 +1,4 @@
-"""Numbers as text, and tables as data that a terminal and Markdown show alike."""
+"""Numbers as text, and tables for terminals and for Markdown."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def number(value: float | None, digits: int = 1) -> str:
 
 
 def figure(value: float | None) -> str:
-    """Return a number with about three digits, "-" where it is None or not finite."""
+    """Return a number with about three digits, "-" if it is None or not finite."""
     if value is None or not math.isfinite(value):
         return MISSING
     whole = abs(value) >= 99.95 or value == int(value)
@@ -31,34 +31,34 @@ def figure(value: float | None) -> str:
 
 
 def interval(low: float, high: float, digits: int = 1) -> str:
-    """An interval as "[low, high]", "-" where an end is nan."""
+    """Return an interval as "[low, high]", "-" if an end is nan."""
     if math.isnan(low) or math.isnan(high):
         return MISSING
     return f"[{number(low, digits)}, {number(high, digits)}]"
 
 
 def percent(share: float) -> str:
-    """A share as a percentage, small ones with a decimal place, "-" for nan."""
+    """Return a share as a percentage, small ones with a decimal place, "-" for nan."""
     if math.isnan(share):
         return MISSING
     return f"{100 * share:.{0 if share >= 0.0995 or share == 0 else 1}f} %"
 
 
 def thousands(number_of: int) -> str:
-    """A large count as "12 800"."""
+    """Return a large count in the form "12 800"."""
     return f"{number_of:,}".replace(",", " ")
 
 
 def sentence(words: str) -> str:
-    """Words with a capital in front; the others keep theirs."""
+    """Return text with its first letter in upper case."""
     return words[:1].upper() + words[1:]
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table of text, of which headers and cells may have several lines; notes follow it.
+    """A table of text with notes below it; headers and cells may have several lines.
 
-    The first `text_columns` are aligned left, others, of numbers, right.
+    The first `text_columns` columns are aligned left, the others right.
     """
 
     title: str
@@ -68,7 +68,7 @@ class Table:
     text_columns: int = 1
 
     def markdown(self) -> str:
-        """Title, table and notes as Markdown, each cell in one line."""
+        """Return title, table and notes as Markdown, each cell on one line."""
         left = self.text_columns
         rule = [*["---"] * left, *["---:"] * (len(self.columns) - left)]
         lines = [
@@ -86,12 +86,12 @@ Block = str | Table
 
 
 def markdown(blocks: Sequence[Block]) -> str:
-    """Blocks as a Markdown document."""
+    """Return blocks as a Markdown document."""
     return "\n".join(one.markdown() if isinstance(one, Table) else f"{one}\n" for one in blocks)
 
 
 def plain_text(blocks: Sequence[Block], width: int) -> str:
-    """Return blocks as plain text of at most so many columns, empty lines between them."""
+    """Return blocks as plain text of at most `width` columns, with empty lines between them."""
     from rich.console import Console
 
     text = io.StringIO()
@@ -116,7 +116,7 @@ def _drawn(table: Table) -> RichTable:
     )
     for position, header in enumerate(table.columns):
         justify: Literal["left", "right"] = "left" if position < table.text_columns else "right"
-        # No name breaks within a word.
+        # Without this, rich may break the name of a learner within a word.
         least = len("Q-learning") if header == "Learner" else None
         drawn.add_column(header, justify=justify, overflow="fold", min_width=least)
     for row in table.rows:

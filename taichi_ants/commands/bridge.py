@@ -1,9 +1,9 @@
-"""Colonies on a double bridge: does the shorter branch win?
+"""Train colonies on a double bridge, and measure whether the shorter branch wins.
 
-Colonies learn on a bridge with branches of 23 and 36 steps and are then followed on it, on its
-mirror image, on one with equal branches, and on one whose short branch opens late. The tables show
-the share of ants that cross by the short branch, without food and with it; counts and two figures
-go to a folder. See docs/bridge.md.
+Colonies learn on a bridge with branches of 23 and 36 steps. The command evaluates them on that
+bridge, on its mirror image, on one with equal branches, and on one whose short branch opens late.
+It prints the share of ants that cross by the short branch, without food and with it, and writes
+counts and two figures to a folder. See docs/bridge.md.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ QUICK = {"seeds": 4, "episodes": 20, "ticks": 500, "evaluation_ticks": 1000}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = command_line.Parser(__doc__)
     add = parser.add_argument
-    add("--seeds", type=whole_number(1, 1000), default=40, metavar="N", help="how many")
-    add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
+    add("--seeds", type=whole_number(1, 1000), default=40, metavar="N", help="number of seeds")
+    add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
     counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
-    add("--episodes", **counts, default=60, help="of training")
-    add("--ticks", **counts, default=1000, help="of an episode of training")
-    add("--evaluation-ticks", **counts, default=3000, help="for which colonies are followed")
-    quick = f"{QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks"
+    add("--episodes", **counts, default=60, help="training episodes")
+    add("--ticks", **counts, default=1000, help="ticks of a training episode")
+    add("--evaluation-ticks", **counts, default=3000, help="ticks of an evaluation")
+    quick = f"use {QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks"
     add("--quick", action="store_true", help=quick)
     command_line.add_common(parser)
     command_line.add_results(parser, "bridge")
@@ -39,7 +39,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def bridge(settings: argparse.Namespace) -> None:
-    """Do the study, or show the finished one."""
+    """Run the study, or show its results if it is finished."""
     from taichi_ants.analysis.bridge import DESIGNS, write_results
     from taichi_ants.studies.bridge import followed, point
     from taichi_ants.studies.result_folder import work_or_show
@@ -65,5 +65,5 @@ def bridge(settings: argparse.Namespace) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
+    """Run the command."""
     command_line.run_command(lambda: bridge(parse_arguments(arguments)), command_line.AGAIN)

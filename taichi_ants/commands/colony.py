@@ -1,8 +1,8 @@
-"""Many ants in one world: the study of the colony, or one colony that lives for a while.
+"""Study how colonies scale, or run one colony of any size.
 
-`study` trains and evaluates 1 to 64 ants under several rules in several kinds of worlds, over many
-seeds; tables, figures and findings go to a folder. `live` lets a colony of any size live, or many
-side by side; it can be saved, resumed and drawn.
+`study` trains and evaluates 1 to 64 ants under several rules in several kinds of worlds with many
+seeds, and writes tables, figures and findings to a folder. `live` runs a colony of any size, or
+many in parallel, and can save, resume and draw it.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ QUICK = {
     **{"world_kinds": ("paper", "open", "piles"), "sizes": (1, 16, 64), "seeds": 8},
     **{"episodes": 20, "ticks": 500, "rollouts": 2},
 }
-# Settings of learning that the study chooses.
+# Training settings that the study sets itself.
 PLANNED = (
     *("training.epsilon_decay", "training.min_epsilon", "training.initial_q"),
     *("training.learning_rate_decay", "training.min_learning_rate"),
@@ -47,11 +47,11 @@ _OF_RESUMED = ("resume", "ticks", "frame_interval", "plugin", "threads", "arch",
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line."""
+    """Return the settings of the command line."""
     parser = command_line.Parser(__doc__)
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     for kind, (words, add_options) in KINDS.items():
-        one = kinds.add_parser(kind, help=words, description=f"{words}.")
+        one = kinds.add_parser(kind, help=words, description=f"{words.capitalize()}.")
         one.set_defaults(kind=kind)
         add_options(one)
     settings, given = parser.parse_given(arguments)
@@ -69,37 +69,36 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def _check_live(
     settings: argparse.Namespace, given: Mapping[str, str], error: Callable[[str], NoReturn]
 ) -> None:
-    """Refuse options that would change nothing beside others."""
+    """Refuse options that would have no effect together with others."""
     for name, flag in given.items():
         if settings.resume and name not in _OF_RESUMED:
-            error(f"{flag} cannot change a colony that is resumed, leave it out")
+            error(f"{flag} cannot change a resumed colony; leave it out")
         learns = name.startswith("training.") and name != "training.epsilon"
         if settings.sharing == "frozen" and learns:
-            error(
-                f"{flag} is of learning, but with --sharing frozen nobody learns, so leave one out"
-            )
+            error(f"{flag} has no effect with --sharing frozen (no learning); remove one of them")
     if settings.policy and "task.observation" in given:
-        error("--task.observation is that of the policy, leave it out")
+        error("the policy determines --task.observation; leave it out")
     if "frame_interval" in given and (
         not settings.render or settings.render.lower().endswith(".png")
     ):
-        error("--frame-interval is of an animation, name one with --render, or leave it out")
+        error("--frame-interval requires an animation; give --render a .gif, .mp4 or folder")
 
 
 def _add_study(parser: command_line.Parser) -> None:
     add = parser.add_argument
     world_kinds: dict[str, Any] = {"nargs": "+", "choices": WORLD_KINDS, "metavar": "NAME"}
-    add("--world-kinds", **world_kinds, default=WORLD_KINDS, help="kinds of world")
+    add("--world-kinds", **world_kinds, default=WORLD_KINDS, help="kinds of world to study")
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1, 100_000)}
-    sizes = "numbers of ants where they are trained"
+    sizes = "numbers of ants of the trained colonies"
     add("--sizes", **several, default=(1, 4, 16, 64), metavar="N", help=sizes)
-    add("--seeds", type=whole_number(1, 1000), default=20, metavar="N", help="how many")
-    add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
+    add("--seeds", type=whole_number(1, 1000), default=20, metavar="N", help="number of seeds")
+    add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
     counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
-    add("--episodes", **counts, default=60, help="of training")
-    add("--ticks", **counts, default=1000, help="of an episode")
+    add("--episodes", **counts, default=60, help="training episodes")
+    add("--ticks", **counts, default=1000, help="ticks of an episode")
     add("--rollouts", **counts, default=4, help="evaluation episodes")
-    add("--quick", action="store_true", help="fewer seeds, sizes and ticks, no other worlds")
+    quick = "use fewer seeds, sizes and ticks, and the kinds paper, open and piles only"
+    add("--quick", action="store_true", help=quick)
     parser.open_settings, parser.own_settings = ("training",), PLANNED
     command_line.add_settings(parser, _learning(0.3))
     command_line.add_common(parser)
@@ -108,26 +107,28 @@ def _add_study(parser: command_line.Parser) -> None:
 
 def _add_live(parser: command_line.Parser) -> None:
     add = parser.add_argument
-    add("--ants", **COUNT, default=80, help="how many start")
-    add("--ticks", type=whole_number(1, 10_000_000), default=1000, metavar="N", help="how long")
-    add("--colonies", **COUNT, default=1, help="side by side, by seed")
-    add("--seed", type=whole_number(), default=0, metavar="N", help="the first of them")
-    start = "of ants, by the queen or anywhere"
+    add("--ants", **COUNT, default=80, help="number of ants at the start")
+    ticks: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
+    add("--ticks", **ticks, default=1000, help="number of ticks to run")
+    add("--colonies", **COUNT, default=1, help="number of colonies in parallel, a seed each")
+    add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
+    start = "place ants around the queen or anywhere"
     add("--start", choices=("nest", "spread"), default="nest", help=start)
     add("--world", default="open", metavar="NAME", help=command_line.WORLDS)
     sharings = ("shared", "independent", "frozen")
-    add("--sharing", choices=sharings, default="shared", help="of tables")
-    add("--policy", metavar="FILE", help="a policy file to start from (.npz)")
-    add("--capacity", **COUNT, help="most ants at once, if births are on")
-    which = "rules to start from (default: those of --policy, else the paper's)"
+    sharing = "share a table of action values, learn into a table each, or do not learn"
+    add("--sharing", choices=sharings, default="shared", help=sharing)
+    add("--policy", metavar="FILE", help="start with the table of a policy file (.npz)")
+    add("--capacity", **COUNT, help="largest number of ants alive, if births are on")
+    which = "rules, which other options change (default: those of --policy, else the paper's)"
     add("--task", choices=("paper", "foraging", "queueing"), help=which)
     add = parser.add_argument_group("files").add_argument
-    add("--save", metavar="FILE", help="keep the colony at the end (.npz)")
-    add("--resume", metavar="FILE", help="go on with a colony that was saved")
-    picture = "a picture of the end (.png), or an animation (.gif, .mp4, a folder)"
+    add("--save", metavar="FILE", help="save the colony at the end (.npz)")
+    add("--resume", metavar="FILE", help="resume a saved colony (.npz)")
+    picture = "draw the end (.png), or an animation (.gif, .mp4, a folder)"
     add("--render", metavar="PATH", help=picture)
-    add("--frame-interval", **COUNT, default=2, help="ticks a picture of an animation")
-    figure = "foods delivered per tick over time, of all colonies together (.png and .csv)"
+    add("--frame-interval", **COUNT, default=2, help="ticks per frame of an animation")
+    figure = "draw deliveries per tick over time, of all colonies together (.png and .csv)"
     add("--figure", metavar="FILE.png", help=figure)
     command_line.add_common(parser)
     parser.open_settings = ("world", "task", "training")
@@ -136,28 +137,28 @@ def _add_live(parser: command_line.Parser) -> None:
 
 
 KINDS = {
-    "study": ("The study of the colony", _add_study),
-    "live": ("One colony, or many side by side, that live for a while", _add_live),
+    "study": ("study colonies of several sizes, rules and worlds with many seeds", _add_study),
+    "live": ("run one colony, or many in parallel", _add_live),
 }
 
 
 def _learning(epsilon: float) -> TrainingConfig:
-    """The learner before options change it; its epsilon does not decay, unless a study plans it."""
+    """Return the default training, without a decay of epsilon, which the study adds."""
     return TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0)
 
 
 def _living(task: Task) -> Task:
-    """A task for colonies that live on after a delivery, while trails evaporate."""
+    """Return the task with trails that evaporate, and deliveries that do not end learning."""
     return replace(task, delivery="truncates", evaporation_in_training=True)
 
 
 def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingConfig:
-    """Return the learner with what options change."""
+    """Return the training with the settings of the command line."""
     return _learning(epsilon).but(**command_line.given_settings(settings).get("training", {}))
 
 
 def study(settings: argparse.Namespace) -> None:
-    """Run the study, or show the finished one."""
+    """Run the study, or show its results if it is finished."""
     from taichi_ants.studies.colony_study import plan, study_of, write_results
     from taichi_ants.studies.result_folder import work_or_show
 
@@ -185,7 +186,7 @@ def make_page(
     results: Results | None,
     made: Mapping[str, Any],
 ) -> str:
-    """Return the page of the results in a folder, which are read from there if not given."""
+    """Return the page of the results in a folder; if `results` is None, read them from there."""
     from taichi_ants import files
     from taichi_ants.analysis.colony.figures import draw_all
     from taichi_ants.analysis.colony.tables import Results
@@ -208,7 +209,7 @@ def make_page(
 
 
 def live(settings: argparse.Namespace) -> None:
-    """Let one colony live, then say what it did; a signal ends it at a whole tick."""
+    """Run a colony and print a summary; a signal stops it between two ticks."""
     from taichi_ants import Colony
     from taichi_ants.studies.one_colony import check_places, live, summary
 
@@ -224,14 +225,14 @@ def live(settings: argparse.Namespace) -> None:
             live(colony, settings.ticks, progress, stopped, *files, settings.frame_interval)
         print(summary(colony, colony.ticks - begun, time.perf_counter() - began))
         for path in filter(None, files):
-            print(f"{path} is written.")
+            print(f"Wrote {path}.")
         if stopped():
-            kept = f"; --resume {settings.save} goes on from there" if settings.save else ""
+            kept = f"; use --resume {settings.save} to resume" if settings.save else ""
             raise KeyboardInterrupt(f"Stopped at tick {colony.ticks}{kept}.")
 
 
 def new_colony(settings: argparse.Namespace) -> Colony:
-    """A colony at the start of its episode; deliveries do not end it, so updates look beyond."""
+    """Return a new colony from the settings, at the start of its episode."""
     from taichi_ants import AntsError, Colony, load_policy, worlds
 
     of_world = {"seed": settings.seed, **command_line.given_settings(settings).get("world", {})}
@@ -239,8 +240,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     policy = load_policy(settings.policy) if settings.policy else None
     if settings.sharing == "frozen" and policy is None:
         raise AntsError(
-            "--sharing frozen needs a table that the ants follow; give --policy FILE, or choose "
-            "another --sharing."
+            "--sharing frozen requires a policy; add --policy FILE, or choose another --sharing."
         )
     names = ("ants", "capacity", "start", "sharing", "threads", "arch")
     options: dict[str, Any] = {name: getattr(settings, name) for name in names}
@@ -253,7 +253,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
 
 
 def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
-    """The task that is named, else the policy's, else the paper's; with what options change."""
+    """Return the task of --task, or the policy's, or the paper's, with settings from options."""
     named = Task.named()[settings.task] if settings.task else None
     base = _living(named or (policy.task if policy else Task()))
     if policy:
@@ -262,7 +262,7 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
 
 
 def start(settings: argparse.Namespace) -> None:
-    """The study, or one colony."""
+    """Run the study or one colony."""
     command_line.load_plugin(settings.plugin)
     if settings.kind == "live":
         live(settings)
@@ -272,5 +272,5 @@ def start(settings: argparse.Namespace) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
+    """Run the command."""
     command_line.run_command(lambda: start(parse_arguments(arguments)))

@@ -1,7 +1,8 @@
-"""The paper's comparison of Q-learning, SARSA and Dyna-Q, over many seeds, with honest statistics.
+"""Repeat the paper's comparison of Q-learning, SARSA and Dyna-Q with many seeds.
 
-Trains every configuration with every seed, follows the final policies greedily, holds the outcome
-against the paper and against exact bounds, and writes tables, figures and policies to a folder.
+The command trains every configuration with every seed and follows the final policies greedily. It
+compares the results with the paper and with exact bounds, and writes tables, figures and policies
+to a folder. See docs/paper.md.
 """
 
 from __future__ import annotations
@@ -39,34 +40,38 @@ DELIVERIES = ("truncates", "terminates")
 ROLLOUTS = 50
 QUICK_SEEDS = 10
 MOST_SEEDS = 10_000
-# Of these, bounds and behaviours know no other values.
+# Bounds and behaviours assume the defaults of these settings.
 _FIXED = [one.path for one in all_of(Task) if "evaporation_in" not in one.path]
 _DEPTH = "planning_steps"  # the one hyperparameter that the paper varies
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
-    """The settings of the command line; the defaults are the paper's."""
+    """Return the settings of the command line; the defaults are the paper's."""
     parser = Parser(__doc__)
     add = parser.add_argument
     seeds: dict[str, Any] = {"type": whole_number(1, MOST_SEEDS), "metavar": "N"}
-    add("--seeds", **seeds, default=100, help=f"how many, at most {MOST_SEEDS}")
-    add("--seed", type=whole_number(), default=0, metavar="BASE", help="the first of them")
+    add("--seeds", **seeds, default=100, help=f"number of seeds, at most {MOST_SEEDS}")
+    add("--seed", type=whole_number(), default=0, metavar="BASE", help="first seed")
     counts: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
     add("--episodes", **counts, default=500, help="training episodes of a run")
-    add("--max-steps", **counts, default=600, help="step limit")
-    add("--delivery", choices=(*DELIVERIES, "both"), default="both", help="what delivery means")
+    add("--max-steps", **counts, default=600, help="step limit of an episode")
+    delivery = "bootstrap at a delivery (truncates), do not (terminates), or compare both"
+    add("--delivery", choices=(*DELIVERIES, "both"), default="both", help=delivery)
     names = ("q_learning", "sarsa", "dyna_q")
-    add("--learners", nargs="+", default=names, metavar="NAME", help="one or more")
-    few: dict[str, Any] = {"nargs": "+", "type": float, "metavar": "X", "help": "one or more"}
-    add("--learning-rates", **few, default=(0.001, 0.01))
-    add("--discounts", **few, default=(0.9, 0.99))
-    add("--epsilons", **few, default=(0.3, 0.5))
-    add("--epsilon-decays", **few, default=(0.99, 0.995))
+    add("--learners", nargs="+", default=names, metavar="NAME", help="learners to compare")
+    few: dict[str, Any] = {"nargs": "+", "type": float, "metavar": "X"}
+    add("--learning-rates", **few, default=(0.001, 0.01), help="learning rates of the grid")
+    add("--discounts", **few, default=(0.9, 0.99), help="discounts of the grid")
+    add("--epsilons", **few, default=(0.3, 0.5), help="initial exploration rates of the grid")
+    decays = "factors of the grid on epsilon after each episode"
+    add("--epsilon-decays", **few, default=(0.99, 0.995), help=decays)
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1), "metavar": "N"}
-    add("--planning-steps", **several, default=(3, 5), help="one or more, for learners that plan")
+    planning = "planning steps after each step, for learners that plan"
+    add("--planning-steps", **several, default=(3, 5), help=planning)
     add("--world", default="paper", help=WORLDS)
     add_common(parser)
-    add("--quick", action="store_true", help=f"at most {QUICK_SEEDS} seeds, no animations")
+    quick = f"use at most {QUICK_SEEDS} seeds and draw no animations"
+    add("--quick", action="store_true", help=quick)
     add_results(parser, "compare")
     parser.open_settings, parser.own_settings = ("world", "training"), _FIXED
     add_settings(parser, Task())
@@ -77,12 +82,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def variants(settings: argparse.Namespace) -> list[tuple[str, dict[str, Any]]]:
-    """The learners, each with what it has of the hyperparameters, once for each planning depth."""
+    """Return pairs of a learner and its hyperparameters, one for each number of planning steps."""
     from taichi_ants import learners
 
     given = given_settings(settings).get("training", {})
     if _DEPTH in given:
-        raise AntsError(f"training.{_DEPTH} has its own option; write --planning-steps.")
+        raise AntsError(f"training.{_DEPTH} has its own option; use --planning-steps instead.")
     kinds = {name: fields(learners.get(name).hyperparameters) for name in settings.learners}
     own = {name: [field.name for field in kind] for name, kind in kinds.items()}
     for one in given:
@@ -96,7 +101,7 @@ def variants(settings: argparse.Namespace) -> list[tuple[str, dict[str, Any]]]:
 
 
 def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
-    """The grid: tasks, learners and planning steps, times rates, discounts and exploration."""
+    """Return the points of the grid: tasks and learners with all combinations of settings."""
     from taichi_ants.studies.runner import RunPoint
 
     deliveries = DELIVERIES if settings.delivery == "both" else (settings.delivery,)
@@ -111,11 +116,11 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
         RunPoint(world, task, TrainingConfig(name, *four, **more), *lengths)
         for task, (name, more), four in grid
     )
-    return tuple(dict.fromkeys(every))  # some may be asked for twice
+    return tuple(dict.fromkeys(every))  # without repetitions
 
 
 def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
-    """The work, checked as a whole before any of it is done."""
+    """Return the study, after checking all settings."""
     from taichi_ants.studies.runner import Study
 
     load_plugin(settings.plugin)
@@ -123,14 +128,14 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
     grid = points(settings, world)
     if not world.reachable_foods().any():
         raise AntsError(
-            f"no food of the world {settings.world!r} can be reached from the queen; "
-            "open a way or choose another world."
+            f"ants cannot reach any food of the world {settings.world!r} from the queen; open a "
+            "way or choose another world."
         )
     return Study(grid, tuple(range(settings.seed, settings.seed + settings.seeds)))
 
 
 def compare(settings: argparse.Namespace) -> None:
-    """Run the comparison, or show the finished one."""
+    """Run the comparison, or show its results if it is finished."""
     from taichi_ants.files.results import MANIFEST
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.worker_process import WorkerProcess
@@ -145,15 +150,15 @@ def compare(settings: argparse.Namespace) -> None:
 
         return make_page(settings, study, *found)
 
-    # Who asks for one thread wants the other processors for something else.
+    # With --threads 1, there is no worker process either.
     with WorkerProcess(not settings.no_figures and settings.threads != 1) as worker:
         if not (settings.out / MANIFEST).exists():
-            worker.begin(import_module, "taichi_ants.report.results")  # this takes a while
+            worker.begin(import_module, "taichi_ants.report.results")  # slow, so start early
         study = build_study(settings)
         work_or_show(settings, study.settings(), work, page=page)
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """The command line."""
-    again = "Stopped; finished runs are kept, and the same command goes on from there."
+    """Run the command."""
+    again = "Stopped; finished runs are saved. Run the same command again to resume."
     run_command(lambda: compare(parse_arguments(arguments)), again)

@@ -1,7 +1,7 @@
-"""A sweep over any settings of the world, the task, the learner or the colony, from a TOML file.
+"""Sweep any settings of the world, the task, the learner or the colony, from a TOML file.
 
-FILE names fixed settings, those that vary with their values, seeds, and what to measure. Every
-combination is done with every seed; tables and a figure go to a folder. See docs/sweeps.md.
+FILE has fixed settings, settings that vary with their values, seeds, and measures. The command runs
+every combination with every seed, and writes tables and a figure to a folder. See docs/sweeps.md.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from taichi_ants.studies import command_line
 def parse_arguments(
     arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
 ) -> argparse.Namespace:
-    """Return the settings of the command line; a script `about` one sweep gives its file."""
+    """Return the settings of the command line; a script for one sweep gives `file` and `about`."""
     parser = command_line.Parser(about or __doc__)
     if file is None:
-        parser.add_argument("file", type=Path, metavar="FILE", help="what to do (.toml)")
+        parser.add_argument("file", type=Path, metavar="FILE", help="sweep to run (.toml)")
     parser.set_defaults(**({"file": file} if file else {}))
     command_line.add_common(parser)
     name = f"sweep-{file.stem}" if file else "sweep-NAME, by the name of FILE"
@@ -29,7 +29,7 @@ def parse_arguments(
 
 
 def sweep(settings: argparse.Namespace) -> None:
-    """Do the sweep, or show the finished one."""
+    """Run the sweep, or show its results if it is finished."""
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.sweep import read_sweep
 
@@ -47,7 +47,7 @@ def sweep(settings: argparse.Namespace) -> None:
 def main(
     arguments: list[str] | None = None, file: Path | None = None, about: str | None = None
 ) -> None:
-    """Run the command line; the arguments are those of `parse_arguments`."""
+    """Run the command; the arguments are those of `parse_arguments`."""
     command_line.run_command(
         lambda: sweep(parse_arguments(arguments, file, about)), command_line.AGAIN
     )

@@ -1,5 +1,5 @@
-"""Reports of studies as web pages: one file each, without a network.
+"""Reports of studies as web pages: one file each, which works offline.
 
-Templates (`*.html`) share one style (`report.css`) and one script (`report.js`); the viewer's
-script plays what moves on them.
+Templates (`*.html`) share one style (`report.css`) and one script (`report.js`); the scripts of the
+viewer play the recordings.
 """

@@ -1,4 +1,4 @@
-"""The page of the study of the colony, and the recordings on it."""
+"""The page of the colony's study, and its recordings."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from taichi_ants.report.page import Player, Shown, Statement, Statements, fill
 from taichi_ants.studies.colony_study import COMPARED, Plan
 from taichi_ants.viewer import record_colony
 
-TICKS, MOST_ANTS = 240, 1000  # how long, and how many ants are shown at most
+TICKS, MOST_ANTS = 240, 1000  # of a recording
 
 
 def colony_page(
@@ -38,7 +38,7 @@ def colony_page(
     facts: Mapping[str, str],
     files: Sequence[str],
 ) -> str:
-    """Return the page as HTML, with `facts` on how it was done and links to `files` beside it."""
+    """Return the page as HTML; `facts` describe the method, and `files` are links to results."""
     world_kinds = list(dict.fromkeys(row.condition.world_kind for row in rows))
     trained = [world_kind for world_kind in WORLD_KINDS if world_kind in world_kinds]
     seeds = seeds_in_words(rows[0].seeds)
@@ -62,7 +62,6 @@ def colony_page(
 
 
 def _statements(findings: Judged) -> Statements:
-    """The findings, with the verdict on the largest colony."""
     lines = []
     for (world_kind, series), by_sizes in findings.items():
         unit = MEASURES[series.measure]
@@ -78,7 +77,7 @@ def _statements(findings: Judged) -> Statements:
 
 
 def at_work(policies: Path, conditions: Plan, seeds: Sequence[int], arch: str) -> list[Player]:
-    """Recordings of the largest colony under each of the compared rules, all in one world."""
+    """Return recordings of the largest colony under each of the compared rules, in one world."""
     trained = [one for one in conditions if one.regime == JOINT and one.ants <= MOST_ANTS]
     if not trained:
         return []

@@ -1,4 +1,4 @@
-"""The page of the paper's comparison, and the pictures on it."""
+"""The page of the paper's comparison, and its figures and recordings."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from taichi_ants.studies.runner import RunPoint, Study
 from taichi_ants.task import Task
 from taichi_ants.viewer import record_episode
 
-STEPS = 80  # of an episode, at most; a delivery takes 34, to and fro on the trail 38
+STEPS = 80  # the longest recording; a delivery takes 34 steps, walking to and fro on the trail 38
 
-Begin = Callable[..., Callable[[], Any]]  # begins a call, and returns what waits for it
+Begin = Callable[..., Callable[[], Any]]  # begins a call and returns a function that waits for it
 
 
 class Seen(NamedTuple):
-    """Figures, a recording of each behaviour, and the sheet of a policy that delivers, if any."""
+    """The figures, a recording of each behaviour, and the sheet of a policy that delivers."""
 
     drawings: Sequence[Drawing] = ()
     players: Sequence[Player] = ()
@@ -42,14 +42,14 @@ class Seen(NamedTuple):
 
 
 def as_in_training(task: Task) -> Task:
-    """The task with the evaporation of training in rollouts too."""
+    """Return the task with the evaporation of training also in evaluation."""
     return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
 
 
 def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
-    """The beginning of the episode that told the behaviour of a policy.
+    """Return the first steps of the episode by which the behaviour of a policy was classified.
 
-    It has evaporation as in training, not as in the greedy evaluation.
+    It has the evaporation of training, not that of the greedy evaluation.
     """
     steps, task = min(point.max_steps, STEPS), as_in_training(point.task)
     return Episode.play(point.world, q_values, seed=seed, max_steps=steps, task=task)
@@ -63,10 +63,10 @@ def what_is_seen(
     play: Begin = partial,
     draw: Begin = partial,
 ) -> Callable[[], Seen]:
-    """Return what waits for the figures, a recording of each behaviour and the sheet of a policy.
+    """Return a function that waits for the figures, recordings and policy sheet of the page.
 
-    Examples whose policies are not in the folder are left out. Ants are followed here, where the
-    kernel for that is compiled; `play` and `draw` begin the rest, as `WorkerProcess.begin`.
+    It skips examples whose policies are not in the folder. Policies are followed in this process,
+    which has compiled the kernel; `play` and `draw` begin the other calls (`WorkerProcess.begin`).
     """
     first: dict[int, tuple[int, int, Path]] = {}
     for row, run in examples(comparison):
@@ -86,9 +86,9 @@ def what_is_seen(
         recording = play(record_episode, played(point, policy.q_values, seed), BEHAVIOURS[code])
         recorded.append((sentence(BEHAVIOURS[code]), words, recording))
         if code == DELIVERS:
-            title = f"{variant.label}: what it does"
+            title = f"{variant.label}: policy"
             sheet = play(policy_sheet, policy.q_values, title, task=point.task)
-            sheets.append((f"What an ant has learned: {whose}", sheet))
+            sheets.append((f"The policy of an ant: {whose}", sheet))
     drawn = draw(drawings_of, comparison, baselines)
     return lambda: Seen(
         drawn(),
@@ -98,14 +98,14 @@ def what_is_seen(
 
 
 def drawings_of(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
-    """The figures. A figure that has been saved as a file is laid out a little otherwise."""
+    """Return new figures for the page, because saving a figure as a file changes its layout."""
     return drawings(draw_all(comparison, baselines))
 
 
 def comparison_page(
     results: Results, seen: Seen, *, facts: Mapping[str, str], files: Sequence[str]
 ) -> str:
-    """Return the page as HTML, with `facts` on how it was done and links to `files` beside it."""
+    """Return the page as HTML; `facts` describe the method, and `files` are links to results."""
     comparison = results.comparison
     first, *others, notes = report.figure_tables(results.lines, comparison)
     greedy, baselines = report.greedy_table(results.lines), report.baseline_table(results.baselines)
@@ -134,14 +134,13 @@ def comparison_page(
 
 
 def _claims(results: Results) -> Statements:
-    """The claims, with a column of verdicts for each delivery setting."""
     lines = []
     for claim, findings in results.audit.items():
         told = [
             Shown(f"delivery {setting}", one, one.contrast.label, claim.quantity.unit)
             for setting, one in findings.items()
         ]
-        facts = {"Tested on": claim.tested_on, "Asked": claim.asked}
+        facts = {"Tested on": claim.tested_on, "Criterion": claim.asked}
         verdicts = [one.verdict for one in findings.values()]
         lines.append(Statement(claim.statement, claim.section, verdicts, facts, told))
     settings = map(sentence, results.comparison.delivery_settings)

@@ -1,4 +1,4 @@
-"""What the pages have in common: how a template is filled, and the parts that stand on both."""
+"""The common parts of the report pages: templates, players, drawings of intervals, and tables."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from taichi_ants.viewer.page import content_policy, part
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-# Of the viewer: what a recording holds, the picture of the world, and what plays it.
+# Scripts of the viewer: the data of a recording, the picture of the world, and the playback.
 _PLAYING = ("history.js", "stage.js", "timeline.js")
 
-# Of drawings of intervals.
+# Sizes of drawings of intervals.
 WIDTH, _MIDDLE, _NUMBERS, _LINE = 340.0, 15.0, 39.0, 15.0
-_SIDE = 26.0  # room for a number
-_LETTERS = 58  # of a line that is as wide as the drawing
+_SIDE = 26.0  # space for a number
+_LETTERS = 58  # characters of a line as wide as the drawing
 
 
 def _text(name: str) -> str:
@@ -47,13 +47,13 @@ def _templates() -> Environment:
 
 
 def signed(text: Any) -> Any:
-    """Text with true minus signs before numbers, as figures have them; what is no text stays."""
+    """Return text with true minus signs before numbers, and other values unchanged."""
     plain = isinstance(text, str) and not hasattr(text, "__html__")
     return re.sub(r"(?<![\w.-])-(?=[\d.])", "\N{MINUS SIGN}", text) if plain else text
 
 
 def fill(template: str, **parts: Any) -> str:
-    """A page as HTML; all text in the parts is escaped."""
+    """Return a page as HTML; all text in `parts` is escaped."""
     from markupsafe import Markup
 
     shared = {
@@ -66,7 +66,7 @@ def fill(template: str, **parts: Any) -> str:
 
 
 class Player(NamedTuple):
-    """A recording that plays on the page, with a title and words below it."""
+    """A recording that plays on the page, with a title and a caption (`words`)."""
 
     title: str
     words: str
@@ -74,19 +74,19 @@ class Player(NamedTuple):
 
     @property
     def data(self) -> str:
-        """The recording as text."""
+        """The recording as base64."""
         return base64.b64encode(self.recording.to_bytes()).decode()
 
 
 class Picture(NamedTuple):
-    """An image, uint8 (height, width, 3), with words for those who do not see it."""
+    """An image, uint8 (height, width, 3), with alternative text (`words`)."""
 
     words: str
     image: np.ndarray
 
     @property
     def data(self) -> str:
-        """A PNG in few colours, as text."""
+        """A PNG with 64 colours as base64."""
         from PIL import Image
 
         file = io.BytesIO()
@@ -100,7 +100,7 @@ class Picture(NamedTuple):
 
 
 class Shown(NamedTuple):
-    """A finding in one setting, as a page shows it; `label` and `unit` are those of its effect."""
+    """A finding in one setting, with the label and the unit of its effect."""
 
     setting: str
     finding: Finding
@@ -109,10 +109,10 @@ class Shown(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The effect and its interval, also by the mean if that has another verdict."""
+        """The effect and its interval; also those by the mean if its verdict differs."""
         words, by_mean = _measured(self.finding, self.label, self.unit), self.finding.by_mean
         if by_mean and by_mean.verdict is not self.finding.verdict:
-            told = _measured(by_mean, by_mean.contrast.label, self.unit)  # of another, maybe
+            told = _measured(by_mean, by_mean.contrast.label, self.unit)  # its contrast may differ
             words += f"; by the mean {by_mean.verdict.value}: {told}"
         return words
 
@@ -135,9 +135,8 @@ def _measured(finding: Finding, label: str, unit: str) -> str:
 def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
     """Return a finding as an SVG element, empty without numbers; `label` and `unit` name the axis.
 
-    The line is the interval, the dot the effect. One band is the range in which the criterion wants
-    the effect, another one the differences that are too small to matter: the regions by which
-    `Criterion.judge` decides.
+    The line is the interval and the dot is the effect. One band is the range that the criterion
+    requires, the other one the differences that are too small to matter, as in `Criterion.judge`.
     """
     if finding.verdict is Verdict.NOT_TESTED or not math.isfinite(finding.low + finding.high):
         return ""
@@ -185,10 +184,10 @@ def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
 
 
 class Statement(NamedTuple):
-    """A line of the table that can be sorted and filtered.
+    """A row of a table that readers can sort and filter.
 
-    `place` is the second column: of the paper, or of the world. There is a verdict for each column
-    of verdicts; facts and findings are shown on demand.
+    `place` is the second column: the section of the paper, or the world. `verdicts` has one for
+    each further column. Facts and findings are shown on demand.
     """
 
     text: str
@@ -198,7 +197,7 @@ class Statement(NamedTuple):
     shown: Sequence[Shown]
 
 
-# In the order in which a reader wants them.
+# In the order of the tallies on the page.
 KINDS = (
     *(Verdict.SUPPORTED, Verdict.EQUIVALENT, Verdict.UNDECIDED),
     *(Verdict.CONTRADICTED, Verdict.NOT_TESTED, Verdict.TOO_FEW),
@@ -206,7 +205,7 @@ KINDS = (
 
 
 class Statements(NamedTuple):
-    """A table of statements, which `noun` calls them; a header for each column."""
+    """A table of statements with a header for each column; `noun` is their name in the text."""
 
     headers: Sequence[str]
     lines: Sequence[Statement]
@@ -219,7 +218,7 @@ class Statements(NamedTuple):
 
     @property
     def tallies(self) -> list[tuple[str, list[tuple[Verdict, int]]]]:
-        """How many verdicts of each kind there are, for each column of verdicts."""
+        """The number of statements by verdict, for each column of verdicts."""
         columns = zip(*(line.verdicts for line in self.lines), strict=True)
         return [
             (header, [(one, column.count(one)) for one in self.kinds if one in column])
@@ -228,7 +227,7 @@ class Statements(NamedTuple):
 
 
 def setting_facts(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Return settings of a study as names and words; a list shows each of its values once."""
+    """Return the settings of a study as text by name, each value of a list once."""
     facts = {}
     for name, value in settings.items():
         several = value if isinstance(value, list) else [value]
@@ -250,7 +249,7 @@ def _plain(value: Any) -> str:
 
 
 def made_facts(made: Mapping[str, Any]) -> dict[str, str]:
-    """What made the results, from a manifest, in words."""
+    """Return the command, versions, machine and time of results as text, from their manifest."""
     packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items())
     cpus = f"{made['cpus']} processors" if made["cpus"] != 1 else "one processor"
     facts = {

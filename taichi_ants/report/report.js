@@ -1,11 +1,11 @@
-/* The report: light or dark, tables that sort and filter, and small players. */
+/* The report: light and dark mode, tables that sort and filter, and small players. */
 
 const dark = matchMedia("(prefers-color-scheme: dark)"), printing = matchMedia("print");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 const players = [];
 let chosenTheme = "";
 
-/* Paper is light, and cannot open what is closed. */
+/* Print in light mode, with all details open. */
 function showTheme() {
   if (printing.matches) document.querySelectorAll(".more").forEach((one) => (one.open = true));
   const wanted = chosenTheme || (dark.matches ? "dark" : "light");
@@ -23,7 +23,7 @@ class SmallPlayer {
     this.stage = new Stage(canvas, overlay, this.history);
     this.player = new Player(this.history, () => this.draw());
     this.player.speed = Number(figure.dataset.speed);
-    this.player.moment = Math.round(this.player.last / 2); // something goes on there
+    this.player.moment = Math.round(this.player.last / 2); // shows the ants at work
     this.fresh = true;
     this.slider.max = this.player.last;
     this.button.addEventListener("click", () => this.press());
@@ -79,7 +79,7 @@ class SmallPlayer {
   }
 }
 
-/* Lines of a table by the text, the place or the verdict; those that do not fit are hidden. */
+/* A table that sorts by text, place or verdict, and hides rows that do not match the filters. */
 class Statements {
   constructor(part) {
     this.part = part;
@@ -87,7 +87,7 @@ class Statements {
     this.lines = [...this.body.rows];
     this.words = part.querySelector("input");
     this.verdict = part.querySelector("[name=verdict]");
-    this.order = part.querySelector("[name=order]"); // where there is no room for heads
+    this.order = part.querySelector("[name=order]"); // for screens too narrow for headers
     this.found = part.querySelector("output");
     this.words.addEventListener("input", () => this.filter());
     this.verdict.addEventListener("change", () => this.filter());
@@ -115,7 +115,6 @@ class Statements {
     this.found.textContent = `${shown} of ${this.lines.length} ${this.part.dataset.noun}`;
   }
 
-  /* Paper shows what is open. */
   openAll(opens) {
     for (const one of this.details) one.open = opens;
   }
@@ -123,13 +122,13 @@ class Statements {
     this.opener.textContent = this.details.every((one) => one.open) ? "Close all details" : "Open all details";
   }
 
-  /* Up, down, and back to the order of the page. */
+  /* Ascending, descending, then the order of the page. */
   turn(column, order) {
     const next = { none: "ascending", ascending: "descending", descending: "" }[order];
     this.sort(next && `${column} ${next}`);
   }
 
-  /* Sorts by what the choice of an order says; "" is the order of the page. */
+  /* Sort by the selected order; "" is the order of the page. */
   sort(chosen) {
     const [column, order] = chosen.split(" ");
     this.order.value = chosen;
@@ -140,7 +139,7 @@ class Statements {
   }
 }
 
-/* What is wider than its place fades where more of it can be scrolled to. */
+/* Parts that can be scrolled sideways fade at that side. */
 function fade(part) {
   const show = () => {
     const rest = part.scrollWidth - part.clientWidth - part.scrollLeft;
@@ -148,7 +147,7 @@ function fade(part) {
     part.classList.toggle("more-left", part.scrollLeft > 1);
   };
   part.addEventListener("scroll", show, { passive: true });
-  new ResizeObserver(show).observe(part); // also when what folds is opened
+  new ResizeObserver(show).observe(part); // also when a folded part is opened
 }
 
 async function open() {
@@ -164,7 +163,7 @@ async function open() {
   for (const figure of document.querySelectorAll(".player")) {
     players.push(new SmallPlayer(figure, await recordingIn(figure.querySelector("script").textContent)));
   }
-  window.report = { players }; // for tests, and for those who look inside
+  window.report = { players }; // for tests and for debugging
 }
 
 open();

@@ -1,4 +1,4 @@
-"""The results of `compare`: trained, measured, written, drawn, and shown as a page."""
+"""The work of the command `compare`: training, measures, tables, figures, and the page."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ from taichi_ants.viewer import record_colony
 SIZE = 720, 480  # of animations
 RUNS, BASELINES = "runs.npz", "baselines.csv"
 FIGURES, POLICIES, RENDERS = "figures", "policies", "renders"
-_CURVE = "curve_"  # begins the names of learning curves in RUNS
+_CURVE = "curve_"  # prefix of the names of learning curves in RUNS
 
 
 def do_comparison(
@@ -58,7 +58,11 @@ def do_comparison(
     blocks: Path,
     ready: Path,
 ) -> tuple[Results, Seen]:
-    """Do what is not done yet, and write all results."""
+    """Do the blocks of a study that are missing in `blocks`, and write all results to `ready`.
+
+    Returns:
+        The results, and the figures and recordings of the page.
+    """
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
     world, task, steps = first.world, first.task, first.max_steps
     shows = not settings.no_figures
@@ -74,7 +78,7 @@ def do_comparison(
     baselines = exact() + simple
     begin = worker.begin if shows and not settings.quick else None
     waits = write_policies(ready, study, comparison, tables, begin)
-    # Beside this process there is time for the figures, unless there are animations.
+    # With --quick, the worker process draws the figures; without, it draws animations.
     draw = worker.begin if settings.quick else partial
     if shows:
         waits.insert(0, draw(draw_figures, comparison, baselines, ready / FIGURES))
@@ -93,7 +97,7 @@ def do_comparison(
 
 
 def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
-    """Prepare a process for what it will show, and draw, while there is nothing to show yet."""
+    """Compile and import all that a worker process needs to record and draw, before it has to."""
     load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
@@ -107,14 +111,14 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
 def measured(
     study: Study[RunPoint], folder: Path, where: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
-    """Return all measures of the runs, and what the final policies do: arrays (points, seeds)."""
+    """Return measures of the runs and behaviours of the final policies: arrays (points, seeds)."""
 
     def reduce(points: Sequence[RunPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
         followed = what_policies_do(points[0], seeds, outcome["q_values"])
         return {**measures_of_runs(outcome), **followed}
 
     with progress_bar("training") as progress:
-        # Compile all kernels first, on one thread, while the other process compiles its own.
+        # Compile all kernels first; this needs one thread, and the worker process uses another.
         for point in {point.training.learner: point for point in study.points}.values():
             short = replace(point, episodes=1, max_steps=1, rollouts=1)
             reduce((short,), (0,), short.do((short,), (0,), None, lambda share: None, where))
@@ -122,9 +126,9 @@ def measured(
 
 
 def what_policies_do(point: RunPoint, seeds: Sequence[int], q_values: np.ndarray) -> Outcome:
-    """Return behaviours and returns of ants that follow final policies; integer (C, S) both.
+    """Return behaviours and returns of ants that follow final policies, integer (C, S) each.
 
-    The policies (C, S, n_states, 5) are of points that differ from this one in their learners.
+    `q_values` (C, S, n_states, 5) are those of C points that differ from `point` only in training.
     """
     tables = q_values.reshape(-1, *q_values.shape[2:])
     max_steps = min(point.max_steps, MAX_ROLLOUT_STEPS)
@@ -138,7 +142,7 @@ def what_policies_do(point: RunPoint, seeds: Sequence[int], q_values: np.ndarray
 def comparison_of(
     settings: argparse.Namespace, study: Study[RunPoint], arrays: Mapping[str, np.ndarray]
 ) -> Comparison:
-    """Return the comparison of arrays from `measured`, with its curves if they are among them."""
+    """Return the comparison of arrays from `measured`, with learning curves if they have them."""
     first = study.points[0]
     return Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
@@ -156,7 +160,7 @@ def comparison_of(
 
 
 def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
-    """The world for readers: a registered name with its seed, or the name of a map file."""
+    """Return the world's name for readers: its registered name and seed, or its map file."""
     if study.points[0].world == worlds.paper():
         return PAPER_WORLD
     if settings.world in worlds.names():
@@ -168,7 +172,11 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
 def with_curves(
     study: Study[RunPoint], blocks: Path, comparison: Comparison
 ) -> tuple[Comparison, dict[tuple[int, int], np.ndarray]]:
-    """Read curves and the examples' tables, by row and place of the seed, from finished blocks."""
+    """Read learning curves and the examples' tables of action values from finished blocks.
+
+    Returns:
+        The comparison with curves, and the tables by indices of row and seed.
+    """
     shown, tables = examples(comparison), {}
     rows = [row for row, _ in shown] + [curve_row(comparison, *one) for one in comparison.learners]
 
@@ -188,9 +196,10 @@ def write_policies(
     tables: Mapping[tuple[int, int], np.ndarray],
     begin: Callable[..., Callable[[], Any]] | None,
 ) -> list[Callable[[], Any]]:
-    """Write the final Q-tables of the examples, with what an ant that follows them does.
+    """Write the policies of the examples, and with `begin` their animations.
 
-    Returns what waits for each animation; `begin` is `WorkerProcess.begin`, None without them.
+    Returns:
+        A function for each animation that waits for it.
     """
     for place in (POLICIES, RENDERS) if begin else (POLICIES,):
         files.check_writable_folder(folder / place)
@@ -211,19 +220,19 @@ def write_policies(
         save_policy(folder / POLICIES / f"{name}.npz", q_values, metadata)
         if begin:
             title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"
-            # The first of the lines beside the world says in words what the policy does.
+            # The animation shows the name of the episode next to the world.
             episode = replace(played(point, q_values, seed), name=behaviour)
             drawn.append(begin(render_policy, folder / RENDERS / f"{name}.gif", episode, title))
     return drawn
 
 
 def render_policy(path: Path, episode: Episode, title: str) -> None:
-    """Show what a policy does."""
+    """Write an animation of an episode."""
     save_animation(path, frames(episode.snapshots(), SIZE, title=title), pause=PAUSE)
 
 
 def draw_figures(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> None:
-    """Write the figures as files."""
+    """Write all figures as files."""
     style.save_all(draw_all(comparison, baselines), folder)
 
 
@@ -250,7 +259,7 @@ def make_page(
     found: tuple[Results, Seen] | None,
     made: Mapping[str, Any],
 ) -> str:
-    """Return the page of the results in a folder, which are read from there if not given."""
+    """Return the page of the results in a folder; if `found` is None, read them from there."""
     if found is None:
         comparison = comparison_of(settings, study, archives.read(folder / RUNS))
         baselines = [Baseline(**row) for row in files.read_csv(folder / BASELINES)]

@@ -1,1 +1,1 @@
-"""Sweeps as data, the runner of resumable blocks, and the folders of results."""
+"""Studies: sweeps from files, work in resumable blocks, and folders of results."""

@@ -1,4 +1,4 @@
-"""Blocks: finished pieces of work in files, which are used again for the same work only."""
+"""Blocks: files with finished parts of a study, which are reused only for the same work."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ _ABOUT = "about"
 
 
 def kept(path: Path, about: Any, make: Callable[[], Outcome]) -> Outcome:
-    """Return the arrays of a block (.npz); make and keep them if they are missing or damaged.
+    """Return the arrays of a block (.npz); make and save them if they are missing or damaged.
 
-    `about` is all that determines them. Raises AntsError if the file cannot be written.
+    `about` is everything that determines them. Raises AntsError if the file cannot be written.
     """
     digest = hashlib.sha256(files.to_json(about).encode()).hexdigest()
     if path.exists():
         try:
             block = archives.read(path)
-        except ValueError:  # AntsError is one
+        except ValueError:  # includes AntsError
             block = {}
         if str(block.pop(_ABOUT, "")) == digest:
             return block
-        notice(f"{str(path)!r} is damaged or of other work, so it is done anew.")
+        notice(f"{str(path)!r} is damaged or has other settings, so it is computed again.")
     made = make()
     archives.write(path, {**made, _ABOUT: np.array(digest)}, compress=False)
     return made
 
 
 def read(path: Path) -> Outcome:
-    """Return the arrays of a finished block; raises AntsError if it cannot be read any more."""
+    """Return the arrays of a finished block; raise AntsError if it cannot be read."""
     return {name: array for name, array in archives.read(path).items() if name != _ABOUT}

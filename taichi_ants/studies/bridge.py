@@ -1,4 +1,4 @@
-"""Colonies on the double bridge: how they train, and how crossings are counted."""
+"""Colonies on the double bridge: training, evaluation, and counts of crossings."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from taichi_ants.worlds.double_bridge import ROOM_RADIUS, branch_cells, junction
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-REACH = 50  # ticks for which an ant lays a trail
-_LOOK_EVERY = 4  # ticks; all branches are longer, so that no crossing is missed
+REACH = 50  # number of ticks for which an ant lays a trail
+_LOOK_EVERY = 4  # ticks; all branches are longer, so no crossing is missed
 _RULES = {"queueing": queueing, "foraging": foraging}
 _QUEEN_ROOM, _FOOD_ROOM, _SHORT, _LONG = range(4)
 
 
 def task(design: Design) -> Task:
-    """The rules of a design; food grows back at once."""
+    """Return the rules of a design; food grows back at once."""
     rules, kind = _RULES[design.rules](), design.evaporation
     evaporation: dict[str, Any] = {"evaporation": kind}
     if kind.isdecimal():
@@ -40,10 +40,10 @@ def task(design: Design) -> Task:
 
 
 def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
-    """How colonies of a design learn.
+    """Return the training of colonies of a design.
 
-    The short branch lies to the right in about half of the episodes and to the left in the others,
-    so that no colony can learn on which side it is.
+    The short branch is on the right in about half of the episodes and on the left in the others, so
+    colonies cannot learn its side.
     """
     right, left, *_ = bridges(design).values()
     pool = double_bridge(**right), double_bridge(**left)
@@ -61,17 +61,17 @@ def followed(
     ticks: int,
     where: Mapping[str, Any],
 ) -> dict[str, np.ndarray]:
-    """Return what `crossings` counts on each bridge while nobody learns; the file `path` keeps it.
+    """Return the `crossings` of trained colonies on each bridge; save them in `path` or read them.
 
-    The point of the design has `learned` the tables `q_values`, float32 (seeds, n_states, 5). An
-    episode has `ticks`, twice as many on `LATE`; `where` are threads and arch of colonies.
+    Training in the point `learned` gave the tables `q_values`, float32 (seeds, n_states, 5). An
+    episode has `ticks`, twice as many on `LATE`; `where` has the arguments `threads` and `arch`.
     """
 
     def counted() -> dict[str, np.ndarray]:
         found = {}
         for name, bridge in bridges(design).items():
             late, parts, world = name == LATE, [], double_bridge(**bridge)
-            # Interventions act on colonies of one world.
+            # Interventions need a colony with a single world.
             each = [slice(s, s + 1) for s in range(len(seeds))] if late else [slice(None)]
             for some in each:
                 given = world, seeds[some], q_values[some], False
@@ -85,13 +85,13 @@ def followed(
 
 
 def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:
-    """Run an episode, and count who has crossed the bridge by which branch.
+    """Run an episode, and count the crossings of the bridge by branch.
 
-    An ant has crossed when it comes to one room from the other; its branch is the one in which it
-    was last. Foragers come to the food without food, carriers to the queen with food. Until tick
-    `opens` the short branch is rock, if it is not 0; then the colony must have one world. Its
-    schedule is "by_world", in which ants keep their slots; `bridge` are arguments of
-    `double_bridge`.
+    An ant crosses when it enters one room and was in the other before; its branch is the last one
+    that it was in. Only foragers that enter the food room and carriers that enter the queen's room
+    count. Rock closes the short branch until tick `opens`; if above 0, there must be one world. The
+    colony has the schedule "by_world", in which ants keep their slots; `bridge` has the arguments
+    of `double_bridge`.
 
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.
@@ -121,7 +121,7 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
 
 
 def _zones(bridge: dict[str, Any]) -> np.ndarray:
-    """In which room or branch each cell lies; a junction belongs to its room."""
+    """Return the room or branch of each cell; a junction belongs to its room."""
     grid, junctions = double_bridge(**bridge).grid, junction_cells(**bridge)
     zone = np.full(grid.size, _QUEEN_ROOM)
     pile = junctions[1] + junctions[0]

@@ -1,7 +1,7 @@
-"""The study of the colony: its kinds of world, its designs, and what is done for each condition.
+"""The study of the colony: worlds, rules, training and evaluation of each condition.
 
-Other rules of the game are an entry in `RULES` (`analysis.colony.study`) and one in `TASKS`, other
-worlds one in `WORLDS` there and one in `_place` here.
+To add rules, add entries to `RULES` (`analysis.colony.study`) and `TASKS`. To add a kind of world,
+add an entry to `WORLDS` there, and extend `place`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SEEDS, CONDITIONS = "seeds.csv", "conditions.csv"
 FIGURES, POLICIES = "figures", "policies"
 _WIDTH = 79  # of the report, in columns
 _SILENT, _LIVELY = Pheromone(deposit="none"), Life(regrowth=0)
-# Trails fall in training too, and food grows back at once.
+# Trails evaporate also in training, and food grows back at once.
 TASKS: dict[str, Task] = {
     rules: replace(task, evaporation_in_training=True, life=_LIVELY)
     for rules, task in {
@@ -47,15 +47,15 @@ TASKS: dict[str, Task] = {
         study.QUEUES: queueing(),
     }.items()
 }
-# Of these, copies of fewer ants are evaluated, and all in other worlds than those of the training.
+# Rules whose policies are also evaluated with more ants, and in other worlds, than in training.
 COMPARED = (study.PAPER, study.ABC, study.QUEUES)
 TRAINED_WITH = {study.ALONE: 1, study.FEW: 4, study.SOME: 16}
 OPEN, LARGE_SIZE = "open", 1000
-POOL, FIRST_OF_POOL = 64, 1 << 20  # worlds for training, and the seed of the first of them
-EXPLORING = 0.7  # of the training episodes, until epsilon and the learning rate have fallen
-OPTIMISM = 10.0  # of each action before learning; more than most are worth
+POOL, FIRST_OF_POOL = 64, 1 << 20  # number of worlds for training, and the first one's seed
+EXPLORING = 0.7  # the share of training episodes in which epsilon and the learning rate decrease
+OPTIMISM = 10.0  # the initial action value, above most true values
 
-# What is done for each condition; some have a point in common.
+# The point of each condition; conditions can share points.
 Plan = dict[Condition, ColonyPoint]
 
 
@@ -70,19 +70,20 @@ def plan(
 ) -> Plan:
     """Return the conditions of some kinds of world, which are names in `WORLDS`.
 
-    The sizes ascend; ants that were trained elsewhere are as many as the last. Epsilon decays to
-    `EVALUATION_EPSILON` as the learning rate to a tenth; the last 30 % of episodes have these.
+    `sizes` ascend; in worlds other than those of the training, there are as many ants as the last.
+    Epsilon decays to `EVALUATION_EPSILON` and the learning rate to a tenth in the first 70 % of the
+    training episodes.
 
     Raises:
-        AntsError: There is no such kind of world, or ants cannot learn together with the learner.
+        AntsError: A kind of world is unknown, or ants cannot share a table with the learner.
     """
     for world_kind in world_kinds:
         check_one_of("the kind of world", world_kind, tuple(study.WORLDS))
     if learners.get(training.learner).td_error is None:
         able = [name for name in learners.names() if learners.get(name).td_error]
         raise AntsError(
-            f"learner {training.learner!r} has no TD error that can be summed over ants, and here "
-            f"they learn together; choose one of {', '.join(able)}."
+            f"learner {training.learner!r} has no TD error that can be summed over ants, which "
+            f"a shared table requires; choose one of {', '.join(able)}."
         )
     training = scheduled(replace(training, min_epsilon=study.EVALUATION_EPSILON), episodes)
     kinds = dict.fromkeys([*world_kinds, OPEN])
@@ -113,19 +114,19 @@ def plan(
     return conditions
 
 
-# Where food is not as in all other kinds of world.
+# Kinds of world in which food moves or takes time to grow back.
 LIVES = {"moving": Life(regrowth=0, wander=100), "slow": Life(regrowth=100)}
 RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
-_PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # and no other food
+_PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # number of piles; there is no other food
 
 
 def task_in(world_kind: str, task: Task) -> Task:
-    """Return the task with the food of a kind of world."""
+    """Return the task with the food rules of a kind of world."""
     return replace(task, life=LIVES.get(world_kind, _LIVELY))
 
 
 def place(world_kind: str, seed: int) -> World:
-    """Return the world of a kind and a seed; there is only one paper's world."""
+    """Return the world of a kind and a seed; the paper's world ignores the seed."""
     if world_kind == "paper":
         return worlds.paper()
     ranges = RANGES.get(world_kind, (30, 30, 30))
@@ -135,12 +136,11 @@ def place(world_kind: str, seed: int) -> World:
 
 
 def _drawn(world_kind: str, seeds: Iterable[int]) -> tuple[World, ...] | None:
-    """Worlds of a kind; None for the paper's, of which there is only one."""
     return None if world_kind == "paper" else tuple(place(world_kind, seed) for seed in seeds)
 
 
 def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
-    """The same with an epsilon and a learning rate that fall geometrically while ants explore."""
+    """Return the training with geometric decays of epsilon and of the learning rate."""
     exploring = max(1, round(EXPLORING * episodes))
     low = max(training.least_epsilon, 1e-6)
     return replace(
@@ -153,20 +153,20 @@ def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
 
 
 def greedy(point: ColonyPoint) -> ColonyPoint:
-    """Return the same ants, evaluated without exploration."""
+    """Return the point that evaluates the same ants without exploration."""
     calm = replace(point, training=replace(point.training, min_epsilon=0.0))
     return replace(calm, pool=None, episodes=0, after=point) if point.episodes else calm
 
 
 def study_of(conditions: Plan, seeds: Sequence[int]) -> Study[ColonyPoint]:
-    """Return the work that a plan takes, over some seeds."""
+    """Return the study that measures all conditions of a plan."""
     return Study((*conditions.values(), *map(greedy, conditions.values())), tuple(seeds))
 
 
 def measured(
     conditions: Plan, outcomes: Mapping[Any, Outcome], seeds: Sequence[int]
 ) -> dict[Condition, dict[str, np.ndarray]]:
-    """Return all measures of all conditions, from the outcomes of their points."""
+    """Return all measures, float64 (seeds,), of all conditions from the outcomes of the points."""
     bounds, found = bounds_of(conditions, len(seeds)), {}
     for condition, point in conditions.items():
         of_point, without = (
@@ -180,9 +180,9 @@ def measured(
 
 
 def bounds_of(conditions: Plan, seeds: int) -> dict[Condition, np.ndarray]:
-    """Return the most deliveries per 1000 ticks in the world of each seed, float64 (seeds,).
+    """Return upper bounds on deliveries per 1000 ticks in the world of each seed, float64 (seeds,).
 
-    They are nan where food moves or takes time to grow back: the limits do not hold there.
+    They are nan if food moves or takes time to grow back, because no bound is known.
     """
     limits: dict[Any, list] = {}
     found = {}
@@ -204,7 +204,7 @@ def write_results(
     folder: Path,
     draws: bool,
 ) -> Results:
-    """Write all results that follow from the outcomes of the points, and return them."""
+    """Return the results of a plan's outcomes, after writing all of their files."""
     values = measured(conditions, outcomes, seeds)
     results = Results.of(values)
     for name, table in (
@@ -229,7 +229,7 @@ def _save_policies(
     outcomes: Mapping[Any, Outcome],
     folder: Path,
 ) -> None:
-    """Save of each jointly trained, compared condition the policy of its median seed."""
+    """Save the policy of the median seed of each condition with joint training in `COMPARED`."""
     for condition, point in conditions.items():
         world_kind, rules, regime, ants = condition
         if rules not in COMPARED or regime != study.JOINT:

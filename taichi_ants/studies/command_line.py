@@ -1,4 +1,4 @@
-"""The common part of command lines: arguments, errors, interruption, progress."""
+"""The common parts of command lines: options, errors, interruption, progress."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ if TYPE_CHECKING:
     from taichi_ants import World
 
 EXIT_BAD_INPUT = 2
-AGAIN = "Stopped; finished parts are kept, and the same command goes on from there."
+AGAIN = "Stopped; finished parts are saved. Run the same command again to resume."
 
 
 class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
-    """Shows the defaults that say something."""
+    """A formatter that shows defaults, except None, flags and empty lists."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        silent = action.default in (None, []) or action.default is False
+        silent = action.default in (None, []) or isinstance(action.default, bool)
         if isinstance(action.default, (list, tuple)) and not silent:
             return f"{action.help} (default: {' '.join(map(str, action.default))})"
         return action.help if silent else super()._get_help_string(action)
 
 
 class _OneOrList(argparse.Action):
-    """Store True without a value, one value as it is, and several as a list."""
+    """An action that stores True without a value, a single value, or a list of values."""
 
     def __call__(self, parser: Any, namespace: Any, values: Any, option: str | None = None) -> None:
         setattr(namespace, self.dest, values if len(values) > 1 else values[0] if values else True)
@@ -43,12 +43,12 @@ class _OneOrList(argparse.Action):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence on standard error.
 
-    `about` is a module's docstring, None under `python -OO`: its first line is the description.
+    `about` is a module's docstring, whose first line is the description, or None (`python -OO`).
     """
 
-    open_settings: tuple[str, ...] = ()  # such as "world", of which any --world.NAME is taken
+    open_settings: tuple[str, ...] = ()  # for example "world": accept any option --world.NAME
     own_settings: Container[str] = ()  # full names of settings that the command determines itself
-    program: str | None = None  # what --help calls it; None: the name of the script
+    program: str | None = None  # the name in --help; None: the name of the script
 
     def __init__(self, about: str | None = None, **settings: Any) -> None:
         summary, _, more = (about or "").partition("\n")
@@ -57,82 +57,82 @@ class Parser(argparse.ArgumentParser):
         super().__init__(**{**usual, **settings})
 
     def parse_given(self, arguments: list[str] | None = None) -> tuple[argparse.Namespace, dict]:
-        """The settings; and of those that were given, even as their defaults, the flag by name."""
+        """Return all settings, and the flags on the command line by the name of their setting."""
         words = sys.argv[1:] if arguments is None else arguments
         flags = [word.partition("=")[0] for word in words if word.startswith("--")]
         return self.parse_args(words), {flag[2:].replace("-", "_"): flag for flag in flags}
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
-        """Parse; refuse an empty word, such as an unset variable, which would count as no file."""
+        """Return parsed and unknown arguments; refuse empty ones, as from unset variables."""
         words = sys.argv[1:] if args is None else list(args)
         for before, word in zip(["", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
-                self.error(f"{word or before or 'the first argument'} is empty, leave it out")
+                self.error(f"{word or before or 'the first argument'} is empty; leave it out")
             self._add_setting(word.partition("=")[0])
         return super().parse_known_args(words, namespace)
 
     def _add_setting(self, flag: str) -> None:
-        """Take an option such as --world.piles, which is checked where it is used."""
+        """Accept an option such as --world.piles; the world checks its value."""
         path = flag[2:].replace("-", "_")
         if path in self.own_settings:
-            self.error(f"{flag} is chosen by this command, leave it out")
+            self.error(f"this command sets {flag} itself; leave it out")
         part, dot, _ = path.partition(".")
         if dot and part in self.open_settings and flag not in self._option_string_actions:
             self.add_argument(flag, dest=path, type=_literal, nargs="*", action=_OneOrList)
 
     def error(self, message: str) -> NoReturn:
         text = without_middle(" ".join(message.splitlines())).removeprefix("argument ").rstrip(".")
-        text = re.sub(r"invalid (whole )?\S+ value: (.*)", r"\2 is no \1number", text)
+        text = re.sub(r"invalid (whole )?\S+ value: (.*)", r"\2 is not a \1number", text)
         self.exit(EXIT_BAD_INPUT, f"error: {text}; see --help.\n")
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
-    """The options of all commands that compute something."""
+    """Add the options of all commands that compute something."""
     add = parser.add_argument
-    add("--plugin", metavar="FILE", help="a file with learners, observations or worlds (.py)")
+    add("--plugin", metavar="FILE", help="load learners, observations or worlds (.py)")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
-    add("--arch", choices=("cpu", "cuda"), default="cpu", help="where kernels run")
+    add("--arch", choices=("cpu", "cuda"), default="cpu", help="run kernels on this processor")
 
 
 def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) -> None:
-    """Add the options of commands with a folder of results; `with_folder` chooses its place."""
+    """Add the options of commands with a folder of results; `with_folder` sets its default."""
     add, place = parser.add_argument, f"results/{name}"
     default = f"{place}, with --quick {place}-quick" if quick else place
-    add("--out", type=Path, metavar="FOLDER", help=f"for the results (default: {default})")
-    add("--force", action="store_true", help="replace what FOLDER holds")
-    add("--no-figures", action="store_true", help="draw no figures and no animations")
+    add("--out", type=Path, metavar="FOLDER", help=f"write the results here (default: {default})")
+    add("--force", action="store_true", help="replace the results in FOLDER")
+    add("--no-figures", action="store_true", help="skip figures and animations")
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """Return the settings with a folder for the results; --quick has its own."""
+    """Return the settings with a folder for the results, which --quick changes."""
     settings.out = settings.out or Path("results", f"{name}-quick" if settings.quick else name)
     return settings
 
 
 def whole_number(least: int | None = None, most: int | None = None) -> Callable[[str], int]:
-    """An argument type: a whole number within bounds."""
+    """Return an argument type for whole numbers within bounds."""
 
     def parse(text: str) -> int:
         value = int(text)
         if (least is not None and value < least) or (most is not None and value > most):
             bounds = f"at least {least}" if most is None else f"from {least} to {most}"
-            raise argparse.ArgumentTypeError(f"{value} is not allowed, it must be {bounds}")
+            raise argparse.ArgumentTypeError(f"{value} is not allowed; it must be {bounds}")
         return value
 
-    parse.__name__ = "whole number"  # in argparse's message, where the text is none
+    parse.__name__ = "whole number"  # for argparse's message about other text
     return parse
 
 
-# What --world takes. The names stand here since those of the registry come with NumPy.
+# Help for --world. It lists names, because an import of the registry would import NumPy.
 WORLDS = (
-    "paper, open, far_piles, double_bridge, or the path of a map file; --world.NAME gives a "
-    "setting of it"
+    "paper, open, far_piles, double_bridge, or the path of a map file; --world.NAME changes a "
+    "setting of the world"
 )
 
 
 def add_settings(parser: Parser, base: Settings) -> None:
-    """Add an option for each setting but `parser.own_settings`; `base` has the defaults."""
-    parser.usage = "%(prog)s [options]"  # there are too many to list them twice
+    """Add an option for each setting except `parser.own_settings`; `base` has the defaults."""
+    parser.usage = "%(prog)s [options]"  # without the list of options, which is too long
     group = parser.add_argument_group(f"{base.path} settings")
     for one in declared(type(base)):
         value = getattr(base, one.name)
@@ -149,7 +149,7 @@ def add_settings(parser: Parser, base: Settings) -> None:
 
 
 def _literal(text: str) -> Any:
-    """The number or the flag that a text stands for, else the text."""
+    """Return the number or flag that a text represents, else the text."""
     for read in (int, float):
         with suppress(ValueError):
             return read(text)
@@ -157,12 +157,12 @@ def _literal(text: str) -> Any:
 
 
 def given_settings(settings: argparse.Namespace) -> dict[str, Any]:
-    """Return the settings that options give, as mappings in mappings (`settings.nested`)."""
+    """Return the settings from options such as --task.delivery, as nested mappings."""
     return nested({path: value for path, value in vars(settings).items() if "." in path})
 
 
 def given_world(settings: argparse.Namespace) -> World:
-    """Return the world of `--world`, with what `--world.NAME` options change."""
+    """Return the world of `--world` with the settings of `--world.NAME` options."""
     from taichi_ants import worlds
 
     given = given_settings(settings).get("world", {})
@@ -172,7 +172,7 @@ def given_world(settings: argparse.Namespace) -> World:
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
-    """Run a command line to its exit; mistakes end in one sentence, as does an interruption."""
+    """Run a command line to its exit; report errors and interruptions in one sentence."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     status = 0
@@ -181,18 +181,18 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
             command()
         if sys.stdout is not None:  # it is None if the caller has closed it
             sys.stdout.flush()
-    except BrokenPipeError:  # the reader of our output has gone, for example `| head`
+    except BrokenPipeError:  # nobody reads the output any more, for example after `| head`
         _discard_output()
     except (AntsError, OSError, MemoryError) as error:
         _discard_output()
-        text = str(error) or "this needs more memory than there is"
+        text = str(error) or "the command needs more memory than is available"
         notice(f"error: {text.rstrip('.')}.")
         status = EXIT_BAD_INPUT
     sys.exit(status)
 
 
 def load_plugin(path: str | None) -> None:
-    """Execute a Python file, if given, which registers learners, observations or worlds.
+    """Run a Python file that registers learners, observations or worlds, unless it is None.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.
@@ -210,15 +210,15 @@ def load_plugin(path: str | None) -> None:
         raise
     except (Exception, SystemExit) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".splitlines())
-        raise AntsError(f"the plugin {path!r} failed with {reason}; mend the file.") from error
+        raise AntsError(f"the plugin {path!r} failed with {reason}; correct the file.") from error
 
 
 @contextmanager
 def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar with the time left on standard error, if that is a terminal.
+    """Yield a function that shows the finished share of the work, 0 to 1, as a progress bar.
 
-    Yields a function of the share of the work that is done, 0 to 1. It raises KeyboardInterrupt if
-    a library has swallowed a signal to stop; so does the beginning.
+    The bar is on standard error, if that is a terminal. The function raises KeyboardInterrupt if a
+    library has ignored a signal to stop.
     """
     from rich.console import Console
     from rich.progress import Progress
@@ -241,7 +241,7 @@ def notice(text: str) -> None:
 
 
 def _discard_output() -> None:
-    """Drop what cannot be written, so that Python does not fail over it once more at exit."""
+    """Discard output that cannot be written, so that Python does not fail again at exit."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()

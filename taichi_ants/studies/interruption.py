@@ -1,7 +1,7 @@
-"""Ctrl-C and SIGTERM: they end a command in one line, whatever it is doing.
+"""Ctrl-C and SIGTERM: they end a command at any time, with a message of one line.
 
-A signal is noted besides raising KeyboardInterrupt, which libraries may swallow or turn into errors
-of their own. The imports are few, so that a command can be stopped from its first moment on.
+A signal is recorded and raises KeyboardInterrupt, because libraries may catch that exception or
+turn it into their own errors. This module has few imports, so that commands can be stopped early.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ _holds = False
 
 def _note(number: int, frame: FrameType | None) -> None:
     _noted.append(number)
-    if not _holds or len(_noted) > 2:  # who insists is not held up
+    if not _holds or len(_noted) > 2:  # the third signal always stops
         raise KeyboardInterrupt
 
 
 def _forget(unraisable: sys.UnraisableHookArgs) -> None:
-    """An interruption that cannot be raised where it comes, as in a callback, is noted at least."""
+    """Ignore interruptions that cannot be raised, as in callbacks; `_note` has recorded them."""
     if not issubclass(unraisable.exc_type, KeyboardInterrupt):
         sys.__unraisablehook__(unraisable)
 
 
 @contextmanager
 def stoppable(message: str = "Stopped.") -> Iterator[None]:
-    """End what is inside at Ctrl-C and SIGTERM, with status 128 + the signal's number.
+    """Return a context that exits at Ctrl-C and SIGTERM with status 128 + the signal's number.
 
-    It prints the message of the interruption, or `message`. What the parent ignores, as nohup does,
-    stays ignored.
+    It prints the text of the KeyboardInterrupt, or `message`. Signals that the parent process
+    ignores, for example nohup, remain ignored.
     """
     usual: dict[int, Any] = {signal.SIGINT: signal.default_int_handler}
     usual[signal.SIGTERM] = signal.SIG_DFL
@@ -54,13 +54,13 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
         sys.unraisablehook = hook
         for number in watched:
             signal.signal(number, usual[number])
-        if watched:  # this is the outermost
+        if watched:  # this is the outermost block
             _noted.clear()
 
 
 @contextmanager
 def held() -> Iterator[Callable[[], bool]]:
-    """Hold signals, up to the third, until what is inside is done; yield whether one came."""
+    """Yield a function that returns whether a signal came; delay up to two to the block's end."""
     global _holds
     _holds = True
     try:
@@ -71,6 +71,6 @@ def held() -> Iterator[Callable[[], bool]]:
 
 
 def stop_if_noted() -> None:
-    """Raise KeyboardInterrupt if a signal came that a library has swallowed; not where it waits."""
+    """Raise KeyboardInterrupt if a library has ignored a signal; do nothing inside `held`."""
     if _noted and not _holds:
         raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""One colony that lives for a while: saved, drawn, stopped between two ticks, told over time."""
+"""Runs of one colony: saving, drawing, stopping between ticks, and deliveries over time."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
 FRAMES_PER_SECOND = 12.0
-_MOST_SPANS = 60  # of a figure
+_MOST_SPANS = 60  # in a figure
 _PIECE_SECONDS = 0.2
 
 
 class Totals(NamedTuple):
-    """What has happened until a tick: foods delivered, moves tried, and those of them blocked."""
+    """Totals up to a tick: food items delivered, moves tried, and moves blocked."""
 
     tick: int
     deliveries: int
@@ -32,14 +32,14 @@ class Totals(NamedTuple):
 
     @classmethod
     def of(cls, colony: Colony) -> Totals:
-        """What all worlds together have done in this episode."""
+        """Return the totals of all worlds in this episode."""
         now = colony.outcome()
         counts = now.deliveries, now.moves, now.blocked
         return cls(colony.ticks, *(int(one.sum()) for one in counts))
 
 
 class Span(NamedTuple):
-    """A row of the numbers of a figure: the span of time between two totals."""
+    """A row of the file with a figure's numbers: the time between two totals."""
 
     from_tick: int
     to_tick: int
@@ -48,7 +48,7 @@ class Span(NamedTuple):
 
 
 def spans(totals: Sequence[Totals]) -> list[Span]:
-    """Return what happened between each two totals; `blocked` is a share of the moves."""
+    """Return the spans between successive totals; `blocked` is a share of the moves."""
     found = []
     for one, next_ in pairwise(totals):
         ticks, deliveries, moves, blocked = (b - a for a, b in zip(one, next_, strict=True))
@@ -57,7 +57,7 @@ def spans(totals: Sequence[Totals]) -> list[Span]:
 
 
 def save_figure(rows: Sequence[Span], who: str, path: files.PathLike) -> None:
-    """Write the figure (.png), and its rows beside it (.csv); the title says whose."""
+    """Write a figure (.png) and its numbers (.csv); `who` is the start of the title."""
     files.check_writable_folder(Path(path).parent)
     numbers = [one._asdict() for one in rows]
     files.write_csv(Path(path).with_suffix(".csv"), numbers, Span._fields)
@@ -65,7 +65,7 @@ def save_figure(rows: Sequence[Span], who: str, path: files.PathLike) -> None:
 
 
 def draw(rows: Sequence[Span], who: str) -> Figure:
-    """Foods per tick above, the share of blocked moves below."""
+    """Return a figure of food items per tick (above) and the share of blocked moves (below)."""
     edges = [rows[0].from_tick, *(row.to_tick for row in rows)] if rows else [0]
     with style.styled():
         figure = style.new_figure(3.6)
@@ -78,7 +78,7 @@ def draw(rows: Sequence[Span], who: str) -> Figure:
             axis.stairs(values, edges, baseline=None, color=colour, lw=1.5)
             axis.yaxis.set_major_formatter("{x:,g}")
         foods.set_ylim(bottom=0)
-        foods.set_ylabel("Foods per tick")
+        foods.set_ylabel("Food items per tick")
         blocked.set_ylim(0, 100)
         blocked.set_ylabel("Blocked, %")
         blocked.set_xlabel("Tick")
@@ -86,12 +86,12 @@ def draw(rows: Sequence[Span], who: str) -> Figure:
             blocked.set_xlim(edges[0], edges[-1])
         longest = max((row.to_tick - row.from_tick for row in rows), default=0)
         caption = f"Means over {longest:g} ticks. Blocked: share of the moves that fail."
-        style.frame(figure, f"{who}: foods delivered", caption, {})
+        style.frame(figure, f"{who}: food items delivered", caption, {})
     return figure
 
 
 def check_places(save: str | None, render: str | None, figure: str | None = None) -> None:
-    """Make sure, before the work begins, that what `live` shall write can be written."""
+    """Check, before the work begins, that the files of `live` can be written."""
     from taichi_ants.rendering.writers import check_animation, check_picture, is_picture
 
     if render is not None and is_picture(render):
@@ -114,10 +114,11 @@ def live(
     figure: str | None = None,
     frame_interval: int = 2,
 ) -> None:
-    """Let time pass in a colony, then write its files; it ends early once `stopped()` is true.
+    """Run a colony for `ticks` ticks, or until `stopped()` is true, and write its files.
 
-    It is saved even if its picture (.png) or animation (.gif, .mp4, a folder) cannot be written. A
-    figure (.png) shows what was delivered over time, and has its numbers beside it (.csv).
+    `save` is the file of the colony, which is saved even if drawing fails. `render` is a picture
+    (.png) of the end, or an animation (.gif, .mp4, a folder). `figure` (.png) shows deliveries over
+    time; their numbers are in a file with the same name (.csv).
     """
     from taichi_ants.rendering import colony_snapshots, frames, save_animation, save_picture
     from taichi_ants.rendering.writers import is_picture
@@ -125,7 +126,7 @@ def live(
     strongest = colony.task.pheromone.level
     animated = render is not None and not is_picture(render)
     interval = frame_interval if animated else ticks
-    least = frame_interval if animated else 1  # a span is a whole number of pictures
+    least = frame_interval if animated else 1  # a span is a whole number of frames
     span = -(-ticks // (least * _MOST_SPANS)) * least if figure else ticks
     totals = [Totals.of(colony)]
     passing = _pieces(colony, ticks, progress, stopped, interval, span, totals)
@@ -141,14 +142,13 @@ def live(
             who = _who(colony.ants * len(colony.seeds), colony)
             save_figure(spans(totals), who, figure)
     except (AntsError, OSError):
-        # Pictures are drawn between ticks, so this one is whole, and may have taken hours.
+        # The colony is intact, because drawing happens between ticks, and may have taken hours.
         _save(colony, save)
         raise
     _save(colony, save)
 
 
 def _save(colony: Colony, path: str | None) -> None:
-    """Save a colony, if there is a file to save it to, into a folder that is made if need be."""
     if path is not None:
         files.check_writable_folder(Path(path).parent)
         colony.save(path)
@@ -163,9 +163,9 @@ def _pieces(
     span: int,
     totals: list[Totals],
 ) -> Iterator[int]:
-    """Move a colony on by short pieces, after which it can be stopped.
+    """Run a colony in short pieces, so that it can be stopped between them.
 
-    Yields after every `interval` ticks and at the end; adds to the `totals` after every `span`
+    Yields after every `interval` ticks and at the end; appends to `totals` after every `span`
     ticks and at the end.
     """
     begun, piece, passed, ends = colony.ticks, 1, 0, stopped()
@@ -187,7 +187,7 @@ def _pieces(
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:
-    """What happened, in two lines, while so many ticks took so many seconds."""
+    """Return a summary of two lines for a run of `ticks` ticks that took `seconds`."""
     outcome = {name: int(array.sum()) for name, array in vars(colony.outcome()).items()}
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
     changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]

@@ -1,4 +1,4 @@
-"""Commands whose results lie in a folder: they do the work, or show what the folder holds."""
+"""Folders of results: a command computes the results, or shows those that the folder has."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from taichi_ants.files.results import PAGE, REPORT, ResultFolder, checksum_of, r
 
 _PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
 Results = TypeVar("Results")
-# Makes HTML from a folder of results, the results of the work if just done, and the manifest.
+# (folder of results, results if just computed, manifest) -> HTML
 Pages = Callable[[Path, Results | None, Mapping[str, Any]], str]
 
 
@@ -31,14 +31,14 @@ def work_or_show(
     leading: Sequence[str] = (),
     page: Pages[Results] | None = None,
 ) -> None:
-    """Do the work of a command, or show the results that its folder holds; print the report.
+    """Compute the results of a command unless its folder has them, and print the report.
 
     Args:
         settings: The command's `out`, `force`, `no_figures`, `plugin` and `arch`.
-        determines: All else that determines the results.
-        work: Called with a folder for blocks and one for the results, among them the report.
-        leading: As of a `ResultFolder`, whose errors are raised.
-        page: Makes the page, also if that alone is missing.
+        determines: Everything else that determines the results.
+        work: A function of a folder for blocks and one for the results; it writes the report.
+        leading: The argument of `ResultFolder`, whose errors are raised.
+        page: A function that makes the page; a missing page is made again.
     """
     plugin = checksum_of(Path(settings.plugin)) if settings.plugin else None
     facts = {**determines, "arch": settings.arch, "plugin": plugin}
@@ -55,13 +55,13 @@ def work_or_show(
             if page:
                 files.write_text(ready / PAGE, page(ready, results, made))
             folder.publish(ready, made)
-        print(f"{report}\n{seconds:.1f} s; everything is in {settings.out}/")
+        print(f"{report}\n{seconds:.1f} s; all results are in {settings.out}/")
     if page:
         print(settings.out / PAGE)
 
 
 def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None) -> None:
-    """Print the report of finished results; make their page again if it is missing."""
+    """Print the report of finished results, and make a missing page again."""
     folder.check(may_lack=PAGE if page else None)
     folder.tidy()
     manifest = read_manifest(settings.out)
@@ -69,15 +69,15 @@ def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None
     if page and is_missing:
         folder.add(PAGE, page(settings.out, None, manifest))
     print(files.read_text(settings.out / REPORT))
-    print(f"{settings.out}/ holds these results already; --force makes them again.")
+    print(f"{settings.out}/ already has these results; use --force to compute them again.")
     if not (settings.no_figures or manifest["figures"]):
-        print("They were made with --no-figures; to have figures, too, give --force.")
+        print("They have no figures because of --no-figures; use --force to draw figures.")
     if page and is_missing:
-        print(f"{PAGE} was missing, and is written again from the other files.")
+        print(f"{PAGE} was missing and has been written again from the other files.")
 
 
 def provenance(arguments: Sequence[str]) -> dict[str, Any]:
-    """Return the command, versions, machine, time and commit that make results."""
+    """Return the command, time, commit, versions and machine, for the manifest of results."""
     return {
         "command": shlex.join(arguments),
         "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
@@ -90,7 +90,7 @@ def provenance(arguments: Sequence[str]) -> dict[str, Any]:
 
 
 def commit() -> str | None:
-    """The commit of the source, "-dirty" behind it if files differ; None outside a checkout."""
+    """Return the commit of the source, with "-dirty" if files differ; None outside a checkout."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None

@@ -1,9 +1,8 @@
-"""Studies: points over seeds, done in blocks that are kept on disk as they finish.
+"""Studies: points over seeds, computed in blocks that are saved as they finish.
 
-A point is a world, a task, a learner, and for how long. The work is cut into blocks (some points
-that are alike, some seeds). Each finished block is a file, so that a study that was stopped goes on
-where it was. Since what a seed gives depends only on the point and the seed, blocks can be done in
-any order without changing anything.
+A point is a world, a task, a learner, and the lengths of training and evaluation. A block is a
+group of similar points and seeds. Each finished block is a file, so a stopped study can resume. The
+outcome of a run depends only on its point and seed, so the order of blocks does not matter.
 """
 
 from __future__ import annotations
@@ -31,13 +30,13 @@ from taichi_ants.worlds.world import World
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
-# Seeds of a colony's evaluation are those of the training plus this, so that no random number
-# serves both.
+# Added to the seeds of a colony for its evaluation, so that it shares no random numbers with the
+# training.
 EVALUATION_SEEDS = 1 << 32
-_STEPS_OF_A_BLOCK = 250_000_000  # of runs, at most, if every episode used all its steps
-_RUNS_OF_A_BLOCK = 5000  # at most, each needs about 20 KB while it is trained
-_NUMBERS_OF_A_BLOCK = 1 << 26  # of colonies, at most, unless one has more; four bytes each
-_NUMBERS_OF_AN_ANT, _NUMBERS_OF_A_CELL = 13, 4  # or a few less
+_STEPS_OF_A_BLOCK = 250_000_000  # at most, if every episode of every run uses all its steps
+_RUNS_OF_A_BLOCK = 5000  # at most; each needs about 20 KB during training
+_NUMBERS_OF_A_BLOCK = 1 << 26  # of four bytes, for colonies, at most, unless one needs more
+_NUMBERS_OF_AN_ANT, _NUMBERS_OF_A_CELL = 13, 4  # upper bounds
 _RUN_ARRAYS = ("returns", "steps", "deliveries")
 _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 
@@ -46,14 +45,15 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class RunPoint:
-    """A lone ant: trained, then its final policy is followed greedily.
+    """A lone ant that is trained and then follows its final policy greedily.
 
-    Outcome: `returns`, `steps`, `deliveries` of training, integer (seeds, episodes); the same as
-    `greedy_returns` ... of the rollouts, integer (seeds, rollouts); `q_values`, float32 (seeds,
-    n_states, 5); `seconds` of CPU time for training, float64 (seeds,).
+    Outcome: `returns`, `steps` and `deliveries` of training, integer (seeds, episodes);
+    `greedy_returns`, `greedy_steps` and `greedy_deliveries` of the rollouts, integer (seeds,
+    rollouts); `q_values`, float32 (seeds, n_states, 5); `seconds` of CPU time for training, float64
+    (seeds,).
 
     Attributes:
-        max_steps: Step limit of episodes and rollouts.
+        max_steps: The step limit of episodes and rollouts.
 
     Raises:
         AntsError: A value is not allowed.
@@ -79,23 +79,23 @@ class RunPoint:
 
     @property
     def alike(self) -> tuple:
-        """What the points of a block have in common."""
+        """The settings that all points of a block share."""
         which = self.training.learner, self.training.planning_steps
         return (self.world, self.task, which, self.episodes, self.max_steps, self.rollouts)
 
     @property
     def runs_of_a_block(self) -> int:
-        """Runs of a block: so many that it starts cheaply, so few that it can stop soon."""
+        """The number of runs of a block: many, for speed, but few enough to save often."""
         return min(max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps)), _RUNS_OF_A_BLOCK)
 
     @property
     def weight(self) -> float:
-        """About how much work a seed is."""
+        """The approximate work of a seed, for progress."""
         return self.episodes * self.max_steps
 
     @property
     def bytes_of_a_run(self) -> int:
-        """About how many bytes the outcome of one seed takes on disk, at most."""
+        """The approximate upper bound on the bytes of one seed's outcome on disk."""
         most = self.max_steps * self.task.rewards.largest
         ends = (-most, most), (0, self.max_steps), (0, 1)
         of_an_episode = sum(files.smallest(np.array(one)).itemsize for one in ends)
@@ -110,7 +110,7 @@ class RunPoint:
         progress: Progress,
         where: Mapping[str, Any],
     ) -> Outcome:
-        """The outcomes of points that are alike: arrays (points, seeds, ...)."""
+        """Return the outcomes of points of one block: arrays (points, seeds, ...)."""
         from taichi_ants.engines.runs.training import evaluate, train
 
         first, configs = points[0], [point.training for point in points]
@@ -128,21 +128,21 @@ class RunPoint:
 
 @dataclass(frozen=True)
 class ColonyPoint:
-    """A colony: it learns, then nobody does, and epsilon stays at its minimum.
+    """A colony that learns, and is then evaluated without learning, with the minimum of epsilon.
 
     Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
-    integer (seeds, rollouts), as in `ColonyEpisodes`; where it learned into one table `q_values`,
-    float32 (seeds, n_states, 5).
+    integer (seeds, rollouts), as in `ColonyEpisodes`; `q_values`, float32 (seeds, n_states, 5), if
+    ants learned into a shared table.
 
     Attributes:
         world: The world, or one for each seed, all of the same ranges.
-        pool: Worlds of the same ranges, from which each seed draws one for each training episode;
-            so no ant has seen `world`. None: training takes place in `world`.
-        sharing: "shared" or "independent", of tables while the ants learn.
-        start, capacity: As of a `Colony`.
-        episodes: Training episodes; with 0 the ants follow what the ants of `after` have learned.
-        ticks: Of each episode, of training and evaluation.
-        after: The point whose shared table learning goes on from; None: from zeros.
+        pool: Worlds of the same ranges for training; each seed draws one for each episode. None
+            means training in `world`.
+        sharing: "shared" or "independent" tables during training.
+        start, capacity: The arguments of `Colony`.
+        episodes: The number of training episodes; with 0, ants follow the table of `after`.
+        ticks: The length of each episode of training and evaluation.
+        after: The point from whose shared table learning starts; None means the initial values.
 
     Raises:
         AntsError: A value is not allowed.
@@ -172,13 +172,16 @@ class ColonyPoint:
         checked_whole("ticks", self.ticks, most=MAX_STEPS)
         checked_whole("rollouts", self.rollouts)
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
-            raise AntsError("a colony can only go on from one that has learned into one table.")
+            raise AntsError(
+                "`after` has no shared table; it must be a point with sharing='shared' and at "
+                "least one episode."
+            )
 
-    alike = property(lambda self: self)  # each point has blocks of its own
+    alike = property(lambda self: self)  # each point has its own blocks
 
     @property
     def runs_of_a_block(self) -> int:
-        """How many seeds: their colonies are in memory together, and go faster so."""
+        """The number of seeds of a block, whose colonies run together, as memory allows."""
         world = self.world[0] if isinstance(self.world, tuple) else self.world
         slots, states = self.capacity or self.ants, self.task.n_states
         memory = learners.get(self.training.learner).memory_for(self.training, states)
@@ -189,16 +192,16 @@ class ColonyPoint:
 
     @property
     def weight(self) -> float:
-        """About how much work a seed is."""
+        """The approximate work of a seed, for progress."""
         return self.ants * self.ticks * (self.episodes + self.rollouts)
 
     @property
     def bytes_of_a_run(self) -> int:
-        """About how many bytes the outcome of one seed takes on disk, at most."""
+        """The approximate upper bound on the bytes of one seed's outcome on disk."""
         return 8 * len(_COLONY_ARRAYS) * self.rollouts + 4 * self.task.n_states * N_ACTIONS
 
     def places(self, seeds: Sequence[int]) -> list[list[World]] | None:
-        """The world of each training episode and seed; None without a pool."""
+        """Return the world of each training episode and seed; None without a pool."""
         if self.pool is None:
             return None
         streams = [np.random.default_rng(seed % 2**64) for seed in seeds]
@@ -208,9 +211,9 @@ class ColonyPoint:
     def colony(
         self, world: Any, seeds: Sequence[int], q_values: Any, learns: bool, **options: Any
     ) -> Colony:
-        """The colony of some seeds, where epsilon is at its minimum if nobody `learns`.
+        """Return the colony of some seeds, for training or (`learns=False`) for evaluation.
 
-        The world or worlds, a table and further arguments are those of `Colony`.
+        `world`, `q_values` and `options` are arguments of `Colony`.
         """
         from taichi_ants.engines.colony.colony import Colony
 
@@ -231,7 +234,7 @@ class ColonyPoint:
         progress: Progress,
         where: Mapping[str, Any],
     ) -> Outcome:
-        """The outcome of a point: arrays (1, seeds, ...); `learned` are the tables of `after`."""
+        """Return the outcome of a point, arrays (1, seeds, ...); `learned` has `after`'s tables."""
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
         tables: Any = learned
@@ -256,10 +259,10 @@ PointKind = TypeVar("PointKind", bound=Point)
 
 @dataclass(frozen=True)
 class Study(Generic[PointKind]):
-    """Points over seeds, which pair them.
+    """Points over the same seeds.
 
     Raises:
-        AntsError: A world has no room for the ants, or not as many worlds as seeds are given.
+        AntsError: A world is too small for the ants, or worlds and seeds differ in number.
     """
 
     points: tuple[PointKind, ...]
@@ -268,26 +271,26 @@ class Study(Generic[PointKind]):
     def __post_init__(self) -> None:
         object.__setattr__(self, "seeds", checks.checked_seeds(self.seeds))
         if not self.points:
-            raise AntsError("there are no points to do; give at least one.")
+            raise AntsError("`points` is empty; give at least one point.")
         places: Any = dict.fromkeys((one.world, one.pool, one.ants) for one in self.points)
         for world, pool, ants in places:
             several = world if isinstance(world, tuple) else (world,)
             if len(several) not in (1, len(self.seeds)):
-                raise AntsError(f"there are {len(several)} worlds for {len(self.seeds)} seeds.")
+                raise AntsError(
+                    f"there are {len(several)} worlds for {len(self.seeds)} seeds; give one world, "
+                    "or one for each seed."
+                )
             starts = [*zip(several, self.seeds, strict=False), *((one, 0) for one in pool or ())]
             for one, seed in starts:
                 checks.checked_world(one, learns=True).start(seed, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:
-        """The points, each once, those that others go on from before these."""
+        """All points once; a point that is the `after` of another one comes first."""
         return _in_order(self.points)
 
     def blocks(self) -> Iterator[tuple[slice, slice]]:
-        """Yield which of the points in order, and which seeds, are in each block.
-
-        Put after each other, the blocks are an array (points, seeds).
-        """
+        """Yield the slices of `in_order` and of the seeds of each block, by rows of the array."""
         first = 0
         for _, group in itertools.groupby(self.in_order, lambda point: point.alike):
             points = list(group)
@@ -298,7 +301,7 @@ class Study(Generic[PointKind]):
             first = end
 
     def settings(self) -> dict[str, Any]:
-        """All that determines the numbers; equal settings give equal results."""
+        """Return everything that determines the results; equal settings give equal results."""
         return settings_of(self.points, self.seeds)
 
     def run(
@@ -308,7 +311,7 @@ class Study(Generic[PointKind]):
         arch: str | None = None,
         progress: Progress = lambda share: None,
     ) -> dict[PointKind, Outcome]:
-        """Do the blocks that the folder lacks; return all outcomes. Arguments as of `in_blocks`."""
+        """Return all outcomes; arguments and errors are those of `in_blocks`."""
         order, done = self.in_order, self.in_blocks(folder, threads, arch, progress)
         return {order[place]: outcome for place, outcome in self._joined(done, range(len(order)))}
 
@@ -320,9 +323,9 @@ class Study(Generic[PointKind]):
         arch: str | None = None,
         progress: Progress = lambda share: None,
     ) -> dict[str, np.ndarray]:
-        """Return numbers of each run, arrays (points, seeds) by name; only these stay in memory.
+        """Return numbers of each run, arrays (points, seeds) by name, without keeping outcomes.
 
-        `reduce` is called with points, seeds and outcome of a block, and returns such arrays of it;
+        `reduce` gets points, seeds and outcome of a block and returns these arrays for the block;
         the other arguments and errors are those of `in_blocks`.
         """
         order = self.in_order
@@ -333,7 +336,7 @@ class Study(Generic[PointKind]):
                 found.setdefault(name, np.empty(shape, array.dtype))[some, at] = array
         if order == self.points:
             return found
-        place = {point: number for number, point in enumerate(order)}  # some may occur twice
+        place = {point: number for number, point in enumerate(order)}  # points may repeat
         return {name: array[[place[one] for one in self.points]] for name, array in found.items()}
 
     def in_blocks(
@@ -343,29 +346,29 @@ class Study(Generic[PointKind]):
         arch: str | None = None,
         progress: Progress = lambda share: None,
     ) -> Iterator[Block]:
-        """Do the blocks that the folder lacks; yield all of them, one at a time in memory.
+        """Yield all blocks; compute and save those that the folder lacks.
 
         Args:
-            folder: Where finished blocks are kept, of this study alone.
-            threads, arch: As in `train`.
-            progress: Called with the share of the work that is done.
+            folder: The folder of finished blocks of this study.
+            threads, arch: The arguments of `train`.
+            progress: A function that is called with the finished share of the work.
 
         Raises:
-            AntsError: The disk has no room for all of it, or an argument is not allowed.
+            AntsError: The disk is too small for all blocks, or an argument is not allowed.
         """
         order, pieces = self.in_order, list(self.blocks())
-        # Points of a block are alike.
+        # The first point of a block can represent all of them.
         works = [(order[some.start], len(order[some]) * len(self.seeds[at])) for some, at in pieces]
         missing = [work for n, work in enumerate(works) if not _path(folder, n).exists()]
         files.check_room(folder, sum(one.bytes_of_a_run * runs for one, runs in missing))
         begun, total = 0.0, sum(one.weight * runs for one, runs in works)
-        # What others go on from is kept, in as many pieces as these points have blocks.
+        # The tables of points that are the `after` of others, a part for each of their blocks.
         befores = {point.after for point in order}
         tables: dict[Any, list[np.ndarray]] = {}
         progress(0.0)
         for number, ((some, at), (first, runs)) in enumerate(zip(pieces, works, strict=True)):
             points, seeds = order[some], self.seeds[at]
-            if isinstance(first.world, tuple):  # a point of its own, with a world for each seed
+            if isinstance(first.world, tuple):  # a block of one point, with a world for each seed
                 points = (replace(first, world=first.world[at]),)
             learned = np.concatenate(tables[first.after])[at] if first.after else None
             share = first.weight * runs / total
@@ -380,12 +383,10 @@ class Study(Generic[PointKind]):
             yield Block(some, at, outcome)
 
     def read(self, folder: Path, points: Iterable[int]) -> Iterator[tuple[int, Outcome]]:
-        """Yield points, by their places in order, with their outcomes, from finished blocks.
-
-        One block at a time is in memory.
+        """Yield outcomes of points from finished blocks, by indices into `in_order`.
 
         Raises:
-            AntsError: A block cannot be read any more.
+            AntsError: A block cannot be read.
         """
         wanted = set(points)
         pieces = (
@@ -398,7 +399,7 @@ class Study(Generic[PointKind]):
     def _joined(
         self, pieces: Iterable[Block], wanted: Container[int]
     ) -> Iterator[tuple[int, Outcome]]:
-        """Yield the wanted points as `read` does, each when the block of its last seeds came."""
+        """Yield the wanted points as `read` does, each after the block of its last seeds."""
         parts: dict[int, list[Outcome]] = {}
         for some, at, outcome in pieces:
             for place in filter(wanted.__contains__, range(some.start, some.stop)):
@@ -410,7 +411,7 @@ class Study(Generic[PointKind]):
 
 
 class Block(NamedTuple):
-    """Slices of the points in order and of the seeds; their outcome (points, seeds, ...)."""
+    """Slices of `in_order` and of the seeds, with their outcome (points, seeds, ...)."""
 
     points: slice
     seeds: slice
@@ -418,16 +419,16 @@ class Block(NamedTuple):
 
 
 def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]:
-    """All that determines the numbers of points and seeds.
+    """Return everything that determines the results of points and seeds, by name.
 
-    What all points have in common is there once, all else as a list with an entry for each.
+    Settings that all points share are single values; others are lists with an entry per point.
     """
     points = _in_order(points)
     places: list[Any] = [place for one in points for place in (one.world, one.pool) if place]
     worlds = list(dict.fromkeys(places))
 
     def facts(point: Point) -> dict[str, Any]:
-        """A point as names and values; worlds and other points by their number."""
+        """Return the settings of a point by name, with worlds and other points as indices."""
         found = {field.name: getattr(point, field.name) for field in fields(point)}
         found |= {name: worlds.index(found[name]) for name in ("world", "pool") if found.get(name)}
         found |= {"after": points.index(point.after)} if point.after else {}
@@ -450,7 +451,7 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
 
 
 def world_facts(world: World) -> dict[str, Any]:
-    """A world in a few numbers, and a hash of all of it."""
+    """Return the sizes of a world, and a checksum of all of its cells."""
     digest, numbers = hashlib.sha256(), {}
     for name in ("foods", "obstacles", "trails", "ants"):
         array = getattr(world, name)
@@ -467,10 +468,8 @@ def _in_order(points: Sequence[PointKind]) -> tuple[PointKind, ...]:
 
 
 def _part(progress: Progress, begin: float, share: float) -> Progress:
-    """The progress of a part of the work, as that of all."""
     return lambda done: progress(begin + share * done)
 
 
 def _path(folder: Path, number: int) -> Path:
-    """The file of a block."""
     return folder / f"{number:06d}.npz"

@@ -1,4 +1,4 @@
-"""Sweeps as TOML files: fixed settings, those that vary, seeds and measures; and their results."""
+"""Sweeps: TOML files with settings, seeds and measures, and the results of these."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from taichi_ants.task import Task
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
 _OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
-_PARTS = ("world", "task", "training", "after", "pool")  # of a point; not settings themselves
+_PARTS = ("world", "task", "training", "after", "pool")  # attributes of points, not settings
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
@@ -36,7 +36,7 @@ Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
 
 
 class Measure(NamedTuple):
-    """A number of a point and seed: its words, the episodes that it needs, and if it has an IQM."""
+    """A number for each point and seed: its name for readers, and the fewest episodes it needs."""
 
     words: str
     episodes: int = 0
@@ -45,7 +45,7 @@ class Measure(NamedTuple):
 
 MEASURES = {
     "runs": {
-        # The comparison takes all episodes if there are fewer than the last 50, a sweep does not.
+        # With fewer than 50 episodes, the comparison uses all of them; a sweep refuses.
         name: Measure(
             one.words, of_runs.WINDOW if name.endswith("_last50") else one.episodes, one.uses_iqm
         )
@@ -57,15 +57,15 @@ MEASURES = {
 
 @dataclass(frozen=True)
 class Sweep:
-    """What a file asks for.
+    """A sweep, read from a file.
 
     Attributes:
         study: The points over the seeds, in the order of `settings`.
-        settings: What varies, for each point of the study.
-        grids: Which of these each [vary] makes.
-        measures: Names of measures, the first of which is drawn.
+        settings: The settings that vary, for each point of the study.
+        grids: The slices of `settings` from each [vary].
+        measures: Names of measures; the figure shows the first.
         against: The setting and its value with which all others are compared.
-        margin: The difference in the first measure that does not matter.
+        margin: The largest difference in the first measure that is too small to matter.
     """
 
     kind: str
@@ -77,7 +77,7 @@ class Sweep:
     margin: float
 
     def facts(self) -> dict[str, Any]:
-        """Return all that determines the results."""
+        """Return everything that determines the results."""
         own = {"measures": self.measures, "against": self.against, "margin": self.margin}
         return {**self.study.settings(), **own, "vary": self.settings}
 
@@ -97,9 +97,10 @@ class Sweep:
         return self.study.reduced(blocks, reduce, threads, arch, progress)
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
-        """Return by point how it differs from the one that is the same except for `against`.
+        """Return the difference of each point to the one that differs only in `against`, by point.
 
-        Intervals of the first measure, float64 (points, seeds), hold at once within a [vary].
+        `values` is the first measure, float64 (points, seeds). Intervals hold at once within a
+        [vary].
         """
         if self.against is None:
             return {}
@@ -117,7 +118,7 @@ class Sweep:
         return found
 
     def write(self, values: dict[str, np.ndarray], folder: Path, draws: bool) -> None:
-        """Write all results that follow from what was `measured`."""
+        """Write all results of `values`, from `measured`."""
         first, columns = self.measures[0], sweeps.columns_of(self.settings)
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
@@ -143,16 +144,16 @@ class Sweep:
 
 
 def read_sweep(path: Path) -> Sweep:
-    """Read a sweep.
+    """Return the sweep of a file.
 
     Raises:
-        AntsError: The file cannot be read, or asks for something that cannot be.
+        AntsError: The file cannot be read, or a setting is not allowed.
     """
     text = files.read_text(path)
     try:
         file = files.tomllib.loads(text)
     except (ValueError, RecursionError) as error:
-        raise AntsError(f"{str(path)!r} is no TOML: {error}; mend the file.") from error
+        raise AntsError(f"{str(path)!r} is not valid TOML: {error}; correct it.") from error
     try:
         return _sweep(file)
     except AntsError as error:
@@ -173,7 +174,7 @@ def _sweep(file: Settings) -> Sweep:
     fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
     grids = [_grid(grid, fixed) for grid in _listed(file.get("vary", []))]
     if not grids:
-        raise AntsError("[vary] is missing; name in it what varies, with lists of values.")
+        raise AntsError("[vary] is missing; add it with lists of values of the settings that vary.")
     seeds = file.get("seeds", 10)
     if not isinstance(seeds, list):
         seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
@@ -183,7 +184,7 @@ def _sweep(file: Settings) -> Sweep:
     for name in wanted:
         least = measures[name].episodes
         if any(point.episodes < least for point in points):
-            raise AntsError(f"{name} needs {least} episodes; give more, or measure something else.")
+            raise AntsError(f"{name} needs {least} episodes; use more or choose another measure.")
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
@@ -193,11 +194,12 @@ def _sweep(file: Settings) -> Sweep:
         pairs = list(flat(given).items()) if isinstance(given, dict) else []
         if len(pairs) != 1 or not any(pairs[0] in row.items() for row in rows):
             raise AntsError(
-                f"against is {shown(given)}; give one setting, and a value of it in [vary]."
+                f"against is {shown(given)}; it must be one setting with one of its values in "
+                "[vary]."
             )
         (against,) = pairs
     elif "margin" in file:
-        raise AntsError("margin is given without against; give both, or none.")
+        raise AntsError("margin requires against; add against, or leave margin out.")
     ends = list(itertools.accumulate(map(len, grids), initial=0))
     parts = tuple(map(slice, ends, ends[1:]))
     return Sweep(kind, Study(points, seeds), rows, parts, tuple(wanted), against, margin)
@@ -210,51 +212,51 @@ def _listed(value: Any) -> list:
 def _check_once(name: str, values: list) -> None:
     for place, value in enumerate(values):
         if value in values[:place]:
-            raise AntsError(f"{name} holds {shown(value)} more than once; leave one out.")
+            raise AntsError(f"{name} has {shown(value)} more than once; remove one of them.")
 
 
 def _grid(grid: Any, fixed: Settings) -> list[Settings]:
-    """All combinations of what varies."""
     if not isinstance(grid, dict) or not grid:
-        raise AntsError("[vary] is empty; name in it what varies, with lists of values.")
+        raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
     values = {name: _listed(value) for name, value in flat(grid).items()}
     for name, several in values.items():
         if not several:
             raise AntsError(f"{name} is an empty list; give at least one value.")
-        for one in fixed:  # a part of it is one of the settings that it stands for
+        for one in fixed:  # a group and one of its settings exclude each other, too
             if f"{one}.".startswith(f"{name}.") or f"{name}.".startswith(f"{one}."):
                 raise AntsError(
-                    f"{name} stands in [vary] and {one} among the fixed settings; leave out one."
+                    f"{name} is in [vary] and {one} in the fixed settings; remove one of them."
                 )
         if name in _OF_FILE:
-            raise AntsError(f"{name} cannot vary; write it above all tables.")
+            raise AntsError(f"{name} cannot vary; move it from [vary] to the top of the file.")
         if name == "world.ranges" and not all(isinstance(one, list) for one in several):
             raise AntsError(
-                f"{name} is {shown(several)} in [vary]; write {shown([several])}, a list of ranges."
+                f"{name} in [vary] is {shown(several)}, but must be a list of ranges; write "
+                f"{shown([several])}."
             )
         _check_once(name, several)
     return [dict(zip(values, row, strict=True)) for row in itertools.product(*values.values())]
 
 
 def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[str, Any]) -> Point:
-    """The point of some settings; worlds that were `built` are used again."""
+    """Return the point of some settings; reuse the worlds in `built`, and add new ones."""
     learner = settings.get("training.learner")
     more = declared(learners.get(str(learner)).hyperparameters) if learner else ()
     known = [
         *_own(kind),
-        # A group is written by a name, if it has names.
+        # A group of settings can be set by a name, if it has names.
         *(one.path for one in all_of(Task) if not one.is_group or one.has_names),
         *(one.path for one in (*declared(TrainingConfig), *more)),
     ]
     for name in settings:
-        # What settings a world has is known where it is made.
+        # The world itself checks its settings.
         if name not in known and not re.fullmatch(r"world\.[^.]*", name):
-            raise AntsError(f"{shown(name)} is no setting {_rather(name, kind, known)}.")
+            raise AntsError(f"{shown(name)} is not a setting {_rather(name, kind, known)}.")
     tree = nested(settings)
     world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
-    for name in _OF_LEARNERS[:5]:  # the others have usual values
+    for name in _OF_LEARNERS[:5]:  # the others have defaults
         if name not in training:
-            raise AntsError(f"training.{name} is missing; write it, fixed or in [vary].")
+            raise AntsError(f"training.{name} is missing; add it to [training] or [vary].")
     key = repr(sorted(world.items()))
     if key not in built:
         built[key] = _world(kind, world, seeds)
@@ -262,12 +264,11 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
 
 
 def _own(kind: str) -> list[str]:
-    """The settings of a kind that are no part of another one."""
+    """Return the settings of a kind that do not belong to a part such as the task."""
     return [field.name for field in fields(KINDS[kind]) if field.name not in _PARTS]
 
 
 def _rather(name: str, kind: str, known: list[str]) -> str:
-    """What may be meant by a name that is no setting."""
     for other in KINDS:
         if name in _own(other):
             return f"of kind {kind!r}, but of {other!r}; leave it out"
@@ -277,11 +278,10 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
         near = near or [one for one in known if one.rpartition(".")[0] == part]
     near = near or difflib.get_close_matches(name, known, 3)
     near = near or [*_own(kind), *(f"{one}. ..." for one in _PARTS[:3])]
-    return f"here; choose among {', '.join(near)}"
+    return f"of this sweep; choose one of {', '.join(near)}"
 
 
 def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
-    """The world of some settings, or one for each seed."""
     preset, drawn = given.pop("preset", "paper"), "seed" in given
     first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
     if checked_flag("world.per_seed", per_seed) and kind == "runs":

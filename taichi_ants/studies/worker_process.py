@@ -1,6 +1,6 @@
-"""A second process for calls that keep Python itself busy, such as drawing.
+"""A second process for calls that run in Python itself, such as drawing.
 
-Two threads of one process would only take turns at it.
+Threads of one process would take turns at such calls.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ _SERVE = "from taichi_ants.studies.worker_process import serve; serve()"
 
 
 class WorkerProcess:
-    """A process that does one call after the other, until the `with` block ends.
+    """A process that runs one call after the other, until the `with` block ends.
 
-    This process does what that one cannot: where there is one processor, where no process can be
-    started, and where a call raises. So a call may be done twice.
+    This process runs calls itself if there is only one processor, if the other process cannot
+    start, or if a call raises there. A call may therefore run twice.
     """
 
     def __init__(self, second: bool = True) -> None:
@@ -45,19 +45,22 @@ class WorkerProcess:
         self._turns.shutdown(cancel_futures=failed)
         self._leave()
         if self._process is not None:
-            self._process.wait()  # it keeps the kernels that it has compiled
+            self._process.wait()  # it saves the kernels that it has compiled
 
     def begin(
         self, call: Callable[Given, Answer], *arguments: Given.args, **named: Given.kwargs
     ) -> Callable[[], Answer]:
-        """Have a call of a module's function done after those before; return what waits for it."""
+        """Return a function that waits for the result of a call, which the other process runs.
+
+        The called function must be at the top level of a module.
+        """
         here = partial(call, *arguments, **named)
         if not self._second:
             return here
         if self._process is None:
             try:
                 self._process = _started()
-            except Exception:  # nobody can be started
+            except Exception:  # no process can be started
                 return here
         coming = self._turns.submit(self._ask, here)
 
@@ -68,20 +71,20 @@ class WorkerProcess:
         return answer
 
     def finish(self) -> None:
-        """Let the process end when it has done what has begun; later calls are done here."""
+        """End the other process after the calls that have begun; later calls run in this one."""
         self._turns.submit(self._leave)
 
     def _leave(self) -> None:
         process: Any = self._process
         for pipe in (process.stdin, process.stdout) if process else ():
-            with suppress(OSError):  # it has ended, with something still to be read
+            with suppress(OSError):  # the process has ended, with data left in the pipe
                 pipe.close()
 
     def _ask(self, call: Callable[[], Any]) -> tuple[bool, Any]:
-        """Whether the other process has done a call, and what it returns."""
+        """Return whether the other process has done a call, and the value of the call."""
         try:
             process: Any = self._process
-            pickle.dump(pickle.dumps(call, -1), process.stdin)  # whole, or not at all
+            pickle.dump(pickle.dumps(call, -1), process.stdin)  # pickled completely or not sent
             process.stdin.flush()
             return pickle.loads(pickle.load(process.stdout))
         except Exception:  # the call cannot be sent, or the process has ended
@@ -89,10 +92,10 @@ class WorkerProcess:
 
 
 def serve() -> None:
-    """Do the calls that come on standard input, and write what they return to standard output."""
+    """Run the calls from standard input, and write their return values to standard output."""
     with suppress(EOFError, BrokenPipeError), os.fdopen(os.dup(1), "wb") as answers:
-        os.dup2(2, 1)  # what is printed goes where errors go
-        while True:  # until nobody asks any more
+        os.dup2(2, 1)  # calls that print write to standard error
+        while True:  # until standard input is closed
             call = pickle.load(sys.stdin.buffer)
             try:
                 answer = pickle.dumps((True, pickle.loads(call)()), -1)
@@ -107,6 +110,6 @@ def _started() -> subprocess.Popen[bytes]:
         [sys.executable, "-c", _SERVE],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,  # what it has to say is said here
-        start_new_session=True,  # Ctrl-C is for this process alone, which ends the other one
+        stderr=subprocess.DEVNULL,  # this process reports errors
+        start_new_session=True,  # only this process gets Ctrl-C, and ends the other one
     )

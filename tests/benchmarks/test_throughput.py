@@ -102,7 +102,10 @@ def test_without_vectors(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("least", "why"),
-    [*((one, f"{one} is not allowed") for one in ("nan", "-1", "inf")), ("much", "is no number")],
+    [
+        *((one, f"{one} is not allowed") for one in ("nan", "-1", "inf")),
+        ("much", "is not a number"),
+    ],
 )
 def test_a_least_ratio_is_a_number_from_0_on(least, why, capsys):
     code, said = said_by([*SMALL, "--least", least], capsys)

@@ -27,7 +27,7 @@ def test_it_writes_counts_and_a_report_and_shows_them_again(
     assert len(rows) == len(analysis.BRIDGES) * 2 * len(analysis.LOADS) * analysis.WINDOWS
     assert {row["seed"] for row in rows} == {"5", "6"}
     status, again, _ = call("bridge", arguments, capsys)
-    assert "holds these results already" in again
+    assert "already has these results" in again
     status, _, err = call("bridge", [*arguments, "--evaluation-ticks", 60], capsys)
     assert status == 2
     assert "evaluation_ticks differ" in err

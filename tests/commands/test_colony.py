@@ -183,7 +183,7 @@ def test_a_finished_study_is_shown_and_nothing_is_lost(finished, capsys):
     status, out, _ = call("colony", [*SMALL, "--out", folder], capsys)
     assert status == 0
     assert out.startswith((folder / "report.txt").read_text("utf-8"))
-    assert "holds these results already" in out
+    assert "already has these results" in out
     other = [*SMALL, "--out", folder, "--training.learner", "q_learning"]
     status, _, err = call("colony", other, capsys)
     assert status == 2
@@ -233,42 +233,42 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["--ants", 2], "invalid choice: '2'"),
         (["study", "--task.life.births"], "unrecognized arguments: --task.life.births"),
         (["study", "--world.piles", 2], "unrecognized arguments: --world.piles 2"),
-        (["study", "--training.initial-q", 2], "--training.initial-q is chosen by this command"),
+        (["study", "--training.initial-q", 2], "this command sets --training.initial-q itself"),
         (["live", "--quick"], "unrecognized arguments: --quick"),
         (["study", "--save", "x"], "unrecognized arguments: --save x"),
         (
             ["live", "--resume", "x", "--task.life.regrowth", 0],
-            "--task.life.regrowth cannot change a colony that is",
+            "--task.life.regrowth cannot change a resumed",
         ),
         (
             ["live", "--resume", "x", "--training.discount", 0.5],
-            "--training.discount cannot change a colony",
+            "--training.discount cannot change a resumed colony",
         ),
-        (["live", "--resume", "x", "--seed", 0], "--seed cannot change a colony that is resumed"),
+        (["live", "--resume", "x", "--seed", 0], "--seed cannot change a resumed colony"),
         (
             ["live", "--resume", "x", "--training.learner", "sarsa"],
-            "--training.learner cannot change a colony",
+            "--training.learner cannot change a resumed colony",
         ),
         (
             ["live", "--resume", "x", "--task.life.births"],
-            "--task.life.births cannot change a colony",
+            "--task.life.births cannot change a resumed colony",
         ),
-        (["live", "--resume", "x", "--task", "paper"], "--task cannot change a colony that is"),
+        (["live", "--resume", "x", "--task", "paper"], "--task cannot change a resumed"),
         (
             ["live", "--task.pheromone.deposit", "none", "--task.pheromone.level", 3],
             "`task.pheromone.level` is 3; leave it out",
         ),
         (
             ["live", "--sharing", "frozen", "--training.discount", 0.9],
-            "--training.discount is of learning, but with",
+            "--training.discount has no effect with",
         ),
         (
             ["live", "--frame-interval", 2],
-            "--frame-interval is of an animation, name one with --render",
+            "--frame-interval requires an animation; give --render",
         ),
         (
             ["live", "--render", "a.PNG", "--frame-interval", 2],
-            "--frame-interval is of an animation",
+            "--frame-interval requires an animation",
         ),
         (
             ["live", "--task.pheromone.cap", 5],
@@ -286,7 +286,7 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["study", "--world-kinds", "moon"], "--world-kinds: invalid choice: 'moon' (choose from"),
         (
             ["study", "--training.learner", "sarsa_lambda"],
-            "learn together; choose one of q_learning, sarsa,",
+            "shared table requires; choose one of q_learning, sarsa,",
         ),
         (["study", "--sizes", "300", "8", "--world-kinds", "paper"], "the number of ants is 300"),
         (["study", "--training.learner", "none"], "there is no learner 'none'"),
@@ -320,12 +320,12 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         ),
         (
             ["live", "--sharing", "frozen"],
-            "--sharing frozen needs a table that the ants follow; give --policy FILE",
+            "--sharing frozen requires a policy; add --policy FILE",
         ),
         (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
         (
             ["live", "--policy", "x", "--task.observation", "paper"],
-            "--task.observation is that of the policy",
+            "the policy determines --task.observation",
         ),
         (
             ["live", "--task.observation", "nose"],
@@ -438,7 +438,7 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(kernels, tmp_path, monkeypatc
     assert time.perf_counter() - began < promptly()
     assert process.returncode == 143
     ticks = int(err.removeprefix("Stopped at tick ").split(";")[0])
-    assert err == f"Stopped at tick {ticks}; --resume colony.npz goes on from there.\n"
+    assert err == f"Stopped at tick {ticks}; use --resume colony.npz to resume.\n"
     assert f"60 ants, {ticks} tick" in out
     monkeypatch.chdir(tmp_path)
     training = TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0, 0.1)
@@ -455,7 +455,7 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(kernels, tmp_path, monkeypatc
         ("live", command, "new_colony", "Stopped.\n"),
         (
             *("study", colony_study, "plan"),
-            "Stopped; finished parts are kept, and the same command goes on from there.\n",
+            "Stopped; finished parts are saved. Run the same command again to resume.\n",
         ),
     ],
 )

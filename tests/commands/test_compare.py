@@ -94,7 +94,7 @@ def finished(tmp_path_factory, kernels):
     report = (folder / "report.txt").read_text("utf-8")
     assert done.stdout.startswith(report)
     assert re.fullmatch(
-        r"\n\d+\.\d s; everything is in deep/out/\ndeep/out/report.html\n",
+        r"\n\d+\.\d s; all results are in deep/out/\ndeep/out/report.html\n",
         done.stdout.removeprefix(report),
     )
     return folder
@@ -360,7 +360,7 @@ def test_the_same_command_shows_the_finished_comparison(copy, compare):
     status, out, err = compare(*SMALL, "--out", copy)
     report = before["report.txt"].decode("utf-8")
     assert (status, err) == (0, "")
-    already = f"{copy}/ holds these results already; --force makes them again."
+    already = f"{copy}/ already has these results; use --force to compute them again."
     assert out == f"{report}\n{already}\n{copy}/report.html\n"
     assert contents(copy) == before
 
@@ -396,7 +396,7 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     ):
         assert after[name] == before[name], name
     assert after["manifest.json"] != before["manifest.json"]
-    left_out = "made with --no-figures; to have figures, too, give --force."
+    left_out = "no figures because of --no-figures; use --force to draw figures."
     assert left_out in compare(*SMALL, "--out", copy)[1]
     assert left_out not in compare(*SMALL, "--out", copy, "--no-figures")[1]
 
@@ -514,7 +514,7 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
     assert lines[4][2] == f"{greedy:.1f}"
     assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in tables
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert "the discount is 1.0, so there is no optimal policy" in page
+    assert "the discount is 1.0, but must be at least 0 and below 1" in page
     assert max(len(line) for line in out.splitlines()[:-2]) < 80
 
 

@@ -79,7 +79,7 @@ def test_finished_blocks_are_kept_and_a_damaged_one_is_done_again(kernels, tmp_p
     process = start("compare", arguments, kernels, tmp_path)
     out, err, seconds = stop_after_a_block(process, folder, signal.SIGTERM, 2)
     assert (process.returncode, out) == (143, "")
-    assert err == "Stopped; finished runs are kept, and the same command goes on from there.\n"
+    assert err == "Stopped; finished runs are saved. Run the same command again to resume.\n"
     assert seconds < promptly()
     assert [path.name for path in folder.iterdir()] == ["unfinished"]
     kept = blocks_in(folder)
@@ -90,7 +90,7 @@ def test_finished_blocks_are_kept_and_a_damaged_one_is_done_again(kernels, tmp_p
     _, err, _ = stop_after_a_block(process, folder, signal.SIGINT, len(kept) + 1)
     said, stopped = err.splitlines()
     assert damaged.name in said
-    assert said.endswith("is damaged or of other work, so it is done anew.")
+    assert said.endswith("is damaged or has other settings, so it is computed again.")
     assert stopped.startswith("Stopped")
     assert np.load(damaged)["returns"].size
     del kept[damaged.name]

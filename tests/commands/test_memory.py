@@ -188,7 +188,7 @@ def test_a_process_with_many_seeds_stays_small(kernels, tmp_path):
         timeout=300,
     )
     assert done.returncode == 0, done.stderr
-    assert "everything is in results/" in done.stdout
+    assert "all results are in results/" in done.stdout
     found = re.fullmatch(r"VmHWM:\s+(\d+) kB\n\n", done.stderr)
     assert found, done.stderr
     assert int(found[1]) < 450_000  # all runs and resamples at once take more than a GB

@@ -152,7 +152,7 @@ def test_a_finished_sweep_is_shown(sweep):
     before = contents(Path("results/sweep-my"))
     status, out, _ = sweep(RUNS)
     assert status == 0
-    assert "holds these results already" in out
+    assert "already has these results" in out
     assert contents(Path("results/sweep-my")) == before
     status, out, err = sweep(RUNS.replace("shaping = [1, 0]", "shaping = [1, 2]"))
     assert status == 2
@@ -167,18 +167,18 @@ WRONG = {
     "unknown": (
         "shaping =",
         "shapings =",
-        ["'task.rewards.shapings' is no setting", "task.rewards.shaping"],
+        ["'task.rewards.shapings' is not a setting", "task.rewards.shaping"],
     ),
-    "unknown above": ("episodes =", "episode =", ["'episode' is no setting", "episodes"]),
+    "unknown above": ("episodes =", "episode =", ["'episode' is not a setting", "episodes"]),
     "not in full": (
         "task.rewards.shaping =",
         "shaping =",
-        ["'shaping' is no setting", "task.rewards.shaping"],
+        ["'shaping' is not a setting", "task.rewards.shaping"],
     ),
     "of the other kind": (
         "rollouts = 3",
         "ants = 3",
-        ["'ants' is no setting of kind 'runs', but of 'colony'"],
+        ["'ants' is not a setting of kind 'runs', but of 'colony'"],
     ),
     "hyperparameter": ("discount = 0.9", "discount = 0.9\nplanning_steps = 3", ["planning_steps"]),
     "missing": ("discount = 0.9", "", ["training.discount is missing"]),
@@ -188,7 +188,7 @@ WRONG = {
     "twice": (
         "discount = 0.9",
         "discount = 0.9\nepsilon = 0.1",
-        ["training.epsilon stands in [vary]"],
+        ["training.epsilon is in [vary]"],
     ),
     "empty": ("[1, 0]", "[]", ["task.rewards.shaping is an empty list"]),
     "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
@@ -208,12 +208,12 @@ WRONG = {
     "margin": ("seeds =", "margin = -1\nseeds =", ["margin is -1"]),
     "no margin": ("seeds =", "against.task.rewards.shaping = 0\nmargin = nan\nseeds =", ["is nan"]),
     "flag as margin": ("seeds =", "margin = true\nseeds =", ["margin is True"]),
-    "margin alone": ("seeds =", "margin = 1\nseeds =", ["margin is given without against"]),
+    "margin alone": ("seeds =", "margin = 1\nseeds =", ["margin requires against"]),
     "against text": ("seeds =", 'against = "paper"\nseeds =', ["against is 'paper'"]),
     "against list": ("seeds =", "against = [{a = 1}]\nseeds =", ["against is [{'a': 1}]"]),
     "against nothing": ("seeds =", "against.training = {}\nseeds =", ["against is {'training'"]),
     "measure twice": ('"greedy_deliveries"', '"return_last50"', ["'return_last50' more than once"]),
-    "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.shaping holds 1 more than once"]),
+    "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.shaping has 1 more than once"]),
     "few episodes": ("episodes = 50", "episodes = 49", ["return_last50 needs 50 episodes"]),
     "too few": ("return_last50", "return_first50", ["return_first50 needs 100 episodes"]),
     "seed of one world": (
@@ -224,12 +224,12 @@ WRONG = {
     "part of a text": (
         "[vary]",
         "[vary]\ntraining.learner.x = [1]",
-        ["training.learner.x stands in [vary] and training.learner among"],
+        ["training.learner.x is in [vary] and training.learner in"],
     ),
     "a part twice": (
         "[task]",
         "[task]\nrewards = 3",
-        ["task.rewards.shaping stands in [vary] and task.rewards among"],
+        ["task.rewards.shaping is in [vary] and task.rewards in"],
     ),
     "wrong name": ("[vary]", '[vary]\ntraining.lerner = ["a"]', ["lerner' is", "training.learner"]),
     "cut name": (
@@ -237,15 +237,15 @@ WRONG = {
         "epsilon_deca =",
         ["epsilon_deca' is", "training.epsilon_decay"],
     ),
-    "of the file": ("[vary]", "[vary]\nseeds = [3, 4]", ["seeds cannot vary", "above all tables"]),
+    "of the file": ("[vary]", "[vary]\nseeds = [3, 4]", ["seeds cannot vary", "top of the file"]),
     "no list of ranges": (
         "[vary]",
         '[world]\npreset = "open"\n[vary]\nworld.ranges = [20, 20, 20]',
-        ["world.ranges is [20, 20, 20]", "[[20, 20, 20]]"],
+        ["world.ranges in [vary] is [20, 20, 20]", "[[20, 20, 20]]"],
     ),
     "part of a world": ("[vary]", "[vary]\nworld.preset.x = [1]", ["'world.preset.x' is no"]),
     "unlike any": ("episodes =", "xyz = 1\nepisodes =", ["max_steps, rollouts, world"]),
-    "no toml": ("[vary]", "[vary", ["is no TOML", "mend the file"]),
+    "no toml": ("[vary]", "[vary", ["is not valid TOML", "correct it"]),
     "nothing varies": (RUNS[RUNS.index("[vary]") :], "", ["[vary] is missing"]),
 }
 

@@ -327,7 +327,9 @@ def test_a_page_that_is_gone_is_made_again(tmp_path, capsys):
         work_or_show(settings, SETTINGS, work, page=page)
         out = capsys.readouterr().out
         assert out.splitlines()[-1] == str(settings.out / "report.html")
-        again.append("report.html was missing, and is written again from the other files." in out)
+        again.append(
+            "report.html was missing and has been written again from the other files." in out
+        )
         return json.loads((settings.out / "manifest.json").read_text())
 
     first = run()

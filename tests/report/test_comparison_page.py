@@ -55,7 +55,7 @@ def test_the_mean_is_told_with_its_own_difference(page: str) -> None:
 def test_both_deliveries_are_explained_before_the_answer(page: str) -> None:
     above = page[: page.index('<section id="answer">')]
     for setting in results().comparison.delivery_settings:
-        assert f"Where delivery {setting}, " in above
+        assert f"If delivery {setting}, " in above
 
 
 def test_table_2_stands_beside_the_papers(page: str) -> None:
@@ -161,6 +161,6 @@ def test_little_is_told_of_little() -> None:
     assert "nan" not in re.sub(r"<script.*?</script>|<style.*?</style>", "", told, flags=re.S)
     assert "table 2, beside ours" not in told
     assert 'class="player"' not in told
-    assert any(caption.startswith("What they do") for caption in tables(told))
+    assert any(caption.startswith("Behaviour, in") for caption in tables(told))
     assert '<svg class="interval"' not in told
     assert "not tested" in told

@@ -56,7 +56,7 @@ def test_a_damaged_block_is_done_anew(tmp_path, capsys):
     assert block(path)
     assert (
         capsys.readouterr().err
-        == f"{str(path)!r} is damaged or of other work, so it is done anew.\n"
+        == f"{str(path)!r} is damaged or has other settings, so it is computed again.\n"
     )
     assert not block(path)
 

@@ -66,16 +66,16 @@ def test_what_was_given_is_told_even_where_it_is_the_default(parser):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["--size", "0"], "--size: 0 is not allowed, it must be from 1 to 9"),
-        (["--size", "10"], "--size: 10 is not allowed, it must be from 1 to 9"),
-        (["--size", "2.5"], "--size: '2.5' is no whole number"),
-        (["--count", "1"], "--count: 1 is not allowed, it must be at least 2"),
-        (["--rates", "1", "x"], "--rates: 'x' is no number"),
+        (["--size", "0"], "--size: 0 is not allowed; it must be from 1 to 9"),
+        (["--size", "10"], "--size: 10 is not allowed; it must be from 1 to 9"),
+        (["--size", "2.5"], "--size: '2.5' is not a whole number"),
+        (["--count", "1"], "--count: 1 is not allowed; it must be at least 2"),
+        (["--rates", "1", "x"], "--rates: 'x' is not a number"),
         (["--rates"], "--rates: expected at least one argument"),
         (["--siz", "3"], "unrecognized arguments: --siz 3"),
-        (["--size", ""], "--size is empty, leave it out"),
-        (["--size="], "--size= is empty, leave it out"),
-        (["", "--loud"], "the first argument is empty, leave it out"),
+        (["--size", ""], "--size is empty; leave it out"),
+        (["--size="], "--size= is empty; leave it out"),
+        (["", "--loud"], "the first argument is empty; leave it out"),
         (["a\nb"], "unrecognized arguments: a b"),
     ],
 )
@@ -111,7 +111,7 @@ def fail_with(error):
     [
         (AntsError("the world is flat."), 2, "error: the world is flat.\n"),
         (AntsError("one\ntwo."), 2, "error: one two.\n"),
-        (MemoryError(), 2, "error: this needs more memory than there is.\n"),
+        (MemoryError(), 2, "error: the command needs more memory than is available.\n"),
         (KeyboardInterrupt(), 130, "Halted.\n"),
         (BrokenPipeError(32, "Broken pipe"), 0, ""),
         (

@@ -229,7 +229,7 @@ def test_damaged_blocks_are_done_again(damage, study, tmp_path, capsys):
     DAMAGES[damage](path)
     assert same(study.run(tmp_path), first)
     (said,) = capsys.readouterr().err.splitlines()
-    assert said.startswith(f"{str(path)!r} is damaged or of other work")
+    assert said.startswith(f"{str(path)!r} is damaged or has other settings")
     assert archives.read(path)["returns"].size
 
 
@@ -275,7 +275,7 @@ def test_bad_points_of_runs_are_named(change, says):
         ({"episodes": 0}, "episodes is 0"),
         ({"ticks": 0}, "ticks is 0"),
         ({"rollouts": 0}, "rollouts is 0"),
-        ({"after": replace(ALONE, sharing="independent")}, "learned into one table"),
+        ({"after": replace(ALONE, sharing="independent")}, "no shared table"),
         ({"training": LAMBDA}, "'sarsa_lambda' has no TD error that can be summed"),
     ],
 )
@@ -288,7 +288,7 @@ def test_bad_points_of_colonies_are_named(change, says):
 @pytest.mark.parametrize(
     ("points", "seeds", "says"),
     [
-        ((), (0,), "no points"),
+        ((), (0,), "`points` is empty"),
         (POINTS, (), "seeds is empty"),
         (POINTS, (1, 1), "seeds contains 1 more than once"),
         ((replace(POINTS[0], world=None),), (0,), "world is None"),

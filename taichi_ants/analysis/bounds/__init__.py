@@ -1,1 +1,1 @@
-"""What no ant and no colony can exceed, and simple policies, to hold learned ones against."""
+"""Bounds of ants and colonies, and simple policies to compare learned ones with."""

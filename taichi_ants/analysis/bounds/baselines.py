@@ -1,4 +1,4 @@
-"""Baselines to hold learned policies against: exact bounds, and two policies without learning."""
+"""Baselines for learned policies: exact bounds, and two policies without learning."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from taichi_ants.worlds.world import World
 
 
 class Baseline(NamedTuple):
-    """Return, steps and deliveries of a policy in an episode: a row of baselines.csv.
+    """A row of baselines.csv: return, steps and deliveries of a policy in an episode.
 
-    `discount` is the one for which it is optimal; means are None if unknown; `note` says how they
-    were computed, or why they are not known.
+    `discount` is the discount for which the policy is optimal. Unknown means are None. `note` has
+    the method of computation, or the reason why the means are unknown.
     """
 
     baseline: str
@@ -45,9 +45,9 @@ def policy_rows(
     rollouts: int = 50,
     max_steps: int = EPISODE_STEPS,
 ) -> list[Baseline]:
-    """Return what the random policy and the trail follower bring; trails evaporate as in training.
+    """Return the results of the random policy and the trail follower, with training's evaporation.
 
-    `evaluate` is `taichi_ants.evaluate`, called with a table for each seed.
+    `evaluate` is `taichi_ants.evaluate`; it gets one table of action values per seed.
     """
     # Both policies are tables of the paper's observation.
     as_trained = replace(
@@ -69,10 +69,10 @@ def bound_rows(
     discounts: Sequence[float] = (0.9, 0.99),
     max_steps: int = EPISODE_STEPS,
 ) -> list[Baseline]:
-    """Return the exact bounds, or one row whose note says why there are none.
+    """Return the exact bounds, or one row with the reason why there are none.
 
-    Trails evaporate as in training; the optimal policies of the discounts are followed for
-    `max_steps`.
+    Trails evaporate as in training. The rows have the shortest delivery and, for each discount, an
+    optimal policy, which is followed for at most `max_steps` steps.
     """
     try:
         bounds = EpisodeBounds(world, task)
@@ -80,7 +80,7 @@ def bound_rows(
         return [Baseline("exact bounds", note=str(error))]
     rows = [Baseline("shortest delivery", note="no delivery is possible")]
     if shortest := bounds.shortest():
-        note = "exact: fewest steps to a delivery, then largest return, whatever the step limit"
+        note = "exact: fewest steps to a delivery, then largest return, without step limit"
         rows = [Baseline("shortest delivery", None, *shortest, note)]
     for discount in dict.fromkeys(discounts):
         try:

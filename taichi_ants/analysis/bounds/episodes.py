@@ -1,12 +1,12 @@
 """Exact bounds on what an ant can achieve in one episode, by dynamic programming.
 
-They hold for an ant that knows the whole world, its own place in it and what it has taken, so no
-policy on what an ant sees can do better. One ant, trails that do not change while it has no food,
-and the episode ends at the first delivery (as in the paper's training).
+They hold for an ant that observes the whole world, its own position and the food item it has taken,
+so no policy on an ant's observations can do better. There is one ant, trails do not change while it
+has no food, and the episode ends at the first delivery (as in the paper's training).
 
-So a state is (heading, cell) until the ant picks up a food, and then (food, heading, cell) in a
-world without that food, where trails no longer matter, since an ant with food does not see them.
-Chance only decides which of several foods in view a pick-up takes.
+A state is therefore (heading, cell) until the ant picks up a food item. Then it is (food item,
+heading, cell) in a world without that item, and without trails, which an ant with food does not
+see. Only the choice among several food items in view is random.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ if TYPE_CHECKING:
 
 # About a minute on one core, and 2 GB of memory.
 MAX_STATES = 2_000_000
-# Of a step in searching the shortest delivery; above twice the rewards of any shortest one, and so
-# small that the sums are exact.
+# The cost of a step in the search for the shortest delivery. It is above twice the rewards of any
+# shortest delivery, and small enough for exact sums.
 _STEP = 1 << 32
-# Action values this close count as equal, since the same sums in another order differ by rounding:
-# relative to the value of the state, and, for sums that cancel to almost nothing, relative to the
-# largest value. So a goal of 10 goes unnoticed after 300 steps with a discount factor of 0.9.
+# Differences of action values up to these count as rounding errors: relative to the value of the
+# state and, for sums that cancel, relative to the largest value. With a discount of 0.9, a reward
+# of 10 that is 300 steps away is therefore ignored.
 _RELATIVE_TOLERANCE = 1e-12
 _ABSOLUTE_TOLERANCE = 1e-14
 
 
 class Outcome(NamedTuple):
-    """Undiscounted return, steps and deliveries (0 or 1) of an episode; means over chances."""
+    """The expected undiscounted return, steps and deliveries (0 or 1) of an episode."""
 
     episode_return: float
     steps: float
@@ -47,8 +47,8 @@ class Outcome(NamedTuple):
 class EpisodeBounds:
     """The decision process of one ant that starts where `world.start(seed=0)` places it.
 
-    States are numbered: first those without food, then those with each of the foods, last the one
-    after the delivery, where nothing happens any more.
+    The indices of states are in this order: states without food, states with each food item, and
+    the absorbing state after the delivery.
 
     Raises:
         AntsError: Trails change while ants learn, no ant can start, or the world is too large.
@@ -57,7 +57,7 @@ class EpisodeBounds:
     def __init__(self, world: World, task: Task) -> None:
         changes = task.evaporation_in_training and task.pheromone.evaporation != "none"
         if changes or task.pheromone.diffusion:
-            raise AntsError("exact bounds are known for worlds without evaporation only.")
+            raise AntsError("exact bounds require training without evaporation and diffusion.")
         around = look_around(world)
         cells, headings = world.start(seed=0)
         cell = int(np.searchsorted(around.cells, cells[0]))
@@ -66,17 +66,17 @@ class EpisodeBounds:
         self._build(around, around.food & reached, task.rewards)
 
     def _build(self, around: Surroundings, food: np.ndarray, paid: Rewards) -> None:
-        """Set the rewards, float64 (5, N), and the chances of what follows, sparse (5 N, N)."""
+        """Set the rewards, float64 (5, N), and the transition probabilities, sparse (5 N, N)."""
         from scipy.sparse import coo_array
 
         foods, half = np.unique(around.neighbours[food]), around.n_states
         n = (1 + len(foods)) * half + 1
         if n > MAX_STATES:
             raise AntsError(
-                f"the exact bounds of this world need {n} states, more than the {MAX_STATES} that "
-                "are allowed; choose a smaller world or fewer foods to get them."
+                f"the exact bounds of this world need {n} states, but at most {MAX_STATES} are "
+                "allowed; use a smaller world or fewer food items."
             )
-        # What fails changes nothing; after the delivery all does.
+        # An action that fails changes nothing, and no action does after the delivery.
         follows = np.tile(np.arange(n), (N_ACTIONS, 1))
         self._rewards = np.full((N_ACTIONS, n), float(paid.failed))
         self._rewards[:, -1] = 0.0
@@ -88,7 +88,7 @@ class EpisodeBounds:
         self._rewards[:3, :half] = np.where(in_view(around.empty), moved, paid.failed)
         seen = in_view(food).sum(axis=0)
         self._rewards[PICK_UP, :half][seen > 0] = paid.pick_up
-        # With each food, whose cell is empty now.
+        # With each food item, whose cell is now empty.
         moved = in_view(np.where(around.nearer, paid.shaping, paid.empty))
         gives = around.sees(around.queen)
         picks = []
@@ -101,7 +101,7 @@ class EpisodeBounds:
             self._rewards[GIVE, carrying.start + gives] = paid.deliver
             takes = around.sees(food & (around.neighbours == taken))
             picks.append((takes, carrying.start + around.turned_round(takes)))
-        # A pick-up takes any of the foods in view.
+        # A pick-up takes one of the food items in view, each with the same probability.
         certain = np.ones_like(follows, bool)
         certain[PICK_UP, :half] = seen == 0
         takes, taken = np.concatenate(picks, axis=1) if picks else np.empty((2, 0), int)
@@ -111,14 +111,14 @@ class EpisodeBounds:
         self._chances = coo_array((shares, (rows, columns)), shape=(N_ACTIONS * n, n)).tocsr()
 
     def shortest(self) -> Outcome | None:
-        """The fewest steps to a delivery, and among these the largest return; None without one.
+        """Return the fewest steps to a delivery with the largest return, None if there is no way.
 
-        The ant is lucky where a pick-up chooses among several foods.
+        Random choices among several food items are assumed to be the best ones.
         """
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import dijkstra
 
-        # Where actions lead to one state, it is the state that they leave.
+        # tocsr adds up parallel edges. Only loops have any, and no shortest path has a loop.
         actions, n = self._chances.tocoo(), self._chances.shape[1]
         costs = _STEP - self._rewards.reshape(-1)[actions.row]
         graph = coo_array((costs, (actions.row % n, actions.col)), shape=(n, n)).tocsr()
@@ -129,18 +129,18 @@ class EpisodeBounds:
         return Outcome(float(steps * _STEP - cost), float(steps), 1.0)
 
     def optimal(self, discount: float, max_steps: int) -> tuple[float, Outcome]:
-        """The largest discounted return without a step limit, and what its policy yields.
+        """Return the largest discounted return without a step limit, and its policy's outcome.
 
-        The policy is followed for at most `max_steps` steps. Where several actions are optimal, it
-        takes the one with the lowest number.
+        The policy is followed for at most `max_steps` steps. Of several optimal actions, it takes
+        the one with the lowest index.
 
         Raises:
             AntsError: The discount is not in [0, 1).
         """
         if not 0 <= discount < 1:
             raise AntsError(
-                f"the discount is {shown(discount)}, so there is no optimal policy: unless it is "
-                "at least 0 and below 1 the return without step limit may grow without bound."
+                f"the discount is {shown(discount)}, but must be at least 0 and below 1: with "
+                "others, the return without step limit may be unbounded and no policy optimal."
             )
         from scipy.sparse import eye_array
         from scipy.sparse.linalg import spsolve
@@ -163,14 +163,14 @@ class EpisodeBounds:
         return float(values[self._start]), self._follow(policy, max_steps)
 
     def _of(self, policy: np.ndarray) -> tuple[np.ndarray, csr_array]:
-        """The rewards of a policy, (N,), and the chances of what follows, (N, N)."""
+        """Return the rewards, (N,), and the transition probabilities, (N, N), of a policy."""
         states = np.arange(len(policy))
         return self._rewards[policy, states], self._chances[policy * len(policy) + states]
 
     def _follow(self, policy: np.ndarray, max_steps: int) -> Outcome:
         rewards, moved = self._of(policy)
         moved = moved.T.tocsr()
-        at = np.zeros(len(policy))  # the chance to be in each state
+        at = np.zeros(len(policy))  # the probability of each state
         at[self._start] = 1.0
         total = steps = 0.0
         for _ in range(max_steps):

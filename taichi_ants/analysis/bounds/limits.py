@@ -1,17 +1,17 @@
-"""Limits of colonies where food grows back at once, whatever they have learned.
+"""Upper bounds on deliveries of colonies with any policy, in worlds whose food grows back at once.
 
 Both hold in the long run, for ants that neither die nor are born, and food that stays in place.
 
-- Time: the ticks of an ant from one delivery to the next are at least those of the shortest cycle
-  queen -> food -> queen over (cell, heading, carrying). Food that grows back at once never leaves
-  its cell free, so that the ground stays the same. An ant that is blocked by another turns on the
-  spot, so the limit lets ants do so everywhere. Where ants with food have right of way, it lets an
-  ant without food be pushed from every cell onto each neighbour, while it turns as it likes.
-- Queen: the ant that gives in tick t leaves in t + 1 at the earliest. If the next one can take its
-  place in that tick, by pushing or by following it, it gives in t + 2; else it enters in t + 2 and
-  gives in t + 3. An ant that stays needs as many ticks: give, pick up (which turns it round), turn
-  back; and one less where giving turns it round. So each of the queen's neighbour cells serves one
-  delivery in 3 ticks, or in 2.
+- Time: an ant needs at least the ticks of the shortest cycle queen -> food -> queen over (cell,
+  heading, carrying) from one delivery to the next. Food grows back before an ant can enter its
+  cell, so the ground does not change. An ant that another blocks turns on the spot, so the bound
+  allows turns on the spot everywhere. With right of way, it also allows an ant without food to be
+  pushed from every cell onto each neighbour while it turns to either side or not.
+- Queen: an ant that delivers in tick t leaves its cell in t + 1 at the earliest. If the next ant
+  can enter in that tick, by pushing or following, it delivers in t + 2; if not, it enters in t + 2
+  and delivers in t + 3. An ant that stays needs as many ticks: it delivers, picks up (which turns
+  it round) and turns back, one tick less if a delivery turns it round. So each neighbour cell of
+  the queen serves one delivery in 3 ticks, or in 2.
 """
 
 from __future__ import annotations
@@ -29,21 +29,23 @@ from taichi_ants.worlds.world import World
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of one world; inf or 0 where nothing can be delivered.
+    """The bounds of one world.
 
-    `cycle` are ticks from one delivery of an ant to its next, `queen` foods per 1000 ticks.
+    Attributes:
+        cycle: The fewest ticks between two deliveries of an ant; inf if it cannot deliver.
+        queen: The most deliveries per 1000 ticks that the cells around the queen allow.
     """
 
     cycle: float
     queen: float
 
     def deliveries(self, ants: int) -> float:
-        """The most that so many ants can deliver per 1000 ticks in the long run."""
+        """Return the most that this number of ants can deliver per 1000 ticks in the long run."""
         return min(ants * 1000 / self.cycle, self.queen)
 
 
 def limits_of(world: World, task: Task | None = None) -> Limits:
-    """The limits of a world under the traffic of a task; None is the paper's."""
+    """Return the bounds of a world with the traffic rules of a task; None is the paper's."""
     task = task or Task()
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = world.walkable(around)[around]
@@ -52,9 +54,9 @@ def limits_of(world: World, task: Task | None = None) -> Limits:
 
 
 def shortest_cycle(world: World, task: Task) -> float:
-    """The least mean number of ticks from one delivery to the next, inf if there is no way.
+    """Return the least mean number of ticks from one delivery to the next, inf if there is no way.
 
-    A delivery leaves the ant on its cell, so it is the end of one walk and the start of the next.
+    A delivery does not move the ant, so a cycle is a chain of walks between delivery states.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
@@ -70,16 +72,16 @@ def shortest_cycle(world: World, task: Task) -> float:
     edges = np.concatenate([*walks, *[walk + half for walk in walks], *pushes, pick_ups], axis=1)
     ones = np.ones(edges.shape[1], np.int8)
     graph = coo_array((ones, tuple(edges)), shape=(2 * half, 2 * half)).tocsr()
-    # Where a carrying ant can give; no ant comes to a cell that holds food.
+    # The states in which a carrier can deliver; no ant can enter a cell with food.
     gives = around.sees(around.queen)
     gives = gives[world.ground()[around.cells[gives % len(around.cells)]] == EMPTY]
-    mean, horizon = np.inf, 64  # short walks are found quickly, and mostly enough
+    mean, horizon = np.inf, 64  # short walks are found quickly and usually suffice
     while len(gives):
         begins = around.turned_round(gives) if task.turns_at_queen else gives
         walked = dijkstra(graph, indices=begins, unweighted=True, limit=horizon)
         ticks = walked[:, half + gives] + 1
         mean = least_mean_cycle(ticks)
-        # If so, a cycle of walks with one beyond the horizon has a greater mean.
+        # If so, a cycle that includes a walk beyond the horizon has a greater mean.
         enough = np.isfinite(mean) and mean + (len(gives) - 1) * (mean - ticks.min()) <= horizon
         if enough or horizon >= 2 * half:  # no walk is longer
             break
@@ -88,7 +90,7 @@ def shortest_cycle(world: World, task: Task) -> float:
 
 
 def _pushes(around: Surroundings) -> list[np.ndarray]:
-    """From each state onto each neighbour that can be empty, turned or not; int64 (2, n) each."""
+    """Return edges onto each neighbour that can be empty, turned or not; int64 (2, n) each."""
     n = len(around.cells)
     edges = []
     for neighbours, empty in zip(around.neighbours, around.empty, strict=True):
@@ -101,7 +103,7 @@ def _pushes(around: Surroundings) -> list[np.ndarray]:
 
 
 def least_mean_cycle(lengths: np.ndarray) -> float:
-    """The least mean length of an edge over all cycles of a graph, from float (n, n) or inf."""
+    """Return the least mean length of an edge over all cycles, from lengths float (n, n) or inf."""
     mean, walks = np.inf, lengths  # the shortest walks of k edges, from each node to each
     for k in range(1, len(lengths) + 1):
         mean = min(mean, float(walks.diagonal().min()) / k)

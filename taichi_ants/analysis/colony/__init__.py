@@ -1,1 +1,1 @@
-"""The scaling study of the colony: its data, what it compares, tables and figures."""
+"""The scaling study of the colony: data, comparisons, tables and figures."""

@@ -1,4 +1,4 @@
-"""The figures of the study, from the rows of conditions.csv."""
+"""Figures of the colony's study, from the rows of conditions.csv."""
 
 from __future__ import annotations
 
@@ -23,22 +23,21 @@ Rows = Sequence[ConditionRow]
 
 
 def draw_all(rows: Rows) -> dict[str, Figure]:
-    """All figures for which there are rows, by their names."""
+    """Return all figures that have rows, by name."""
     drawn = {name: draw(rows) for name, draw in FIGURES.items()}
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
 def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
-    """Deliveries of the largest colonies, a line per design, a panel per kind of world."""
     panels: dict[str, dict[Design, ConditionRow]] = {}
     for row in sorted(rows, key=lambda row: row.condition.ants):
-        if row.design in designs:  # larger colonies come later
+        if row.design in designs:  # larger colonies replace smaller ones
             panels.setdefault(row.condition.world_kind, {})[row.design] = row
     if not panels:
         return None
     across = min(3, len(panels))
     down = -(-len(panels) // across)
-    alike = len({one.regime for one in designs}) == 1  # then the title says it
+    alike = len({one.regime for one in designs}) == 1  # then labels need not name the regime
     names = [study.RULES[one.rules] if alike else one.words for one in designs]
     with style.styled():
         figure = style.new_figure(1.3 + down * (0.9 + 0.28 * len(designs)))
@@ -56,7 +55,7 @@ def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
         ants = sorted({row.condition.ants for lines in panels.values() for row in lines.values()})
         sizes = f"{' or '.join(map(str, ants))} {'ant' if ants == [1] else 'ants'}"
         caption = (
-            f"{sizes}. {_spread(rows)} Thin line: from the worst seed to the best. Grey: the "
+            f"{sizes}. {_spread(rows)} Thin line: from the worst to the best seed. Grey: the "
             "bounds of the worlds, from the lowest to the highest; bar: their mean."
         )
         title = f"{title}: {study.MEASURES['deliveries']}"
@@ -65,7 +64,7 @@ def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
 
 
 def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
-    """The mean with its interval, value and range over seeds, and the bounds where known."""
+    """Draw a mean with its number, interval and range over seeds, and the bounds if known."""
     mean, low, high, *_ = row.estimates["deliveries"]
     colour = style.COLOURS[place % len(style.COLOURS)]
     axis.hlines(place, low, high, color=colour, lw=3)
@@ -81,7 +80,6 @@ def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
 def _lines(
     title: str, designs: Sequence[Design], measures: Sequence[str], rows: Rows
 ) -> Figure | None:
-    """Measures against the number of ants, a column of panels for each kind of world."""
     world_kinds = [
         one for one in study.WORLD_KINDS if any(row.condition.world_kind == one for row in rows)
     ]
@@ -108,7 +106,7 @@ def _lines(
 
 
 def _spread(rows: Rows) -> str:
-    """The seeds, the intervals and the exploration rate, for a caption."""
+    """Return a caption with the seeds, the intervals and the exploration rate."""
     seeds = rows[0].seeds
     means = f"Means over {seeds_in_words(seeds)}, with 95 % intervals" if seeds > 1 else "One seed"
     return f"{means}. Exploration rate {study.EVALUATION_EPSILON:g}."

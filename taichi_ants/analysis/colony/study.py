@@ -1,8 +1,8 @@
-"""What the study of the colony measures and compares; `series.toml` lists its contrasts.
+"""The conditions, measures and contrasts of the colony's study; `series.toml` lists the contrasts.
 
-A condition is so many ants of a design (rules and a training regime) in one kind of world. A seed
-gives all conditions of a kind of world the same world, and so pairs them; except in the paper's,
-no ant has seen it before.
+A condition is a number of ants of a design (rules and a training regime) in one kind of world. A
+seed gives all conditions of a kind of world the same world, so they are paired. Except for the
+paper's world, ants have not been trained in the worlds in which they are evaluated.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ import numpy as np
 from taichi_ants.analysis.findings import LEAST_SEEDS, Contrast, Finding, Verdict, above, judge
 from taichi_ants.files import tomllib
 
-# Kinds of world in which ants are trained and evaluated, with the words of tables and figures.
+# Kinds of world for training and evaluation, with their names in tables and figures.
 WORLD_KINDS: dict[str, str] = {
     "paper": "the paper's world",
     "open": "open worlds (30, 30, 30)",
     "piles": "three far piles (30, 30, 30)",
 }
-# Kinds of world in which ants are evaluated that were trained in open ones.
+# Kinds of world for the evaluation of ants that were trained in open worlds.
 ELSEWHERES: dict[str, str] = {
     "rocks": "twice the rocks",
     "one_pile": "one far pile",
@@ -36,7 +36,7 @@ ELSEWHERES: dict[str, str] = {
 }
 WORLDS = {**WORLD_KINDS, **ELSEWHERES}
 
-# Rules of the game: A, trails that rise towards food; B, right of way; C, ants in view.
+# Rules: A, trails that rise towards food; B, right of way; C, ants in view.
 PAPER, SILENT, A, BC, ABC, ABC_SILENT, QUEUES = (
     *("paper", "paper_no_trails", "direction", "right_of_way"),
     *("foraging", "foraging_no_trails", "queueing"),
@@ -50,7 +50,7 @@ RULES: dict[str, str] = {
     ABC_SILENT: "B + C, no trails laid",
     QUEUES: "queues",
 }
-# Ways to come to a policy.
+# Training regimes.
 JOINT, ALONE, FEW, SOME, ABROAD = "joint", "alone", "with_4", "with_16", "open"
 REGIMES: dict[str, str] = {
     JOINT: "trained jointly",
@@ -62,20 +62,20 @@ REGIMES: dict[str, str] = {
 
 
 class Design(NamedTuple):
-    """Names in `RULES` and `REGIMES`."""
+    """Rules and a training regime, by their names in `RULES` and `REGIMES`."""
 
     rules: str
     regime: str = JOINT
 
     @property
     def words(self) -> str:
-        """What tables call it."""
+        """Its name in tables."""
         rules = RULES[self.rules]
         return rules if self.regime == JOINT else f"{rules}, {REGIMES[self.regime]}"
 
 
 class Condition(NamedTuple):
-    """What was evaluated: a name in `WORLDS`, a design, and how many ants."""
+    """An evaluated combination: a name in `WORLDS`, a design, and the number of ants."""
 
     world_kind: str
     rules: str
@@ -93,7 +93,7 @@ MEASURES: dict[str, str] = {
     "blocked": "share of blocked moves",
     "reward": "reward per ant and 1000 ticks",
 }
-# Those of the study, which also evaluates without exploration and knows bounds of its worlds.
+# Measures of the study, which also evaluates without exploration and computes bounds.
 OF_STUDY: dict[str, str] = {
     **MEASURES,
     "greedy": "deliveries per 1000 ticks without exploration",
@@ -107,9 +107,9 @@ Measured = Mapping[Condition, Mapping[str, np.ndarray]]
 def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dict[str, np.ndarray]:
     """Return the `MEASURES` of each seed, float64 (seeds,), from the outcome of a `ColonyPoint`.
 
-    An episode without a delivery counts with all its ticks for `first_delivery`: the mean is that
-    of the time to the first delivery or the end, whichever comes first (the restricted mean of
-    survival analysis), and never too large. `no_delivery_rate` tells how often this was so.
+    For `first_delivery`, an episode without a delivery counts with all its ticks. This restricted
+    mean (of survival analysis) is at most the true one; `no_delivery_rate` is the share of such
+    episodes.
     """
     deliveries, rewards = (
         outcome[name].mean(axis=1, dtype=float) * 1000 / ticks for name in ("deliveries", "returns")
@@ -126,21 +126,20 @@ def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dic
     }
 
 
-# Numbers of ants, of the first and of the second condition of a difference.
+# The numbers of ants of the first and the second condition of a difference.
 Sizes = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class Series:
-    """Differences of one kind, for several numbers of ants: the first minus the second design.
+    """Differences between two designs, first minus second, for several numbers of ants.
 
     Attributes:
-        question: What it helps to answer.
-        statement: What is so where the differences are above 0.
+        question: The question that the series helps to answer.
+        statement: A statement that is true if the differences are above 0.
         measure: A name in `MEASURES`.
-        against: With how many ants of the second each number of ants of the first is compared.
-        least: The smallest number of ants that is compared with the same: for one ant all regimes,
-            and rules for several, are alike.
+        against: Compare with the same number of ants, or with each smaller number.
+        least: The fewest ants for "same". With one ant, all regimes and some rules are the same.
         main: Whether it is one of the main findings.
     """
 
@@ -154,7 +153,7 @@ class Series:
     main: bool = False
 
     def contrasts(self, measured: Measured, world_kind: str) -> dict[Sizes, Contrast]:
-        """The contrasts of a kind of world; none where conditions are missing."""
+        """Return the contrasts of a kind of world for which both conditions were measured."""
         found = {}
         for n, other in self._sizes(measured, world_kind):
             values = measured[Condition(world_kind, *self.first, n)][self.measure]
@@ -183,9 +182,9 @@ Judged = dict[tuple[str, Series], dict[Sizes, Finding]]
 
 
 def judge_all(measured: Measured) -> Judged:
-    """Return the findings on all contrasts; a question in a kind of world is judged at once.
+    """Return the findings on all contrasts; those of a question and kind of world hold at once.
 
-    With fewer than `LEAST_SEEDS` seeds none has a verdict.
+    With fewer than `LEAST_SEEDS` seeds, the verdict is "too few seeds".
     """
     judged: Judged = {}
     for world_kind in dict.fromkeys(one.world_kind for one in measured):

@@ -1,4 +1,4 @@
-"""The study as tables: all conditions, all differences, and the findings."""
+"""Tables of the colony's study: all conditions, all differences, and the findings."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from taichi_ants.errors import count
 
 
 class ConditionRow(NamedTuple):
-    """A condition over all seeds, a row of conditions.csv.
+    """A row of conditions.csv: a condition over all seeds.
 
-    `estimates` are the measures of `OF_STUDY`; `ranges` the least and greatest value of deliveries
-    and bounds.
+    `estimates` has the measures of `OF_STUDY`, `ranges` the minimum and maximum of deliveries and
+    bounds.
     """
 
     condition: Condition
@@ -39,7 +39,7 @@ class ConditionRow(NamedTuple):
 
     @property
     def design(self) -> Design:
-        """Its rules and the way to its policy."""
+        """Its rules and training regime."""
         return Design(self.condition.rules, self.condition.regime)
 
     @property
@@ -59,17 +59,16 @@ class ConditionRow(NamedTuple):
 
 
 def rows_of_seeds(measured: Measured, seeds: Sequence[int]) -> list[dict[str, Any]]:
-    """The rows of seeds.csv: all measures of each seed under each condition."""
+    """Return the rows of seeds.csv: all measures of each seed under each condition."""
     return list(seed_rows([one._asdict() for one in measured], seeds, _stacked(measured)))
 
 
 def _stacked(measured: Measured) -> dict[str, np.ndarray]:
-    """The measures as arrays (conditions, seeds)."""
     return {name: np.stack([one[name] for one in measured.values()]) for name in study.OF_STUDY}
 
 
 def condition_rows(measured: Measured) -> list[ConditionRow]:
-    """Return each condition over its seeds, with 95 % intervals."""
+    """Return a row with 95 % intervals for each condition."""
     rows = []
     for (condition, one), estimates in zip(
         measured.items(), centres_of(_stacked(measured)), strict=True
@@ -80,7 +79,7 @@ def condition_rows(measured: Measured) -> list[ConditionRow]:
 
 
 def difference_rows(judged: Judged) -> list[dict[str, Any]]:
-    """The rows of differences.csv; intervals of a question in a kind of world hold together."""
+    """Return the rows of differences.csv; intervals of a question and a world hold at once."""
     return [
         {
             "world_kind": world_kind,
@@ -95,9 +94,9 @@ def difference_rows(judged: Judged) -> list[dict[str, Any]]:
 
 
 def means(rows: Sequence[ConditionRow]) -> list[Table]:
-    """Return tables of mean deliveries: for each kind of world, designs down, ants across.
+    """Return tables of mean deliveries, one per kind of world: designs down, ants across.
 
-    The last is of the policies of open worlds in others, with intervals and the worst seed.
+    The last table has policies from open worlds in other worlds, with intervals and worst seeds.
     """
     seeds = f"{_basis(rows)}: {study.MEASURES['deliveries']}"
     trained = [one for one in rows if one.condition.regime != study.ABROAD]
@@ -118,8 +117,8 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
         if cells:
             headers = ("ants", *map(str, sizes), "share of\nbound", "mean\nbound")
             note = (
-                f"Of {count(sizes[-1], 'ant')}: the mean share of each world's own bound, and the "
-                "mean of the bounds."
+                f"Last columns, for {count(sizes[-1], 'ant')}: the mean share of each world's "
+                "bound, and the mean of the bounds."
             )
             title = f"{sentence(study.WORLD_KINDS[world_kind])}, {seeds}"
             tables.append(Table(title, headers, cells, [note]))
@@ -140,12 +139,11 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
 
 
 def _basis(rows: Sequence[ConditionRow]) -> str:
-    """The seeds and the exploration rate behind the numbers of a table."""
     return f"{seeds_in_words(rows[0].seeds)}, exploration rate {study.EVALUATION_EPSILON:g}"
 
 
 def glance(rows: Sequence[ConditionRow]) -> Table:
-    """Return what the largest colonies deliver: designs down, kinds of world across."""
+    """Return a table of deliveries of the largest colonies: designs down, kinds of world across."""
     sizes = [one.condition.ants for one in rows if one.condition.regime != study.ABROAD]
     largest = max(sizes, default=0)
     shown: dict[str, dict[Design, ConditionRow]] = {name: {} for name in study.WORLD_KINDS}
@@ -157,7 +155,6 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
     digits = 0 if most >= 100 else 1
 
     def cell(row: ConditionRow | None) -> str:
-        """Deliveries with and without exploration, and the share of the bounds."""
         if row is None:
             return MISSING
         with_, without = (number(row.estimates[n].mean, digits) for n in ("deliveries", "greedy"))
@@ -170,7 +167,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
         for one in designs
         if any(one in by_design for by_design in shown.values())
     ]
-    if cells:  # most is possible where ants with food have right of way
+    if cells:  # the bounds are highest if ants with food have right of way
         line = []
         for by_design in shown.values():
             best = max(by_design.values(), key=lambda one: one.estimates["bound"].mean)
@@ -179,7 +176,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             line.append(figure(best.estimates["bound"].mean) + range_)
         cells.append(["Mean bound, right of way [range]", *line])
     title = f"{sentence(study.MEASURES['deliveries'])} of {count(largest, 'ant')}"
-    note = f"{_basis(rows)}; in brackets: 0. %: of each world's own bound."
+    note = f"{_basis(rows)}; in brackets: 0. %: share of each world's bound."
     return Table(title, ("", *_headers(shown)), cells, [note] if cells else [])
 
 
@@ -188,7 +185,7 @@ def _headers(world_kinds: Iterable[str]) -> list[str]:
 
 
 def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
-    """Return the main findings on the largest colonies: statements down, kinds of world across."""
+    """Return a table of the main findings on the largest colonies, a column per kind of world."""
     by_condition = {one.condition: one for one in rows}
     found_in = {world_kind for world_kind, series in judged if series.main}
     world_kinds = [one for one in study.WORLD_KINDS if one in found_in]
@@ -214,7 +211,6 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
 def _compared(
     by_condition: Mapping[Condition, ConditionRow], world_kind: str, series: Series, sizes: Sizes
 ) -> tuple[float, float]:
-    """The two means whose difference a series is about."""
     first, second = (
         by_condition[Condition(world_kind, *design, n)].estimates[series.measure].mean
         for design, n in zip((series.first, series.second), sizes, strict=True)
@@ -223,7 +219,7 @@ def _compared(
 
 
 def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
-    """Return deliveries at a glance, the main findings, and how many statements hold."""
+    """Return deliveries at a glance, the main findings, and the number of statements that hold."""
     seen = glance(rows)
     world_kinds = {one.condition.world_kind for one in rows}
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
@@ -246,7 +242,7 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 
 
 def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
-    """What is found of the largest colony; compared with several, the strongest objection."""
+    """Return the finding on the largest colony; of several, the strongest objection."""
     return _of_size(findings, max(ants for ants, _ in findings))
 
 
@@ -259,7 +255,7 @@ _HEADERS = ("World", "Statement", *(f"{sentence(one)}\nwith" for one in _SHOWN),
 
 
 def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
-    """Return the findings: a table per question, a line per series and kind of world."""
+    """Return the findings: a table per question, with a line per series and kind of world."""
     blocks: list[Block] = []
     by_condition = {one.condition: one for one in rows}
     for question in study.QUESTIONS:
@@ -277,9 +273,9 @@ def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
             blocks.append(Table(question, _HEADERS, lines, notes, text_columns=len(_HEADERS)))
     return [
         *blocks,
-        "The numbers are those of ants. Where a colony is compared with each smaller one, the "
-        "strongest objection counts. The intervals behind the answers to one question in one kind "
-        "of world hold at once with 95 %.",
+        "Columns with verdicts list numbers of ants. If a colony is compared with each smaller "
+        "one, the strongest objection counts. The intervals of one question in one kind of world "
+        "hold at once with 95 %.",
     ]
 
 
@@ -289,7 +285,7 @@ def _verdicts(
     series: Series,
     findings: Mapping[Sizes, Finding],
 ) -> list[str]:
-    """With how many ants a statement holds, and the two means that differ most."""
+    """Return cells with the numbers of ants by verdict, and with the two means that differ most."""
     by_verdict: dict[Verdict, list[int]] = {verdict: [] for verdict in Verdict}
     for n in {n for n, _ in findings}:
         by_verdict[_of_size(findings, n).verdict].append(n)
@@ -310,19 +306,19 @@ def _verdicts(
 
 
 class Results(NamedTuple):
-    """The conditions over all seeds, and the findings."""
+    """The rows of all conditions, and the findings."""
 
     rows: Sequence[ConditionRow]
     judged: Judged
 
     @classmethod
     def of(cls, measured: Measured) -> Results:
-        """Return the results that follow from all measures."""
+        """Return the results of all measures."""
         return cls(condition_rows(measured), study.judge_all(measured))
 
     @classmethod
     def read(cls, seeds: Sequence[Mapping]) -> Results:
-        """Return the same from the rows of seeds.csv."""
+        """Return the results from the rows of seeds.csv."""
         by_condition: dict[Condition, list[Mapping]] = {}
         for row in seeds:
             condition = Condition(row["world_kind"], row["rules"], row["regime"], int(row["ants"]))

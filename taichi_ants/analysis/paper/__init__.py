@@ -1,1 +1,1 @@
-"""The paper's comparison of learners: its data, tables and figures, and the audit of its claims."""
+"""The paper's comparison of learners: data, tables, figures, and an audit of the paper's claims."""

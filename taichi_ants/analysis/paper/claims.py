@@ -1,4 +1,4 @@
-"""All empirical claims of the paper, in its order, as `claims.toml` has them, and their audit."""
+"""An audit of all empirical claims of the paper, which `claims.toml` lists in the paper's order."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from taichi_ants.files import tomllib
 class Claim:
     """An empirical claim of the paper, made precise.
 
-    Every effect of the quantity must fulfil the criterion, which decides how far a word such as
-    "about", "close" or "consistently" goes.
+    Every effect of the quantity must fulfil the criterion, which gives words of the paper such as
+    "about", "close" or "consistently" a number.
     """
 
     id: str
@@ -30,7 +30,7 @@ class Claim:
     statement: str  # in our words
     criterion: Criterion
     quantity: Quantity
-    why: str = ""  # this criterion or quantity
+    why: str = ""  # the reason for the criterion or the quantity
 
     @property
     def tested_on(self) -> str:
@@ -49,7 +49,7 @@ class Claim:
         return f"{self.estimator} {self.criterion.words} {self.quantity.unit}"
 
 
-# Names in the file for arguments of quantities, besides measures.
+# Arguments of quantities that are not measures, by their names in the file.
 _NAMED: dict[str, Any] = {**{one.label: one for one in VARIANTS}, **quantities.READS}
 
 
@@ -80,10 +80,10 @@ Audit = dict[Claim, dict[str, Finding]]  # by claim and delivery setting
 
 
 def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
-    """Return findings on the claims, each in all delivery settings, all judged together.
+    """Return findings on the claims in all delivery settings, all judged together.
 
-    A claim is supported if all its contrasts are and contradicted if one is: its finding is that on
-    the weakest contrast.
+    The finding on a claim is that on its weakest contrast: a claim is supported if all its
+    contrasts are, and contradicted if one of them is.
     """
     grids = {delivery: grids_of(comparison, delivery) for delivery in comparison.delivery_settings}
     contrasts = {
@@ -105,7 +105,7 @@ def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
 
 
 def claims_rows(audit: Audit) -> list[dict[str, Any]]:
-    """The rows of claims.csv; numbers are nan if not tested, None if not read by mean."""
+    """Return the rows of claims.csv; numbers are nan if not tested, None if not judged by mean."""
 
     def numbers(one: Finding | None, prefix: str = "") -> dict[str, Any]:
         names = ("contrast", "effect", "ci_low", "ci_high", "verdict")
@@ -135,7 +135,7 @@ def claims_rows(audit: Audit) -> list[dict[str, Any]]:
 
 
 def tallies(audit: Audit) -> list[str]:
-    """How many verdicts of each kind there are, a line for each delivery setting."""
+    """Return the number of claims with each verdict as text, a line for each delivery setting."""
     lines = []
     for setting in next(iter(audit.values())):
         counted = Counter(findings[setting].verdict.value for findings in audit.values())
@@ -153,7 +153,7 @@ def headlines(audit: Audit) -> Table:
     ]
     note = (
         "Below the verdict: the difference that decides, its interquartile mean (IQM) over seeds "
-        "in reward or steps, and its interval, which holds for all claims at once."
+        "in reward or steps, and its interval. All intervals hold at once."
     )
     settings = next(iter(audit.values()))
     headers = ("The paper's main claims", *map(sentence, settings))
@@ -168,7 +168,7 @@ def _cell(finding: Finding) -> str:
 
 
 def claims_markdown(audit: Audit, world: str) -> str:
-    """The world's name, how to read it, and a table of all claims with effects and intervals."""
+    """Return a table of all claims with effects and intervals as Markdown, with an explanation."""
     rows = [
         [
             *(claim.id, claim.section, claim.statement, claim.tested_on, claim.asked),
@@ -182,17 +182,17 @@ def claims_markdown(audit: Audit, world: str) -> str:
     blocks: list[Block] = [
         f"World: {world}.",
         "\n".join(f"- {line}." for line in tallies(audit)),
-        "Effects are paired by seed. Where the verdict by the mean is another, it stands behind. "
-        "Of claims with several contrasts the weakest is shown. Intervals are at "
+        "Effects are paired by seed. If the verdict by the mean differs, it follows the one by the "
+        "IQM. For claims with several contrasts, the table shows the weakest one. Intervals are at "
         f"{100 * level:.3f} % each, so that all hold at once with 95 %. docs/statistics.md "
-        "explains estimators, verdicts and margins mean.",
+        "explains estimators, verdicts and margins.",
         Table("", headers, rows, text_columns=len(headers)),
     ]
     return markdown(blocks)
 
 
 def _effect(finding: Finding) -> str:
-    """Verdict, effect, interval and contrast of a claim; then those by mean where they differ."""
+    """Return verdict, effect, interval and contrast; then those by mean if the verdict differs."""
     if finding.verdict is Verdict.NOT_TESTED:
         return finding.verdict.value
     digits = 1 if finding.contrast.uses_iqm else 2

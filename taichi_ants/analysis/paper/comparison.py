@@ -1,7 +1,7 @@
 """The data of a comparison: measures of each configuration and seed, and learning curves.
 
-The seed is the unit of all statistics, and because one seed drives every configuration with the
-same random numbers, differences of rows are taken seed by seed.
+Seeds are the unit of all statistics. A seed gives all configurations the same random numbers, so
+differences of rows are paired by seed.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ import numpy as np
 from taichi_ants.learners import TrainingConfig, label
 from taichi_ants.task import Task
 
-PAPER_WORLD = "the paper's"  # in which alone its figures and claims mean something
+PAPER_WORLD = "the paper's"  # its numbers and claims apply to this world only
 
 
 class Variant(NamedTuple):
-    """A learner with hyperparameters of its own: what the paper calls an algorithm."""
+    """A learner with values of its hyperparameters, which the paper calls an algorithm."""
 
     learner: str
-    hyperparameters: str = ""  # as "planning_steps=3"; several are separated by blanks
+    hyperparameters: str = ""  # for example "planning_steps=3"; several are separated by spaces
 
     @property
     def short(self) -> list[str]:
-        """Its hyperparameters by their first letters, as "p3"; in full where these are alike."""
+        """Its hyperparameters by initials, for example "p3", or in full if two initials agree."""
         pairs = self.hyperparameters.split()
         short = {pair[0]: pair[0] + pair.partition("=")[2] for pair in pairs}
         return list(short.values()) if len(short) == len(pairs) else pairs
@@ -40,7 +40,7 @@ class Variant(NamedTuple):
 
 
 class GridPoint(NamedTuple):
-    """The four numbers of the paper's grid."""
+    """A point of the paper's grid of four hyperparameters."""
 
     learning_rate: float
     discount: float
@@ -49,7 +49,7 @@ class GridPoint(NamedTuple):
 
     @property
     def label(self) -> str:
-        """As in its table 2, for example "0.01 / 0.9 / 0.3 / 0.995"."""
+        """Its name as in the paper's table 2, for example "0.01 / 0.9 / 0.3 / 0.995"."""
         return " / ".join(f"{value:g}" for value in self)
 
 
@@ -62,25 +62,25 @@ class Row(NamedTuple):
 
     @classmethod
     def of(cls, task: Task, config: TrainingConfig) -> Row:
-        """The row of a task and a training configuration."""
+        """Return the row of a task and a training configuration."""
         own = " ".join(f"{name}={value:g}" for name, value in config.hyperparameters)
         numbers = (getattr(config, name) for name in GridPoint._fields)
         return cls(task.delivery, Variant(config.learner, own), GridPoint(*numbers))
 
     def columns(self) -> dict:
-        """The columns of a table that name the configuration."""
+        """Return the columns of a table that identify the configuration."""
         return {**self.variant._asdict(), **self.point._asdict(), "delivery": self.delivery}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Comparison:
-    """Configurations times seeds, trained and evaluated.
+    """The results of all configurations, each trained and evaluated with all seeds.
 
     Attributes:
         measures: `MEASURES` of each run by name, float64 (rows, seeds).
-        behaviours: What each final policy does, places in `BEHAVIOURS`, integer (rows, seeds).
-        policy_returns: Returns of the episodes that told the behaviours, integer (rows, seeds).
-        episodes, rollouts, max_steps: As of a `RunPoint`.
+        behaviours: Behaviours of the final policies, indices into `BEHAVIOURS`, int (rows, seeds).
+        policy_returns: Returns of the episodes that show the behaviours, integer (rows, seeds).
+        episodes, rollouts, max_steps: Those of a `RunPoint`.
         curves: Learning curves of the learners, see `figures.curves_of`.
         task: The rules of all rows, except the delivery.
     """
@@ -114,16 +114,16 @@ class Comparison:
 
     @property
     def learners(self) -> list[tuple[str, Variant]]:
-        """Each delivery setting with each learner in it."""
+        """All pairs of a delivery setting and a learner that have rows."""
         pairs = product(self.delivery_settings, self.variants)
         return [pair for pair in pairs if self.positions(*pair)]
 
     def position(self, delivery: str, variant: Variant, point: GridPoint) -> int | None:
-        """The number of a configuration's row, None where it is not in the comparison."""
+        """Return the index of a configuration's row, None if it is not in the comparison."""
         row = Row(delivery, variant, point)
         return self.rows.index(row) if row in self.rows else None
 
     def positions(self, delivery: str, variant: Variant) -> list[int]:
-        """The numbers of all rows of a learner in one delivery setting, in their order."""
+        """Return the indices of all rows of a learner in one delivery setting, in their order."""
         pairs = [row[:2] for row in self.rows]
         return [number for number, pair in enumerate(pairs) if pair == (delivery, variant)]

@@ -1,4 +1,4 @@
-"""The figures of a comparison, and the learning curves that they show."""
+"""Figures of a comparison, and the data of their learning curves."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ if TYPE_CHECKING:
 
 CURVES = {"returns": "Return", "steps": "Steps", "deliveries": "Deliveries"}
 _PER_DECADE = 12  # points of a learning curve between two powers of ten
-# Colours and marks of behaviours, by their places in `BEHAVIOURS`.
+# Colours and markers of behaviours, in the order of `BEHAVIOURS`.
 BEHAVIOUR_LOOKS = ((BLUE, "o"), (ORANGE, "^"), (WINE, "s"), (INK, "x"))
 
 
 def curve_row(comparison: Comparison, delivery: str, variant: Variant) -> int:
-    """Return the row of a learner in figure 1; where it lacks that one, the row of its table 2."""
+    """Return the row of a learner's configuration in figure 1, or if it has none, in table 2."""
     row = comparison.position(delivery, variant, FIGURE_1)
     return shown_position(comparison, delivery, variant) if row is None else row
 
 
 def spans(episodes: int) -> np.ndarray:
-    """Return the first episodes of spans, from 0, and the end of the last one, int64 (spans + 1,).
+    """Return the first episode of each span, from 0, and the last span's end, int64 (spans + 1,).
 
-    Spans grow so that points are evenly spaced on a logarithmic axis; the first ones are single
+    Spans grow, so that points are evenly spaced on a logarithmic axis; the first spans are single
     episodes.
     """
     n, end = max(2, round(_PER_DECADE * np.log10(episodes + 1)) + 1), episodes + 1
@@ -48,9 +48,9 @@ def curves_of(
 ) -> dict[str, np.ndarray]:
     """Return the curves of all `comparison.learners`, float64 (learners, 3, spans) by name.
 
-    The second axis is the interquartile mean over seeds and the ends of the middle half of the
-    seeds; of deliveries the mean, as a run of an episode delivers or does not. `outcomes` are rows
-    with arrays (seeds, episodes) by name, those of `curve_row` among them.
+    The second axis has the interquartile mean over seeds and the ends of the middle half of the
+    seeds. For deliveries, which are 0 or 1 per episode, it has the mean instead. `outcomes` yields
+    indices of rows, which include those of `curve_row`, with arrays (seeds, episodes) by name.
     """
     places = [curve_row(comparison, *learner) for learner in comparison.learners]
     edges = spans(comparison.episodes)
@@ -65,10 +65,10 @@ def curves_of(
 
 
 def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
-    """Return, length and deliveries per episode, a column for each delivery setting.
+    """Return a figure of the return, length and deliveries of episodes, by delivery setting.
 
-    Learners are shown at the configuration of figure 1, else of table 2. A point is the mean over a
-    span of episodes; lines are interquartile means over seeds, bands the middle half of the seeds.
+    It shows each learner in the configuration of `curve_row`. A point is the mean over a span of
+    episodes. Lines are interquartile means over seeds; bands are the middle half of the seeds.
     """
     colours = dict(zip(comparison.variants, cycle(COLOURS)))
     settings = comparison.delivery_settings
@@ -91,7 +91,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
             axis.set_ylabel(f"{label} of an episode")
             if name == "steps":
                 style.logarithmic(axis.yaxis, (1, 2, 5))
-            if name == "deliveries":  # a share, of which few hundredths are not to look like much
+            if name == "deliveries":  # a share, for which an axis of few hundredths would mislead
                 axis.set_ylim(min(0.9, axis.get_ylim()[0]), 1.02)
         for column, setting in zip(axes.T, settings, strict=True):
             column[0].set_title(f"Delivery {setting}")
@@ -103,11 +103,11 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
             style.logarithmic(column[-1].xaxis, (1,) if comparison.episodes > 50 else (1, 2, 5))
         words = (
             f"World: {comparison.world}. Line: interquartile mean of "
-            f"{count(len(comparison.seeds), 'seed')} (of deliveries the mean), band: their middle "
-            "half.\nLater points are means over longer spans. If the legend does not name another, "
+            f"{count(len(comparison.seeds), 'seed')} (mean for deliveries), band: their middle "
+            "half.\nLater points are means over longer spans. Unless the legend names others, "
             f"the learning rate is {FIGURE_1.learning_rate:g},\nthe discount "
             f"{FIGURE_1.discount:g}, epsilon {FIGURE_1.epsilon:g} and its decay "
-            f"{FIGURE_1.epsilon_decay:g}: the paper's figure 1 names no configuration; this one "
+            f"{FIGURE_1.epsilon_decay:g}. The paper's figure 1 names no configuration; this one "
             "occurs\ntwice in its table 2."
         )
         style.frame(figure, "Learning", words, style.legend_entries(axes.flat))
@@ -115,7 +115,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
 
 
 def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseline] = ()) -> Figure:
-    """Draw the behaviour and the return of each final policy: a mark for each run."""
+    """Return a figure with a mark for each run: return, deliveries and behaviour."""
     settings = comparison.delivery_settings
     returns = comparison.measures["return_last50"]
     deliveries = comparison.measures["deliveries_last50"]
@@ -131,8 +131,8 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
                 colour, marker = BEHAVIOUR_LOOKS[code]
                 faint: dict[str, Any] = {"color": colour, "markersize": 4, "alpha": 0.6}
                 axis.plot(deliveries[runs], returns[runs], marker, label=BEHAVIOURS[code], **faint)
-            # Hollow marks, larger than those of the data and above them. Optimal policies take
-            # delivery for the end; elsewhere they are no yardstick.
+            # Hollow marks, larger than those of the data and above them. Optimal policies assume
+            # that a delivery ends the episode, so other settings do not show them.
             look: dict[str, Any] = {"color": INK, "markerfacecolor": "none", "markersize": 11}
             for row, marker in zip(baselines, cycle("osD^vph")):
                 counts_here = setting == "terminates" or row.baseline != "optimal policy"
@@ -145,8 +145,7 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
             f"World: {comparison.world}. A mark is a run: "
             f"{count(len(comparison.rows), 'configuration')}, "
             f"{count(len(comparison.seeds), 'seed')} each. Its shape and colour show\nthe "
-            "behaviour of an ant that follows the final policy greedily, with evaporation as in "
-            "training.",
+            "behaviour of the greedy final policy, with evaporation as in training.",
             style.legend_entries(axes),
         )
     return figure
@@ -156,5 +155,5 @@ FIGURES = (learning_curves, return_against_deliveries)
 
 
 def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
-    """All figures, by their names."""
+    """Return all figures by name."""
     return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}

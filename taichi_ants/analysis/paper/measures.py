@@ -1,7 +1,7 @@
 """Measures of one run before any statistics: one number per configuration and seed.
 
-"last 50" means all episodes where a run has fewer. What speaks of the first 50 or the second 50
-episodes needs 100, so that early and late never share an episode.
+If a run has fewer than 50 episodes, "last 50" means all of them. Measures of the first or second 50
+episodes need 100 episodes, so that early and late measures never share an episode.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from functools import partial
 import numpy as np
 
 WINDOW = 50
-# Quantities of an episode: the array of `RunPoint`'s outcome, words, unit.
+# Quantities of an episode: array in the outcome of a `RunPoint`, name for readers, unit.
 _GIVEN = {
     "return": ("returns", "return", "reward"),
     "steps": ("steps", "length", "steps"),
     "deliveries": ("deliveries", "deliveries", "deliveries per episode"),
 }
-# Episodes, their words, and how many a run needs.
+# Windows of episodes: slice, name for readers, number of episodes that a run needs.
 _WINDOWS = {
     "first50": (slice(0, WINDOW), "the first 50 episodes", 2 * WINDOW),
     "second50": (slice(WINDOW, 2 * WINDOW), "episodes 51 to 100", 2 * WINDOW),
@@ -28,7 +28,7 @@ _WINDOWS = {
 }
 _SHARE = "share of runs"
 
-# Arrays of a `RunPoint`'s outcome, integer (..., episodes) or (..., rollouts).
+# The outcome of a `RunPoint`: integer arrays (..., episodes) or (..., rollouts) by name.
 Outcome = Mapping[str, np.ndarray]
 
 
@@ -39,18 +39,18 @@ class Measure:
     words: str
     unit: str
     compute: Callable[[Outcome], np.ndarray]  # float64 (...)
-    episodes: int = 1  # of training, at least
+    episodes: int = 1  # the fewest episodes of training that it needs
 
     @property
     def uses_iqm(self) -> bool:
-        """Whether it has an IQM; a share or a count has a mean only."""
+        """Whether it has an IQM; shares and counts have only a mean."""
         return self.unit in ("reward", "steps")
 
 
 def measures_of_runs(outcome: Outcome, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
     """Return measures of runs by name, float64 (points, seeds), from arrays (points, seeds, ...).
 
-    They are nan where the runs have fewer episodes than a measure needs. None: all of them.
+    If the runs have fewer episodes than a measure needs, it is nan. `names=None` means all.
     """
     *shape, episodes = outcome["returns"].shape
     return {
@@ -66,7 +66,7 @@ def _mean(name: str, episodes: slice, runs: Outcome) -> np.ndarray:
 
 
 def _fluctuation(name: str, episodes: slice, runs: Outcome) -> np.ndarray:
-    """Root mean square change from one episode to the next, over the square root of two.
+    """Return the root mean square change between successive episodes, divided by sqrt(2).
 
     For independent episodes this is their standard deviation; a slow trend hardly changes it.
     """

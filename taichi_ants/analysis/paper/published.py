@@ -1,4 +1,4 @@
-"""The numbers that the paper reports, with which ours are compared."""
+"""The numbers that the paper reports."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ VARIANTS: tuple[Variant, ...] = (Q_LEARNING, SARSA, DYNA_P3, DYNA_P5)
 
 
 class PaperRow(NamedTuple):
-    """One row of the paper's table 2, of one run."""
+    """A row of the paper's table 2, with the numbers of one run."""
 
     point: GridPoint
     reward: float  # mean of the last 50 episodes
-    # The column is headed "train avg steps", section 3.1 says "the last 50 episodes"; ours come
-    # near them as a mean of all episodes, and do not as one of the last 50.
+    # The column is headed "train avg steps", but section 3.1 says "the last 50 episodes". Our
+    # means of all episodes are close to these numbers; those of the last 50 are not.
     steps: float
     deliveries: float  # per episode
 
     def figure(self, measure: str) -> float:
-        """The figure for a measure of ours, by its first word."""
+        """Return the paper's number for a measure such as "return_last50", by its first word."""
         return getattr(self, measure.partition("_")[0].replace("return", "reward"))
 
 
@@ -36,14 +36,14 @@ TABLE_2: dict[Variant, PaperRow] = {
     SARSA: PaperRow(GridPoint(0.01, 0.9, 0.3, 0.995), 47.3, 73.0, 1.0),
 }
 
-# Its figure 1 shows all learners with "shared hyperparameters" that it does not name; these are
-# the only ones that occur twice in its table 2.
+# The paper's figure 1 shows all learners with "shared hyperparameters" that it does not name. Only
+# this configuration occurs twice in its table 2.
 FIGURE_1 = GridPoint(0.01, 0.9, 0.3, 0.995)
 
 GREEDY_RETURN = 45
 GREEDY_STEPS = (34, 36)
 
-# The paper's grid: each factor with its two values, in the order of `GridPoint`.
+# The paper's grid: each hyperparameter with its two values, in the order of `GridPoint`.
 FACTORS: dict[str, tuple[float, float]] = {
     "learning_rate": (0.001, 0.01),
     "discount": (0.9, 0.99),

@@ -1,10 +1,10 @@
 """Quantities of each seed, on which the claims of the paper are tested.
 
-Where the paper speaks of best configurations, its own are used: they were chosen by its data, so
-that on our seeds they are free of the luck of having been chosen. Where it speaks of a learner in
-general, the mean over all 16 configurations is. Where it speaks of a peak, the configuration is
-chosen anew on one half of the seeds and measured on the other. The effect of a hyperparameter is
-the mean difference over the 8 pairs of configurations that differ in it alone.
+For claims about best configurations, we take the paper's: chosen on its data, they are not selected
+for luck on our seeds. For claims about a learner in general, we take the mean over all 16
+configurations. For claims about a peak, we choose the configuration on one half of the seeds and
+measure it on the other. The effect of a hyperparameter is the mean difference over the 8 pairs of
+configurations that differ only in it.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from taichi_ants.analysis.paper.published import FACTORS, FIGURE_1, GRID, TABLE_
 
 SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)
 ALL = f"all {len(GRID)}"
-EVERY_CONFIGURATION = (0, 1, 2, 3)  # the axes of a grid without that of the seeds
+EVERY_CONFIGURATION = (0, 1, 2, 3)  # the axes of a grid except that of the seeds
 
-# Reads a measure of a learner's 16 configurations, float64 (2, 2, 2, 2, seeds), axes in the order
-# of `FACTORS`; see `grids_of`.
+# (measure, learner) -> the measure in its 16 configurations, float64 (2, 2, 2, 2, seeds), axes in
+# the order of `FACTORS`; see `grids_of`.
 Grids = Callable[[str, Variant], np.ndarray]
-Effect = Callable[[Grids], np.ndarray]  # reads a number of each seed, float64 (seeds,)
+Effect = Callable[[Grids], np.ndarray]  # grids -> a number for each seed, float64 (seeds,)
 
 
 def grids_of(comparison: Comparison, delivery: str) -> Grids:
-    """Return what reads the grids of one delivery setting.
+    """Return a function that returns the grids of one delivery setting.
 
-    nan is what is missing: a configuration, a measure that needs more episodes, and all of another
-    world than the paper's or of runs with fewer than 50 episodes.
+    Missing configurations and measures that need more episodes are nan. In worlds other than the
+    paper's, and with fewer than 50 episodes, all numbers are nan.
     """
     is_papers = comparison.in_paper_world and comparison.episodes >= WINDOW
     missing = np.full(len(comparison.seeds), np.nan)
@@ -51,13 +51,13 @@ def grids_of(comparison: Comparison, delivery: str) -> Grids:
 
 
 def pairs(grid: np.ndarray, factor: str) -> np.ndarray:
-    """Upper minus lower value of a hyperparameter, all else equal, float64 (8, seeds)."""
+    """Return differences between both values of a hyperparameter, upper - lower, (8, seeds)."""
     lower, upper = np.moveaxis(grid, list(FACTORS).index(factor), 0)
     return (upper - lower).reshape(-1, grid.shape[-1])
 
 
 class Read(NamedTuple):
-    """A learner's number, (grids, measure, learner) -> float64 (seeds,), and its words."""
+    """A function (grids, measure, learner) -> float64 (seeds,), and its name for readers."""
 
     words: str
     values: Callable[[Grids, str, Variant], np.ndarray]
@@ -68,9 +68,9 @@ def _at(grid: np.ndarray, point: GridPoint) -> np.ndarray:
 
 
 def _held_out(grids: Grids, measure: str, variant: Variant) -> np.ndarray:
-    """The best by mean return of even seeds, on odd ones, float64 (seeds / 2,)."""
+    """Return a measure on odd seeds, where even seeds return most, float64 (seeds / 2,)."""
     choosing = grids("return_last50", variant)[..., ::2].mean(axis=-1)
-    best = np.unravel_index(choosing.argmax(), choosing.shape)  # of a missing one, if there is
+    best = np.unravel_index(choosing.argmax(), choosing.shape)  # argmax prefers nan
     return grids(measure, variant)[best][1::2]
 
 
@@ -81,7 +81,6 @@ def _epsilon_at_table_2(grids: Grids, measure: str, variant: Variant) -> np.ndar
 
 
 def _effect_of(factor: str, sign: int = 1) -> Read:
-    """The effect of a hyperparameter: its upper minus its lower value, or the reverse."""
     lower, upper = FACTORS[factor][::sign]
     return Read(
         f"{factor.replace('_', ' ')} {upper:g} minus {lower:g}, mean of 8 pairs",
@@ -90,7 +89,7 @@ def _effect_of(factor: str, sign: int = 1) -> Read:
 
 
 def _less_exploration(epsilon: int, decay: int) -> Read:
-    """Epsilon 0.3 with decay 0.99 minus another combination, by the places of its two values."""
+    """Return epsilon 0.3 with decay 0.99 minus the combination with these indices of values."""
 
     def values(grids: Grids, *of: Any) -> np.ndarray:
         grid = grids(*of)
@@ -127,10 +126,10 @@ READS: dict[str, Read] = {  # by their names in `claims.toml`
 
 @dataclass(frozen=True)
 class Quantity:
-    """One or more numbers of each seed, in one unit, on which a claim is tested.
+    """One or more numbers for each seed, in one unit, on which a claim is tested.
 
-    `effects` read them, by label, such as "Q-learning minus SARSA"; float64 (k, seeds) each with
-    `of_estimates`, which like `possible` is that of a `Contrast`.
+    `effects` compute them, by label, for example "Q-learning minus SARSA". `possible` and
+    `of_estimates` are those of a `Contrast`; with `of_estimates`, effects are float64 (k, seeds).
     """
 
     words: str
@@ -141,29 +140,29 @@ class Quantity:
 
     @property
     def uses_iqm(self) -> bool:
-        """Whether it rests on the IQM over seeds.
+        """Whether it is judged by the IQM over seeds.
 
-        Quantities in reward or steps do, because outliers, one run in hundreds, pull their mean.
-        Shares, counts of deliveries and correlations are bounded, so that no run can outweigh the
-        others, and an IQM would hide that a quarter of all runs fails.
+        Quantities in reward or steps are, because outliers, one run in hundreds, pull their mean.
+        Shares, counts of deliveries and correlations are bounded, so no run can outweigh the
+        others, and an IQM would hide failures of a quarter of all runs.
         """
         return self.possible == UNBOUNDED
 
 
 def of(read: Read, measure: str, *variants: Variant) -> Quantity:
-    """The measure of each learner."""
+    """Return the measure of each learner."""
     effects = {variant.label: _effect(read, measure, variant) for variant in variants}
     return _quantity(read.words, measure, effects, SHARE)
 
 
 def of_each(measure: str, variant: Variant, *reads: Read) -> Quantity:
-    """The measure of a learner, read in several ways."""
+    """Return the measure of a learner, computed in several ways."""
     effects = {f"{variant.label}, {one.words}": _effect(one, measure, variant) for one in reads}
     return _quantity(ALL, measure, effects)
 
 
 def minus(read: Read, measure: str, *both: tuple[Variant, Variant]) -> Quantity:
-    """The measure of the first minus that of the second learner of each pair, seed by seed."""
+    """Return the measure of the first minus that of the second learner of each pair, by seed."""
     effects = {
         f"{one.label} minus {other.label}": _effect(read, measure, one, other)
         for one, other in both
@@ -180,14 +179,14 @@ def _effect(read: Read, measure: str, variant: Variant, less: Variant | None = N
 def _quantity(
     scope: str, measure: str, effects: dict[str, Effect], bounds: tuple[float, float] = UNBOUNDED
 ) -> Quantity:
-    """A quantity in the unit of a measure; the bounds are those of a share or a count."""
+    """Return a quantity in the unit of a measure; `bounds` apply to shares and counts."""
     one = MEASURES[measure]
     possible = UNBOUNDED if one.uses_iqm else bounds
     return Quantity(f"{one.words}, {scope}", one.unit, effects, possible)
 
 
 def share_above(measure: str, first: Variant, second: Variant, sign: int = 1) -> Quantity:
-    """In which share of matched configurations the first is above (-1: below); ties by half."""
+    """Return the share of configurations with the first above (-1: below); ties count by half."""
 
     def share(grids: Grids) -> np.ndarray:
         signs = np.sign(grids(measure, first) - grids(measure, second))
@@ -202,7 +201,7 @@ share_below = partial(share_above, sign=-1)
 
 
 def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
-    """One measure minus another of each learner, mean over all configurations."""
+    """Return one measure minus another of each learner, as the mean over all configurations."""
     words, mean = READS["mean of all"]
     both = Read(
         f"minus {MEASURES[earlier].words}, {words}",
@@ -212,10 +211,12 @@ def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
 
 
 def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
-    """Spearman's, of two measures over a learner's 16 runs of a seed; 0 where one is constant."""
+    """Return Spearman's correlation of two measures over a learner's 16 runs of each seed.
 
-    def centred_ranks(values: np.ndarray) -> np.ndarray:
-        """Ranks of (16, seeds) in each seed, less their mean; equal values share the middle one."""
+    It is 0 if one of them is constant.
+    """
+
+    def centred_ranks(values: np.ndarray) -> np.ndarray:  # equal values share the middle rank
         return np.sign(values[:, None] - values).sum(axis=1) / 2
 
     def correlation(grids: Grids) -> np.ndarray:
@@ -230,7 +231,7 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
 
 
 def stronger(measure: str, factor: str) -> Quantity:
-    """The absolute effect of a hyperparameter minus that of each other one."""
+    """Return the absolute effect of a hyperparameter minus that of each of the others."""
 
     def effects(other: str) -> Effect:
         reads = [READS[f"effect of {name}"].values for name in (factor, other)]
@@ -246,7 +247,7 @@ def stronger(measure: str, factor: str) -> Quantity:
 
 
 def more_dependent(measure: str, factor: str, *both: tuple[Variant, Variant]) -> Quantity:
-    """How much more a hyperparameter's effect varies over configurations for the first learner."""
+    """Return how much more an effect varies over configurations for the first learner of a pair."""
 
     def effects(*variants: Variant) -> Effect:
         return lambda grids: np.concatenate([pairs(grids(measure, v), factor) for v in variants])
@@ -261,6 +262,5 @@ def more_dependent(measure: str, factor: str, *both: tuple[Variant, Variant]) ->
 
 
 def _first_minus_second(estimates: np.ndarray, statistic: Callable[..., Any]) -> np.ndarray:
-    """A statistic of the first half of the rows minus that of the second."""
     first, second = np.split(estimates, 2)
     return statistic(first, axis=0) - statistic(second, axis=0)

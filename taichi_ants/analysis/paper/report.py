@@ -1,4 +1,4 @@
-"""The comparison as text: on one screen, and all of its tables."""
+"""The comparison as text: a report of one screen, and all tables."""
 
 from __future__ import annotations
 
@@ -35,17 +35,16 @@ from taichi_ants.analysis.tables import (
 )
 from taichi_ants.errors import count
 
-WIDTH = 79  # columns: what the narrowest common terminal shows
-MOST_LINES = 12  # of the table on one screen
-# Below, a note warns that means have too few seeds; what intervals cover is measured in
-# docs/statistics.md.
+WIDTH = 79  # columns of the narrowest common terminal
+MOST_LINES = 12  # of the table in the report of one screen
+# With fewer, a note warns about intervals of means; docs/statistics.md has their coverage.
 FEW_SEEDS = 50
-APART = "!"  # marks a mean that the interval of the IQM excludes
-MIXED = "+ the runs do different things, and no run has their mean."
+APART = "!"  # marks a mean outside of the interval of the IQM
+MIXED = "+ the runs do different things, so their mean describes no run."
 
 
 class Results(NamedTuple):
-    """A comparison, the rows of `bounds.baselines`, and what follows from them."""
+    """A comparison, its baselines, and the tables and the audit that follow from them."""
 
     comparison: Comparison
     baselines: Sequence[Baseline]
@@ -63,19 +62,19 @@ class Results(NamedTuple):
 
 
 def report(comparison: Comparison, lines: Sequence[Line], audit: Audit) -> str:
-    """Return what fits on one screen, as plain text of at most `WIDTH` columns."""
+    """Return the report of one screen, as plain text of at most `WIDTH` columns."""
     tables = _glance(lines), headlines(audit), behaviour_counts(comparison)
     claims = [f"The paper's {len(audit)} claims", *(f"  {line}" for line in tallies(audit))]
     return plain_text([*heading(comparison), *tables, "\n".join(claims)], WIDTH)
 
 
 def table2_markdown(comparison: Comparison, lines: Sequence[Line]) -> str:
-    """The paper's table 2 beside ours, as Markdown."""
+    """Return our version of the paper's table 2, with the paper's numbers, as Markdown."""
     return markdown([*heading(comparison), *figure_tables(lines, comparison), greedy_table(lines)])
 
 
 def heading(comparison: Comparison) -> list[Block]:
-    """The world, the sizes, and whether trails evaporate."""
+    """Return text with the world, the numbers of runs, and whether trails evaporate."""
     sizes = (
         f"{count(len(comparison.rows), 'configuration')}, {count(len(comparison.seeds), 'seed')}, "
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "
@@ -91,7 +90,7 @@ def heading(comparison: Comparison) -> list[Block]:
 
 
 def behaviour_counts(comparison: Comparison) -> Table:
-    """Return a table of how many final policies do what, by delivery setting."""
+    """Return a table of the number of final policies with each behaviour, by delivery setting."""
     settings = comparison.delivery_settings
     by_setting = []
     for setting in settings:
@@ -102,7 +101,7 @@ def behaviour_counts(comparison: Comparison) -> Table:
         for code, name in enumerate(BEHAVIOURS)
         if any(code in done for done in by_setting)
     ]
-    return Table("", ("What the final policies do", *settings), rows)
+    return Table("", ("Behaviour of final policies", *settings), rows)
 
 
 def _mean(one: Estimator) -> str:
@@ -110,7 +109,6 @@ def _mean(one: Estimator) -> str:
 
 
 def _glance(lines: Sequence[Line]) -> Table:
-    """Return the returns and steps of the learners beside the paper's."""
     shown = lines[:MOST_LINES]
     beside = any(line.paper for line in lines)
     paper = ("paper",) if beside else ()
@@ -128,22 +126,22 @@ def _glance(lines: Sequence[Line]) -> Table:
         ]
         rows.append(cells if beside else [*cells[:5], *cells[6:8], cells[9]])
     notes = [
-        "Return and food of the last 50 episodes, steps of all. IQM: interquartile mean, the "
-        "IQM. Best run: best by return of all configurations, one run each."
+        "Return and food: last 50 episodes; steps: all. IQM: interquartile mean. Best run: "
+        "highest return of all configurations, one run each."
     ]
     if any(line.summary.estimates["return_last50"].apart for line in shown):
-        notes.append(f"{APART} a few far runs have moved the mean away from the IQM.")
+        notes.append(f"{APART} outliers pull the mean away from the IQM.")
     if any(line.summary.mixed for line in shown):
         notes.append(MIXED)
     if not all(line.paper_configuration for line in shown):
-        notes.append("* its best configuration by the IQM of the return, which flatters it.")
+        notes.append("* best configuration by the IQM of the return, which flatters the learner.")
     if len(lines) > len(shown):
-        notes.append(f"table2.csv has {len(lines) - len(shown)} more.")
+        notes.append(f"table2.csv has {len(lines) - len(shown)} more rows.")
     return Table("", headers, rows, notes, text_columns=2)
 
 
 def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
-    """A table for each figure of a run, beside the paper's in its world, and what they mean."""
+    """Return a table for each of `FIGURES`, with the paper's numbers in its world, and notes."""
     runs = comparison.episodes
     late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
     titles = (f"Return, {late}", "Steps, all episodes", f"Steps, {late}", f"Deliveries, {late}")
@@ -169,7 +167,7 @@ def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
 
 
 def _spread(measure: str, middle: float | None, low: float, high: float, mark: str = "") -> str:
-    """Return an estimator and below it its interval, if it has one; "-" if there is none."""
+    """Return an estimate with its interval, if it has one, on the next line; "-" for None."""
     if middle is None:
         return MISSING
     large = max(abs(middle), abs(high)) >= 100
@@ -183,20 +181,21 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
         f"Mean, IQM: over {seeds} seeds, with intervals at 95 %."
         if seeds > 1
         else "Mean, IQM: of one seed, which has no interval.",
-        "IQM: interquartile mean, of the middle half of the runs.",
-        "Best run: best by return of all configurations, one run each: median, [95 % range].",
+        "IQM: interquartile mean, the mean of the middle half of the runs.",
+        "Best run: highest return of all configurations, one run each: median, [95 % range].",
     ]
     if any(line.summary.estimates[name].apart for line in lines for name in FIGURES):
-        notes.append(f"{APART} the mean is outside of the IQM's interval: far runs have moved it.")
+        notes.append(f"{APART} outliers pull the mean out of the interval of the IQM.")
     if beside:
         notes += [
             "Paper: its table 2. Its steps may be of all episodes or of the last 50.",
-            "Below: percentage of the best runs below the paper's figure.",
+            "Below: percentage of best runs below the paper's number.",
         ]
     if 1 < seeds < FEW_SEEDS:
         notes += [
-            f"Few seeds ({seeds}): where one run in a hundred is far off, the interval of the mean "
-            "misses it more often than not. The IQM's holds from 10 seeds on (docs/statistics.md)."
+            f"Few seeds ({seeds}): if one run in a hundred is an outlier, most intervals of the "
+            "mean miss the true mean. Intervals of the IQM are valid from 10 seeds on "
+            "(docs/statistics.md)."
         ]
     starred = [
         f"  {line.label}, {line.delivery}: {line.summary.row.point.label}"
@@ -204,7 +203,7 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
         if not line.paper_configuration
     ]
     if starred:
-        best = "* its best by the IQM of the return, on these seeds, which flatters it"
+        best = "* best configuration by the IQM of the return on these seeds, which flatters it"
         notes += [f"{best} (learning rate / discount / epsilon / decay):", *starred]
     return [*notes, MIXED] if any(line.summary.mixed for line in lines) else notes
 
@@ -220,12 +219,12 @@ def greedy_table(lines: Sequence[Line]) -> Table:
         both = (text for one in (gains, steps) for text in (_mean(one), number(one.iqm)))
         rows.append([line.label, line.delivery, *both, number(food.mean, 2)])
     low, high = GREEDY_STEPS
-    note = f"The paper, in its world: about {GREEDY_RETURN} reward in {low} to {high} steps."
+    note = f"The paper, in its world: a return of about {GREEDY_RETURN} in {low} to {high} steps."
     return Table("Greedy evaluation, configurations as above", headers, rows, [note], 2)
 
 
 def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans]) -> Table:
-    """Return what the final policies do, in the configurations that the tables above show."""
+    """Return a table of the behaviours of the final policies of `lines`."""
     returns = ("Return\nin training", "Return\nfollowed", "Return\ngreedy")
     headers = ("Learner", "Delivery", "Behaviour", "Runs", *returns)
     shown = ("return_last50", "policy_return", "greedy_return")
@@ -241,15 +240,16 @@ def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans])
     notes = (
         "Each policy is followed greedily once, with evaporation as in training.",
         *(f"{one}: {words}." for one, words in zip(BEHAVIOURS, DEFINITIONS, strict=True)),
-        "An episode without delivery is told by its second half.",
-        "Return: mean of the last 50 training episodes, of the episode that tells the behaviour, "
-        "of the greedy evaluation. summary.csv counts all configurations.",
+        "If that episode has no delivery, its second half decides.",
+        "Return: mean of the last 50 training episodes, of the episode that is followed, and of "
+        "the greedy evaluation. summary.csv has the counts of all configurations.",
     )
-    return Table("What they do, in the configurations above", headers, rows, notes, text_columns=3)
+    title = "Behaviour, in the configurations above"
+    return Table(title, headers, rows, notes, text_columns=3)
 
 
 def baseline_table(baselines: Sequence[Baseline]) -> Table:
-    """Return what exact bounds and simple policies bring; what is not known is in the notes."""
+    """Return a table of exact bounds and simple policies; notes explain missing ones."""
     rows = [
         [one.label, number(one.return_mean), number(one.steps_mean), number(one.deliveries_mean, 2)]
         for one in baselines

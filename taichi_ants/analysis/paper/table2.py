@@ -1,7 +1,7 @@
-"""The paper's table 2 beside ours, and summaries of all configurations.
+"""Our version of the paper's table 2, and summaries of all configurations.
 
-The paper trains each configuration once, and reports for each algorithm the best of 16 by return.
-`best_of` repeats that with other seeds, which shows how much of a figure is luck.
+The paper trains each configuration once, and reports for each algorithm the one of 16 with the
+highest return. `best_of` repeats that with other seeds, which shows the effect of luck.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from taichi_ants.analysis.statistics import RANDOM_SEED, interquartile_mean
 from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of
 
 DRAWS = 20_000
-# What is reported of a run. The paper has one figure of steps, we have two readings of it.
+# Measures in table 2. The paper has one number of steps, which can be read in two ways.
 FIGURES = ("return_last50", "steps_all", "steps_last50", "deliveries_last50")
 _GREEDY = ("greedy_return", "greedy_steps", "greedy_deliveries")
 _MEASURES = ("return_last50", "steps_last50", "steps_all", "deliveries_last50", *_GREEDY)
 
 
 class Summary(NamedTuple):
-    """A configuration over all seeds, a row of summary.csv."""
+    """A row of summary.csv: a configuration over all seeds."""
 
     row: Row
     seeds: int
     estimates: Mapping[str, Estimator]
-    runs: Mapping[int, int]  # by place in `BEHAVIOURS`
+    runs: Mapping[int, int]  # number of runs by index into `BEHAVIOURS`
 
     @property
     def mixed(self) -> bool:
-        """Whether the runs do different things."""
+        """Whether the runs have different behaviours."""
         return len(self.runs) > 1
 
     def columns(self) -> dict[str, Any]:
@@ -50,7 +50,7 @@ class Summary(NamedTuple):
 
 
 def summarise(comparison: Comparison) -> list[Summary]:
-    """Return a summary of each configuration, in their order."""
+    """Return a summary of each configuration, in the order of the rows."""
     values = {name: comparison.measures[name] for name in _MEASURES}
     estimates = centres_of(values, [name for name in values if MEASURES[name].uses_iqm])
     rows = zip(comparison.rows, estimates, comparison.behaviours, strict=True)
@@ -59,12 +59,12 @@ def summarise(comparison: Comparison) -> list[Summary]:
 
 
 class BehaviourMeans(NamedTuple):
-    """The runs of a configuration with one behaviour, a row of behaviours.csv."""
+    """A row of behaviours.csv: the runs of a configuration with one behaviour."""
 
     row: Row
     behaviour: int
     runs: int
-    means: Mapping[str, float]  # "policy_return" is of the episode that told the behaviour
+    means: Mapping[str, float]  # "policy_return": of the episode that shows the behaviour
 
     def columns(self) -> dict[str, Any]:
         """Return the columns of behaviours.csv."""
@@ -85,15 +85,15 @@ def summarise_behaviours(comparison: Comparison) -> list[BehaviourMeans]:
 
 
 def paper_row(comparison: Comparison, variant: Variant) -> PaperRow | None:
-    """The paper's table 2 for a learner; None where it has none, and in other worlds."""
+    """Return a learner's row of the paper's table 2; None without one and in other worlds."""
     return TABLE_2.get(variant) if comparison.in_paper_world else None
 
 
 def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> int:
-    """The row that stands for a learner: the paper's configuration.
+    """Return the index of the row with the paper's configuration of a learner.
 
-    Where there is none, its best one by the IQM of the return, which no outlier decides. It is
-    chosen and reported on the same seeds, which flatters it.
+    Without one, return its best row by the IQM of the return, which outliers do not decide. That
+    row is chosen and reported on the same seeds, which flatters the learner.
     """
     paper = paper_row(comparison, variant)
     same = comparison.position(delivery, variant, paper.point) if paper else None
@@ -107,7 +107,7 @@ def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> i
 def best_of(
     comparison: Comparison, delivery: str, variant: Variant, draws: int = DRAWS
 ) -> dict[str, np.ndarray]:
-    """The winner's `FIGURES`, float64 (draws,) each: each configuration runs once, on any seed."""
+    """Return `FIGURES` of the best configuration, one run each, float64 (draws,) by name."""
     rows = np.array(comparison.positions(delivery, variant))
     random = np.random.default_rng(RANDOM_SEED)
     seeds = random.integers(0, len(comparison.seeds), size=(draws, len(rows)))
@@ -117,9 +117,10 @@ def best_of(
 
 
 class BestRun(NamedTuple):
-    """A figure of the best run of all configurations, had each been trained once.
+    """A measure of the best run of all configurations, if each is trained once.
 
-    The range is from 2.5 % to 97.5 % of repetitions with other seeds.
+    `low` and `high` are the percentiles 2.5 and 97.5 of repetitions with other seeds;
+    `paper_percentile` is the percentile of the paper's number.
     """
 
     median: float
@@ -129,18 +130,18 @@ class BestRun(NamedTuple):
 
     @classmethod
     def of(cls, values: np.ndarray, paper: float = math.nan) -> BestRun:
-        """Return it from the values of repetitions; ties with the paper's count by half."""
+        """Return the best run from values of repetitions; ties with `paper` count by half."""
         low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
         below = float(50 * ((values < paper).mean() + (values <= paper).mean()))
         return cls(median, low, high, math.nan if math.isnan(paper) else below)
 
 
 class Line(NamedTuple):
-    """A learner in one delivery setting, a row of table2.csv."""
+    """A row of table2.csv: a learner in one delivery setting."""
 
-    summary: Summary  # of the configuration that stands for it, see `shown_position`
+    summary: Summary  # of the configuration that `shown_position` chooses
     paper: PaperRow | None  # see `paper_row`
-    best_run_of: int  # configurations
+    best_run_of: int  # number of configurations
     best_run: Mapping[str, BestRun]  # by the names of `FIGURES`
 
     @property
@@ -155,12 +156,12 @@ class Line(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The learner, with * if its configuration is not the paper's, + if its runs differ."""
+        """The learner, with * if its configuration is not the paper's, and + if its runs differ."""
         star = "" if self.paper_configuration else " *"
         return self.summary.row.variant.label + star + (" +" if self.summary.mixed else "")
 
     def of_paper(self, measure: str) -> float:
-        """Return the paper's figure of a measure, nan if it has none."""
+        """Return the paper's number for a measure, nan if it has none."""
         return self.paper.figure(measure) if self.paper else math.nan
 
     def columns(self) -> dict[str, Any]:
@@ -193,10 +194,10 @@ def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DR
 
 
 def examples(comparison: Comparison) -> list[tuple[int, int]]:
-    """Return runs to look at, as row and place of the seed: one of each behaviour of each learner.
+    """Return an example of each behaviour of each learner, as indices of row and seed.
 
-    It is the run of median return, in the configuration that stands for the learner, else in the
-    one in which the behaviour is most frequent.
+    It is the run of median return in the configuration of `shown_position`. For behaviours that do
+    not occur there, it is from the configuration in which they are most frequent.
     """
     codes = comparison.behaviours
     shown = [shown_position(comparison, *learner) for learner in comparison.learners]
@@ -212,7 +213,7 @@ def examples(comparison: Comparison) -> list[tuple[int, int]]:
 
 
 def example_name(comparison: Comparison, row: int, run: int) -> str:
-    """The name of the files of an example: its delivery setting, learner and behaviour."""
+    """Return the name of an example's files: delivery setting, learner and behaviour."""
     delivery, variant, _ = comparison.rows[row]
     own = "".join(f"_{part}" for part in variant.short)
     return f"{delivery}_{variant.learner}{own}_{NAMES[comparison.behaviours[row, run]]}"

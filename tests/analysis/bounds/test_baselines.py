@@ -99,7 +99,7 @@ def test_trails_evaporate_as_in_training() -> None:
     task = Task(evaporation_in_training=True, evaporation_in_evaluation=False)
     policy_rows(paper(), task, record, [0], 1, 40)
     [row] = bound_rows(paper(), task, (0.9,), 40)
-    assert row.note == "exact bounds are known for worlds without evaporation only."
+    assert row.note == "exact bounds require training without evaporation and diffusion."
     assert calls == [True, True]
 
 
@@ -107,7 +107,7 @@ def test_a_discount_of_one_has_no_figures_but_a_reason() -> None:
     rows = bound_rows(paper(), Task(), [1.0, 0.5, 1], 40)
     assert [row.discount for row in rows] == [None, 1.0, 0.5]
     assert rows[1].return_mean is None
-    assert "may grow without bound" in rows[1].note
+    assert "may be unbounded" in rows[1].note
 
 
 def test_a_world_without_a_delivery_says_so() -> None:
@@ -121,5 +121,5 @@ def test_of_a_world_that_is_too_large_no_bounds_are_told(monkeypatch: pytest.Mon
     monkeypatch.setattr(episodes, "MAX_STATES", 100)
     [row] = bound_rows(paper(), Task(), max_steps=40)
     assert row.baseline == "exact bounds"
-    assert "choose a smaller world" in row.note
+    assert "use a smaller world" in row.note
     assert row.return_mean is None

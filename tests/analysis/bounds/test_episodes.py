@@ -240,7 +240,7 @@ def test_trails_that_change_are_refused(task: Task) -> None:
 
 
 def test_a_world_that_is_too_large_is_refused() -> None:
-    with pytest.raises(AntsError, match=r"choose a smaller world or fewer foods to get them\.$"):
+    with pytest.raises(AntsError, match=r"use a smaller world or fewer food items\.$"):
         bounds_of(World((1000, 1000, 1), (0, 0, 0)))
 
 
@@ -262,5 +262,5 @@ def test_every_food_in_reach_counts_for_the_size(
     monkeypatch.setattr(episodes, "MAX_STATES", states)
     bounds_of(world)
     monkeypatch.setattr(episodes, "MAX_STATES", states - 1)
-    with pytest.raises(AntsError, match=f"need {states} states, more than the {states - 1}"):
+    with pytest.raises(AntsError, match=f"need {states} states, but at most {states - 1} are"):
         bounds_of(world)

@@ -79,7 +79,7 @@ def test_do_more_ants_help(each: dict[int, float], verdicts: list[str]) -> None:
 )
 def test_where_crowding_begins(each: dict[int, float], falls: str) -> None:
     *_, last = answer(MORE, of_each(each), noise=0.5)
-    assert last[0] == "With all three rules, each ant delivers more than each of fewer"
+    assert last[0] == "With all three rules, each ant delivers more if there are more ants"
     assert last[2] == falls
     assert " with " in last[4]
 

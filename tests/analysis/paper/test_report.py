@@ -118,7 +118,7 @@ def test_means_that_far_runs_have_moved_are_marked() -> None:
     assert greedy == ["SARSA", "truncates", "45.0", "45.0", "44.4", "!", "35.0", "1.00"]
     assert "Few seeds" not in text
     few = subset(comparison, range(len(comparison.rows)), 10, 120)
-    assert "Few seeds (10): where one run in a hundred" in render(few)
+    assert "Few seeds (10): if one run in a hundred" in render(few)
 
 
 def test_greedy_evaluation_and_baselines(text: str) -> None:
@@ -147,7 +147,7 @@ def test_it_counts_what_the_ants_do(comparison: Comparison) -> None:
     behaviours[shown, 4:], policy_returns[shown, 4:] = CIRCLES, 220
     behaviours[shown - 1, :3] = WALKS  # in another configuration, not shown
     mixed = replace(comparison, behaviours=behaviours, policy_returns=policy_returns)
-    table = section(render(mixed), "What they do")
+    table = section(render(mixed), "Behaviour, in")
     terminates = table[table.index("terminates") :]
     trained = mixed.measures["return_last50"][shown]
     lines = terminates[terminates.index("Dyna-Q (p5)") :].splitlines()
@@ -165,11 +165,11 @@ def test_means_that_no_run_has_are_marked(comparison: Comparison, text: str) -> 
     behaviours = comparison.behaviours.copy()
     behaviours[shown_position(comparison, "terminates", DYNA_P5), 0] = OTHER
     marked = render(replace(comparison, behaviours=behaviours))
-    for start in ("Return, last 50", "Greedy evaluation", "What they do"):
+    for start in ("Return, last 50", "Greedy evaluation", "Behaviour, in"):
         rows = [line for line in section(marked, start).splitlines() if "Dyna-Q (p5)" in line]
         marks = {(line.startswith("Dyna-Q (p5) +"), "terminates" in line) for line in rows}
         assert marks == {(False, False), (True, True)}, start
-    assert marked.count("\n+ the runs do different things, and no run has their mean") == 1
+    assert marked.count("\n+ the runs do different things, so their mean describes no run") == 1
 
 
 def test_a_small_comparison_is_shown_too() -> None:
@@ -190,7 +190,7 @@ def test_learners_beside_the_papers_are_shown_at_their_best() -> None:
     assert row(text, "hysteretic *", after="Return, last")[3:5] == ["80.0", "80.0"]
     assert row(text, "hysteretic *", after="Greedy")[3] == "17.0"
     assert f"hysteretic *, terminates: {full.rows[19].point.label}" in text
-    assert "* its best by the IQM of the return, on these seeds, which flatters it" in text
+    assert "* best configuration by the IQM of the return on these seeds, which flatters it" in text
 
 
 def test_another_world_is_not_held_against_the_paper(comparison: Comparison) -> None:
@@ -224,4 +224,4 @@ def test_more_lines_than_fit_are_named() -> None:
     text = screen(build({"terminates": unchanged}, variants=many, seeds=2))
     assert f"learner_{MOST_LINES - 1} *" in text
     assert f"learner_{MOST_LINES} *" not in text
-    assert "table2.csv has 2 more." in text
+    assert "table2.csv has 2 more rows." in text
