@@ -203,7 +203,6 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
 
 
 def _of_both_sides(found: Crossings, name: str, value: Any) -> np.ndarray:
-    """Return the late shares with one setting changed, as the mean of both mirror images."""
     bridges = found[replace(Design(), **{name: value})]
     return np.mean([late_shares(bridges[one]) for one in (SHORT_RIGHT, SHORT_LEFT)], axis=0)
 

@@ -69,7 +69,6 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 def _check_live(
     settings: argparse.Namespace, given: Mapping[str, str], error: Callable[[str], NoReturn]
 ) -> None:
-    """Refuse options that would have no effect together with others."""
     for name, flag in given.items():
         if settings.resume and name not in _OF_RESUMED:
             error(f"{flag} cannot change a resumed colony; leave it out")

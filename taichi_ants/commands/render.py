@@ -287,7 +287,6 @@ def _save_snapshots(
     title: str,
     task: Task,
 ) -> None:
-    """Write n snapshots of a task as an animation, or the last one as a picture."""
     from taichi_ants.rendering import frames, save_picture
     from taichi_ants.rendering.writers import is_picture
 

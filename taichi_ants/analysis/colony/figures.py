@@ -106,7 +106,6 @@ def _lines(
 
 
 def _spread(rows: Rows) -> str:
-    """Return a caption with the seeds, the intervals and the exploration rate."""
     seeds = rows[0].seeds
     means = f"Means over {seeds_in_words(seeds)}, with 95 % intervals" if seeds > 1 else "One seed"
     return f"{means}. Exploration rate {study.EVALUATION_EPSILON:g}."
