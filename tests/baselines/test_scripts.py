@@ -68,7 +68,7 @@ def test_utility_prints_a_row_for_each_world_and_room(kernels: Path, tmp_path: P
         ("ant_system", ["--worlds", "paper", "mars"], "double_bridge"),
         ("ant_system", ["--evaporation", 2], "`evaporation` is 2.0"),
         ("fixed_rules", ["--epsilon", 2], "epsilon` is 2.0"),
-        ("fixed_rules", ["--ants", 10**6], "1000000 ants"),
+        ("fixed_rules", ["--ants", 10**6], "the number of ants is 1000000"),
         ("fixed_rules", ["--worlds", "moon"], "invalid choice: 'moon'"),
         ("fixed_rules", ["--study", "nowhere"], "cannot read 'nowhere/seeds.csv'"),
         ("utility", ["--discount", 1], "`discount` is 1.0"),

@@ -152,7 +152,7 @@ WRONG = {
     "size of a sheet": (["sheet", "--size", "400x300"], "--size"),
     "form of a size": (["episode", "--size", "1280*720"], "1280x720"),
     "speed": (["episode", "--fps", "0", "--out", "{}/a.gif"], "fps"),
-    "no number": (["episode", "--fps", "fast"], "'fast' is no number"),
+    "no number": (["episode", "--fps", "fast"], "'fast' is not a number"),
     "world": (["episode", "--world", "mars", "--out", "{}/a.gif"], "mars"),
     "policy": (["episode", "--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
     "policy and learning": (["learning", "--policy", "a.npz"], "--policy"),
