@@ -46,7 +46,7 @@ MUTATIONS = [
     ("task/rules/conflicts.py", "loaded > other_loaded or", "loaded < other_loaded or", TRAFFIC),
     ("task/rules/conflicts.py", "stays = had_ant(", "stays = not had_ant(", TRAFFIC),
     ("task/rules/conflicts.py", "(WINS | TAKES_FOOD) == WINS", "WINS == WINS", TRAFFIC),
-    ("task/rules/conflicts.py", "True, Event.PUSHED", "True, Event.ENTERED_EMPTY", TRAFFIC),
+    ("task/rules/conflicts.py", "True, Event.PUSHED", "True, Event.ENTERED_EMPTY", COLONY),
     ("task/rules/delivery.py", "(action == GIVE) & (", "(action == GIVE) | (", RUNS),
     ("task/rules/delivery.py", "turns_at_queen == 1", "turns_at_queen == 0", RUNS),
     ("task/rules/delivery.py", "(is_last | delivered &", "(is_last & delivered &", RUNS),

@@ -164,15 +164,14 @@ def settle(
     return entered, pushed
 
 
-def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Task) -> list[Event]:
-    """Return the event of each intent, after all ants have acted at once.
+def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Task) -> None:
+    """Let all ants act at once; each remembers its action, its event and its reward.
 
     All intents are from the start of the tick, so no ant's action changes that of another ant. No
     two ants enter a cell, empty it, or deposit on it.
     """
     winning = winners(intents, tick, world.index, task.traffic.carriers_first)
     entered, pushed = settle(intents, winning, task.traffic)
-    events = []
     for intent in intents:
         ant, slot = intent.ant, intent.ant.slot
         ant.action = intent.action
@@ -185,11 +184,9 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
             event = _move(world, intent, entered.get(slot))
         else:
             event = _handle(world, intent, slot in winning, task)
-        ant.reward = getattr(task.rewards, PAID[event])
+        ant.event, ant.reward = event, getattr(task.rewards, PAID[event])
         ant.carried += ant.carries
-        events.append(event)
     world.ants = {intent.ant.cell: intent.ant for intent in intents}
-    return events
 
 
 def _move(world: WorldState, intent: Intent, destination: Cell | None) -> Event:

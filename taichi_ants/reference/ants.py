@@ -30,7 +30,7 @@ class Ant:
         carried: Ticks since the ant picked up its food.
         percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
-        action, reward: The last ones; -1 and 0 before the first tick.
+        action, event, reward: The last ones; -1, NONE and 0 before the first tick.
         chosen: The action already drawn for the next tick, if any.
     """
 
@@ -45,6 +45,7 @@ class Ant:
     percept: int = 0
     state: int = 0
     action: int = -1
+    event: Event = Event.NONE
     reward: int = 0
     chosen: int | None = None
 

@@ -187,14 +187,14 @@ class ReferenceColony:
             action = self._draw_action(ant) if ant.chosen is None else ant.chosen
             ant.chosen = None
             intents.append(intend(self.world, ant, action, traffic))
-        events = carry_out(self.world, intents, tick, self.task)
-        for intent, event in zip(intents, events, strict=True):
-            if event is Event.PICKED_UP and intent.target is not None:
+        carry_out(self.world, intents, tick, self.task)
+        for intent in intents:
+            if intent.ant.event is Event.PICKED_UP and intent.target is not None:
                 self.food_sources.taken(intent.target, tick)
         self.world.trail.tick()
-        self._count(acting, events)
+        delivered = self._count(acting)
         if self.task.life.births:
-            self.store += events.count(Event.DELIVERED)
+            self.store += delivered
             self._births()
         dying = self._deaths(acting)
         life = self.task.life
@@ -205,24 +205,25 @@ class ReferenceColony:
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
-        self._learn(before, acting, events, last or self.over)
+        self._learn(before, acting, last or self.over)
         self.record.ticks += 1
 
     def _draw_action(self, ant: Ant) -> int:
         values = self.minds.of(ant.slot).rows[ant.state]
         return choose_action(values, self.epsilon, ant.stream)
 
-    def _count(self, acting: Sequence[Ant], events: Sequence[Event]) -> None:
-        record = self.record
+    def _count(self, acting: Sequence[Ant]) -> int:
+        """Record what happened in the tick, and return the number of deliveries."""
+        record, delivered = self.record, sum(ant.event is Event.DELIVERED for ant in acting)
         record.episode_return += sum(ant.reward for ant in acting)
         record.moves += sum(ant.action < PICK_UP for ant in acting)
         record.blocked += sum(
-            ant.action < PICK_UP and event in (Event.BLOCKED, Event.PUSHED)
-            for ant, event in zip(acting, events, strict=True)
+            ant.action < PICK_UP and ant.event in (Event.BLOCKED, Event.PUSHED) for ant in acting
         )
-        record.deliveries += events.count(Event.DELIVERED)
+        record.deliveries += delivered
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
+        return delivered
 
     def _births(self) -> None:
         """Turn stored food into ants that face away from the queen, while there is room."""
@@ -266,13 +267,11 @@ class ReferenceColony:
         self.record.deaths += len(dying)
         return dying
 
-    def _learn(
-        self, before: Sequence[Ant], after: Sequence[Ant], events: Sequence[Event], last: bool
-    ) -> None:
+    def _learn(self, before: Sequence[Ant], after: Sequence[Ant], last: bool) -> None:
         """Draw the next actions if the learner needs them, by the present tables; then learn."""
         self.transitions = []
-        for was, ant, event in zip(before, after, events, strict=True):
-            terminated = event is Event.DELIVERED and self.task.delivery == "terminates"
+        for was, ant in zip(before, after, strict=True):
+            terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
             # After a delivery that terminates, the ant chooses at the start of its next tick.
             if self.minds.draws_next_action and not terminated:
                 ant.chosen = self._draw_action(ant)
@@ -287,7 +286,7 @@ class ReferenceColony:
                     state=was.state,
                     action=ant.action,
                     reward=ant.reward,
-                    event=event,
+                    event=ant.event,
                     next_state=ant.state,
                     next_action=ant.chosen,
                     terminated=terminated,
