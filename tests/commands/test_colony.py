@@ -561,7 +561,7 @@ def test_a_figure_shows_what_all_colonies_deliver_by_tick(capsys, tmp_path, monk
     more = ["--ticks", 230, "--figure", "a.png", "--render", "a.gif", "--frame-interval", 4]
     status, out, err = call("colony", ["live", *fixed, *where, *more], capsys)
     assert (status, err) == (0, "")
-    assert "a.png is written" in out
+    assert "Wrote a.png" in out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.gif", "a.png"]
     with open("a.csv", newline="") as file:
         rows = [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
