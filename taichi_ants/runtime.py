@@ -206,7 +206,7 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
 
 
 def _cache_folder() -> Path:
-    """Return the folder of the kernel cache; a temporary folder if that one is not writable."""
+    """Return the folder of the kernel cache, or a temporary one if it is not writable."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.environ["HOME"], ".cache")
     chosen = os.environ.get("TI_OFFLINE_CACHE_FILE_PATH")  # Taichi's own variable for it
     folder = Path(chosen) if chosen else Path(base) / "taichi_ants" / "kernels"

@@ -255,7 +255,7 @@ def _resampled_means(deviations: np.ndarray, resamples: int, iqm: bool = False) 
 
 
 def _at_level(draws: np.ndarray, levels: np.ndarray) -> np.ndarray:
-    """Sort `draws` (rows, resamples) and return their quantiles (Weibull's) at levels (rows, k)."""
+    """Sort `draws` (rows, resamples) in place; return Weibull's quantiles at `levels` (rows, k)."""
     last = draws.shape[1] - 1
     place = np.clip(levels * (last + 2) - 1, 0, last)
     left = np.nan_to_num(np.floor(place)).astype(int)

@@ -23,7 +23,7 @@ def number(value: float | None, digits: int = 1) -> str:
 
 
 def figure(value: float | None) -> str:
-    """Return a number with about three digits, "-" if it is None or not finite."""
+    """Return a number as text with about three digits; "-" if it is None or not finite."""
     if value is None or not math.isfinite(value):
         return MISSING
     whole = abs(value) >= 99.95 or value == int(value)

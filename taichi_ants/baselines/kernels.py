@@ -287,9 +287,9 @@ def measure(
     span: ti.i32,
     lengths: i32_2d,
 ):
-    """Measure the path to food and back that always takes the highest utility, in all colonies.
+    """Measure, in each colony, the path to food and back that always follows the highest utility.
 
-    Writes its steps, 0 if there is none, into column `span` of `lengths`.
+    Writes the number of steps, or 0 without such a path, into column `span` of `lengths`.
     """
     ti.loop_config(block_dim=1)
     for colony in range(lengths.shape[0]):

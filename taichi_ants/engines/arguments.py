@@ -48,7 +48,7 @@ class Launch:
             ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
-        """Compile the kernel and make its pack, as Taichi would; on a GPU Taichi launches it."""
+        """Compile the kernel and make its pack, as Taichi does at a launch."""
         kind = _pack_type(tuple((name, _kind(value)) for name, value in values.items()))
         self._kernel = self._kernel_of(kind)
         taichi = ti.lang.impl.get_runtime()
@@ -71,7 +71,7 @@ class Launch:
         self._taichi = ref(taichi)
 
     def _set(self, name: str, value: Any) -> None:
-        """Pass a value to Taichi that may have changed."""
+        """Pass a value to Taichi; skip the pack if the value has not changed."""
         # Taichi leaks some bytes for each value that is set again.
         known = self._pack[name]
         if known is not value and (isinstance(value, np.ndarray) or known != value):

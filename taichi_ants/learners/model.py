@@ -34,7 +34,7 @@ class Planning(Hyperparameters):
 
 
 def model_memory(n_states: int, floats: int = 0) -> Memory:
-    """Return the memory of a model, with additional floats."""
+    """Return the size of the memory of a model, plus `floats` further floats."""
     return Memory(floats=floats, integers=2 + 3 * N_ACTIONS * n_states)
 
 

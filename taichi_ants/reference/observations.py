@@ -82,7 +82,7 @@ def paper(world: WorldState, ant: Ant) -> int:
 
 
 def more_cells(turns: tuple[int, ...], world: WorldState, ant: Ant) -> int:
-    """Return the state index of the load and the paper's codes of the cells at these headings."""
+    """Return the state index of the load and the paper's codes of the cells at these turns."""
     return _number([ant.carries, *codes_in_view(world, ant, turns)], 4)
 
 

@@ -138,7 +138,7 @@ def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None
 
 
 def _write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> None:
-    """Write the best actions below a state, with a bar for `clarity`."""
+    """Write the best actions below a state, with a bar of relative length `clear`."""
     words, size = " / ".join(ACTION_NAMES[action] for action in best), _SMALL
     while text.width(words, size) > _TILE:
         size -= 1

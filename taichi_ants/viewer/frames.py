@@ -60,7 +60,7 @@ _HEAD = 8 * -(-(1 + len(SECTIONS)) // 2)  # bytes
 
 
 def types_of(size: int, n_states: int, dense: bool) -> dict[str, str]:
-    """Return the type of each section, given the numbers of cells and states and kind of trail."""
+    """Return the type of each section for `size` cells; `dense` if trails are levels."""
     of_world = {
         "cell": "u2" if size < 2**16 else "u4",
         "state": "u2" if n_states < 2**16 else "u4",

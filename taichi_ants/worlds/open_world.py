@@ -45,9 +45,9 @@ def open_world(
 
     The queen is at the origin, and all other cells within distance 3 of her are empty. Rocks are
     hexagons of a random radius from 0 to max(1, min(X, Y, Z) // 20), placed until they cover their
-    share of the cells. Piles are hexagons of radius max(1, n // 16), three quarters along each
-    range n, in the order of the ranges; they replace rocks. If fewer cells are free than the share
-    of single food items requires, all free cells have food. If `ranges` is None, each range is
+    share of the cells. Pile number k lies on axis k, at three quarters of range k. It is a
+    hexagon of radius max(1, range // 16), and replaces rocks. If too few cells are free for the
+    share of single food items, all free cells have food. If `ranges` is None, each range is
     drawn from 10 to 100. There are no trails and no listed ants. The same seed gives the same
     world. Raises AntsError if the shares add up to more than 0.9, or if ants could not reach food
     from the queen in any of 100 random worlds.

@@ -26,7 +26,7 @@ def parse_ranges(ranges: object) -> tuple[int, int, int]:
 def parse_contents(
     grid: AxialGrid, queen: object, foods: object, obstacles: object, trails: object, ants: object
 ) -> dict[str, tuple[int, ...] | np.ndarray]:
-    """Return the contents of a world, checked and in normal form, by field."""
+    """Return the checked contents of a world by field, with coordinates in normal form."""
     cell = _inside("queen", np.array([_row("queen", queen, "one cell (x, y, z)", 3)]), grid)
     contents = {
         "foods": _parse("foods", foods, grid),

@@ -45,9 +45,10 @@ def policy_rows(
     rollouts: int = 50,
     max_steps: int = EPISODE_STEPS,
 ) -> list[Baseline]:
-    """Return the results of the random policy and the trail follower, with training's evaporation.
+    """Return the results of the random policy and the trail follower.
 
-    `evaluate` is `taichi_ants.evaluate`; it gets one table of action values per seed.
+    Trails evaporate as in training. `evaluate` is `taichi_ants.evaluate`; it gets one table of
+    action values per seed.
     """
     # Both policies are tables of the paper's observation.
     as_trained = replace(

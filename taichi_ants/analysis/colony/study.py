@@ -69,7 +69,7 @@ class Design(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Its name in tables."""
+        """The name of the design in tables."""
         rules = RULES[self.rules]
         return rules if self.regime == JOINT else f"{rules}, {REGIMES[self.regime]}"
 

@@ -135,7 +135,7 @@ def claims_rows(audit: Audit) -> list[dict[str, Any]]:
 
 
 def tallies(audit: Audit) -> list[str]:
-    """Return the number of claims with each verdict as text, a line for each delivery setting."""
+    """Return a line for each delivery setting, with the number of claims by verdict."""
     lines = []
     for setting in next(iter(audit.values())):
         counted = Counter(findings[setting].verdict.value for findings in audit.values())

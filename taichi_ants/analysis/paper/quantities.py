@@ -57,7 +57,7 @@ def pairs(grid: np.ndarray, factor: str) -> np.ndarray:
 
 
 class Read(NamedTuple):
-    """A function (grids, measure, learner) -> float64 (seeds,), and its name for readers."""
+    """A way to read a value per seed: `values(grids, measure, learner)`, and its name in tables."""
 
     words: str
     values: Callable[[Grids, str, Variant], np.ndarray]

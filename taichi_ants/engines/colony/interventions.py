@@ -275,7 +275,7 @@ class Interventions:
         )
 
     def begin_episode(self, length: int | None) -> None:
-        """End the present episode, if any, and start the next one, see `Colony.begin_episode`."""
+        """End the present episode, if any, and start the next one; see `Colony.begin_episode`."""
         colony = self.colony
         if colony.episode >= 0:
             colony.end_episode()

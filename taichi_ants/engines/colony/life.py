@@ -86,7 +86,7 @@ def give_birth(c: ti.template(), v: ti.template(), w, tick):
 
 @ti.func
 def place_newborn(c: ti.template(), w, ant, cell, heading):
-    """Fill a slot and a cell with a new ant."""
+    """Put a newborn ant into a slot and onto a cell."""
     number = c.worlds[WorldRow.NEXT_NUMBER, w]
     c.cell[ant] = cell
     put(c.heading, ant, heading)

@@ -636,7 +636,7 @@ class ColonyState:
 
 
 def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:
-    """Return a world for each seed; AntsError unless all have the same ranges."""
+    """Return one world per seed; AntsError if their number is wrong or their ranges differ."""
     given = entries_of(world) or [world] * n_seeds
     worlds = tuple(checks.checked_world(one, learns) for one in given)
     if len(worlds) != n_seeds:

@@ -194,9 +194,10 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Mark the winners if ants can enter cells with ants, and store the event of a move.
+    """Mark the ant if it wins its cell, and store the event of its move.
 
-    The event of a move does not depend on the deposits of this tick.
+    Only rules by which ants can enter cells with ants need this. The event of a move does not
+    depend on the deposits of this tick.
     """
     base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
     won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)

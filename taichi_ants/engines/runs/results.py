@@ -94,7 +94,7 @@ class RunState(Record):
 
 
 def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
-    """Return a memory that is large enough for each of the learners, which must be registered."""
+    """Return a memory size that suffices for each of the learners, which must be registered."""
     memories = [
         astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
     ]

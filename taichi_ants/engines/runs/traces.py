@@ -29,10 +29,10 @@ MAX_TABLE_ROWS = 12_800_000  # of 32 bytes each; a trace keeps the table after e
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """The arguments of `rollout` or `trace_training`, from which a trace can be made again.
+    """The arguments of `rollout` or `trace_training` that reproduce a trace.
 
-    `q_values`, float (n_states, 5), is the table that the ant followed with `epsilon`, None if it
-    learned. `config` is the configuration of its learner, None if it did not learn.
+    `q_values`, float (n_states, 5), is the table that the ant followed with `epsilon`; None if the
+    ant learned. `config` configures its learner; None if the ant did not learn.
     """
 
     world: World

@@ -2,9 +2,10 @@
 
 An ant can enter a cell that is empty at the start of the tick, or occupied if the task's `Traffic`
 allows it. If several ants want to enter a cell, or to take the food in it, the ant with the
-smallest key wins. Its key is a hash of its own cell and the tick, so results do not depend on ant
-numbers or threads. No operation is atomic: each ant writes its intention as a mark into `wants` at
-its own cell, and reads the marks of the six cells around the cell that it wants.
+smallest key wins; with `carriers_first`, ants with food win over others. The key is a hash of its
+own cell and the tick, so results do not depend on ant numbers or threads. No operation is atomic:
+each ant writes its intention as a mark into `wants` at its own cell, and reads the marks of the six
+cells around the cell that it wants.
 
 `c` has the arrays `wants` and `compass` (see `rules.actions`). `base` is the offset of a world in
 `wants`; all other cells are indices within the world.
