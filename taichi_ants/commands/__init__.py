@@ -14,7 +14,7 @@ COMMANDS = {  # modules of this package with their help
     "compare": "repeat the paper's comparison of learners with many seeds",
     "colony": "study how colonies scale, or run one colony of any size",
     "bridge": "train colonies on a double bridge, where the shorter branch wins",
-    "sweep": "measure the effect of any settings, which a file lists",
+    "sweep": "run every combination of the settings in a file, and compare them",
     "render": "draw an episode, a colony, learning, or a policy",
     "watch": "watch and change ants in a browser while they run",
 }

@@ -124,7 +124,7 @@ def _add_live(parser: command_line.Parser) -> None:
     add = parser.add_argument_group("files").add_argument
     add("--save", metavar="FILE", help="save the colony at the end (.npz)")
     add("--resume", metavar="FILE", help="resume a saved colony (.npz)")
-    picture = "draw the end (.png), or an animation (.gif, .mp4, a folder)"
+    picture = "draw the last tick (.png), or an animation (.gif, .mp4, a folder)"
     add("--render", metavar="PATH", help=picture)
     add("--frame-interval", **COUNT, default=2, help="ticks per frame of an animation")
     figure = "draw deliveries per tick over time, of all colonies together (.png and .csv)"

@@ -66,7 +66,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     decays = "factors of the grid on epsilon after each episode"
     add("--epsilon-decays", **few, default=(0.99, 0.995), help=decays)
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1), "metavar": "N"}
-    planning = "planning steps after each step, for learners that plan"
+    planning = "planning updates after each step in the world, for learners that plan"
     add("--planning-steps", **several, default=(3, 5), help=planning)
     add("--world", default="paper", help=WORLDS)
     add_common(parser)

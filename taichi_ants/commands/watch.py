@@ -55,7 +55,13 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
     add("--policy", **files, help="policy files to offer, in addition to experiments/policies/")
     add("--session", metavar="FILE", help="resume a saved session")
-    add("--port", type=whole_number(0, 65535), default=0, metavar="N", help="port; 0: any free one")
+    add(
+        "--port",
+        type=whole_number(0, 65535),
+        default=0,
+        metavar="N",
+        help="port of the page; 0 picks a free one",
+    )
     add("--no-browser", action="store_true", help="do not open a browser (implied if no terminal)")
     add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
     add("--plugin", metavar="FILE", help="Python file with learners, worlds or observations")

@@ -32,7 +32,7 @@ class TrainingConfig(Settings, path="training"):
 
     learner: Annotated[str, Is("name of a learner")]
     # Smaller step sizes could underflow to zero in float32.
-    learning_rate: Annotated[float, Is("step size of the first episode", least=1e-37, most=1)]
+    learning_rate: Annotated[float, Is("learning rate in the first episode", least=1e-37, most=1)]
     discount: Annotated[Share, Is("discount factor")]
     epsilon: Annotated[Share, Is("exploration rate of the first episode")]
     epsilon_decay: Annotated[Factor, Is("factor on epsilon after each episode")]

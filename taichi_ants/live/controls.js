@@ -2,7 +2,7 @@
 
 const SLIDERS = {
   ants: "Ants", evaporation: "Trails evaporate", half_life: "Half-life of trails", diffusion: "Diffusion",
-  deposit: "Deposit", cap: "Largest trail", slope: "Slope of trails", epsilon: "Epsilon", learning_rate: "Learning rate",
+  deposit: "Deposit", cap: "Largest trail level", slope: "Slope of trails", epsilon: "Epsilon", learning_rate: "Learning rate",
 };
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const WORKS = { page: "page", gif: "GIF" };
@@ -11,9 +11,9 @@ const LOST = {
   "no token": ["This page has no token, so the server refuses it. Open the address that the server prints.", "Try again"],
   lost: ["The connection is lost. This page keeps everything it has shown, and reconnects when the server is back. "
     + "A restarted server has a new address; open that one.", "Try now"],
-  ended: ["The server has ended. This page keeps everything it has shown.", "Try to connect"],
+  ended: ["The server has stopped. This page keeps everything it has shown.", "Try to connect"],
   "cut off": ["The server has disconnected this page", "Connect again"],
-  another: ["The server is back with another session. This page still shows the previous one; you can replace it.", "Show the other session"],
+  another: ["The server is back with another session. This page still shows the previous one; you can replace it.", "Show the new session"],
 };
 const MOST_UPLOAD = 2 ** 22;
 const MAP = `; lines shift by two columns
@@ -154,8 +154,8 @@ class Controls {
       }
     }
     for (const group of document.querySelectorAll("#settings fieldset")) group.hidden = !group.querySelector("label:not([hidden])");
-    const follows = policy === "by hand" ? "They follow the trail, with action values set by hand." : `They follow ${name}, and do not learn.`;
-    byId("policy-help").textContent = policy.startsWith("learn ") ? `They learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
+    const follows = policy === "by hand" ? "The ants follow the trail, with action values set by hand." : `The ants follow ${name}, and do not learn.`;
+    byId("policy-help").textContent = policy.startsWith("learn ") ? `The ants learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
   }
 
   /* Insert long text into the map at once, because browsers need quadratic time in its lines. */

@@ -20,7 +20,9 @@ class Rewards(Settings, path="task.rewards"):
     """The reward of each event, a whole number; by default, those of table 1 of the paper."""
 
     empty: Annotated[Reward, Is("reward for a move onto a cell seen as empty (E)")] = 0
-    failed: Annotated[Reward, Is("reward for a blocked move, failed pick-up or failed give")] = -1
+    failed: Annotated[
+        Reward, Is("reward for a blocked move, failed pick-up or failed delivery")
+    ] = -1
     shaping: Annotated[
         Reward, Is("reward for a move onto a cell seen as T (trail) or S (nearer to the queen)")
     ] = 1

@@ -31,13 +31,19 @@ class Traffic(Settings, path="task.traffic"):
     queue move at once; a ring of ants that claim each other's cells does not move.
     """
 
-    swap: Annotated[bool, Is("allow carriers to change places with foragers")] = False
+    swap: Annotated[
+        bool, Is("allow carriers (ants with food) to change places with foragers (ants without)")
+    ] = False
     follow: Annotated[bool, Is("allow ants to enter a cell whose ant leaves in the same tick")] = (
         False
     )
     carriers_first: Annotated[bool, Is("give carriers precedence over foragers for cells")] = False
     grant: Annotated[
-        bool, Is("reward a pushed ant for its move if the push makes it", only=("swap", True))
+        bool,
+        Is(
+            "reward a pushed ant as for its own move if it is pushed onto the cell that it wanted",
+            only=("swap", True),
+        ),
     ] = False
 
     def __post_init__(self) -> None:

@@ -189,7 +189,7 @@ class Panel {
     const level = trail[cell];
     const link = (number) => `<button type="button" class="link" data-follow="${number}">ant ${number}</button>`;
     const wanting = history.wanting(moment, cell).map(({ number, action, event }) =>
-      `${link(number)} (${history.header.actions[action]}${["BLOCKED", "FAILED"].includes(event) ? ", in vain" : ""})`);
+      `${link(number)} (${history.header.actions[action]}${["BLOCKED", "FAILED"].includes(event) ? ", failed" : ""})`);
     const lines = [
       ["holds", ants.length ? ants.map(link).join(", ") : HOLDS[ground[cell]] ?? "?"],
       ["trail", `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.strongest}`],

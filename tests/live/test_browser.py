@@ -400,12 +400,12 @@ def test_a_new_session_is_what_was_chosen(page, room):
     assert_same(page, room)
     assert page.text("#now-chosen") == "three far piles · foraging · Expected SARSA"
     open_new(page)
-    assert page.text("#policy-help") == f"They learn: {EXPECTED_SARSA.summary}."
+    assert page.text("#policy-help") == f"The ants learn: {EXPECTED_SARSA.summary}."
     page.tab.uncheck('[data-path="task.traffic.swap"]')
     assert page.tab.input_value("#task") == ""  # other settings
     page.tab.select_option("#policy", "file mine")
     assert page.tab.is_disabled('[data-path="task.observation"]')
-    assert page.text("#policy-help") == "They follow mine, and do not learn."
+    assert page.text("#policy-help") == "The ants follow mine, and do not learn."
     page.tab.select_option("#world-name", "map")
     page.tab.fill("#ants", "3")
     page.click("#begin")
@@ -707,7 +707,7 @@ def test_the_page_ends_with_the_server(browser, shared):
         page = Page(browser, one.url)
         page.tab.click("#quit")
         page.tab.click("#quit")
-        wait(page, "document.querySelector('#lost').innerText.startsWith('The server has ended')")
+        wait(page, "document.querySelector('#lost').innerText.startsWith('The server has stopped')")
         assert page.tab.is_disabled("#play")
         page.faults.clear()  # it tries to connect again
         page.close()

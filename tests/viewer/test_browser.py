@@ -283,7 +283,7 @@ def test_who_wants_a_cell_is_told(crowd, colony):
             said = crowd.text("#cell")
             for number in numbers:
                 assert f"ant {number} (" in said
-            assert "in vain" in said
+            assert "failed" in said
             crowd.tab.click(f'#cell [data-follow="{numbers[0]}"]')
             assert crowd.read("viewer.followed") == numbers[0]
     assert found == 5
