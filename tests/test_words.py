@@ -200,3 +200,7 @@ def test_docstrings_and_messages_are_plain_english(path):
     forms = [fault for one in docstrings(path) for fault in docstring_faults(one)]
     found = [*forms, *faults(of_docstrings), *faults(messages(path))]
     assert not found, "\n".join(found)
+
+
+def test_readme_is_short():
+    assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= README_LINES
