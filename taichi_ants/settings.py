@@ -34,6 +34,7 @@ from typing import (
     Annotated,
     Any,
     ClassVar,
+    Generic,
     Literal,
     NamedTuple,
     TypeVar,
@@ -92,8 +93,9 @@ Flag = Annotated[bool, Is()]
 class Setting(NamedTuple):
     """A declared setting.
 
-    `path` is its full name; `kind` is bool, int, float, str, list, or a class of settings; `words`
-    are the allowed words if they are fixed; `default` is MISSING if the setting is required.
+    `path` is its full name; `kind` is bool, int, float, str, list, `Named`, or a class of settings;
+    `words` are the allowed words if they are fixed; `default` is MISSING if the setting is
+    required; `entry` is the class of the entries of a `Named`.
     """
 
     name: str
@@ -103,6 +105,7 @@ class Setting(NamedTuple):
     optional: bool
     default: Any
     rule: Is
+    entry: type = NoneType
 
     @property
     def is_group(self) -> bool:
@@ -160,9 +163,28 @@ class Setting(NamedTuple):
             return value if fits else None
         if self.kind is list:  # the code that uses the list checks its entries
             return entries_of(value)
+        if self.kind is Named:
+            return self._named(value, {}) if isinstance(value, Mapping) else None
         if issubclass(self.kind, Settings) and isinstance(value, str):
             value = self.kind.named().get(value)
         return value if isinstance(value, self.kind) else None
+
+    def _named(self, value: Mapping[Any, Any], start: Mapping[str, Any]) -> Named[Any]:
+        """Return named settings in which `value` replaces or changes those of `start`."""
+        entry, entries = self.entry, dict(start)
+        for name, one in value.items():
+            if not isinstance(name, str) or not name.isidentifier():
+                raise AntsError(
+                    f"`{self.path}` has the name {shown(name)}; a name has letters, digits and "
+                    "underscores, and does not begin with a digit."
+                )
+            try:
+                entries[name] = one if isinstance(one, entry) else _entry(entry, one, start, name)
+            except AntsError as error:
+                raise AntsError(
+                    str(error).replace(f"{self.path}.NAME", f"{self.path}.{name}")
+                ) from None
+        return Named(entries)
 
     def _in_range(self, value: float) -> bool:
         rule = self.rule
@@ -187,6 +209,8 @@ class Setting(NamedTuple):
             words = ", ".join(self.allowed_words)
             registered = ", or that of a plugin" if self.rule.choices else ""
             return f"one of {words}{registered}" if words else "text"
+        if self.kind is Named:
+            return f"a table of names, each with a {self.entry.__name__}"
         if self.is_group:
             words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
             return f"a {self.kind.__name__}" + (f", or one of {words}" if words else "")
@@ -263,7 +287,9 @@ class Settings:
             if name not in known:
                 raise AntsError(f"`{_below(self.path, name)}` {not_a_setting(name, known)}")
             one = known[name]
-            if one.is_group and isinstance(value, Mapping):
+            if one.kind is Named and isinstance(value, Mapping):
+                value = one._named(value, getattr(self, name))
+            elif one.is_group and isinstance(value, Mapping):
                 inner = dict(value)
                 start = one.checked(inner.pop("")) if "" in inner else getattr(self, name)
                 value = start._changed(inner)
@@ -281,6 +307,47 @@ class Settings:
         if not isinstance(facts, Mapping):
             raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
         return cls()._changed(facts)
+
+
+def _entry(cls: Any, value: Any, start: Mapping[str, Any], name: str) -> Any:
+    """Return an entry of named settings, from a mapping of changes of the entry that exists."""
+    if not isinstance(value, Mapping):
+        return cls.from_dict(value)  # raises AntsError
+    return (start[name] if name in start else cls())._changed(value)
+
+
+Entry = TypeVar("Entry")
+
+
+class Named(dict[str, Entry], Generic[Entry]):
+    """An ordered, read-only mapping from names to settings of one class, for example fields.
+
+    The path of the class of the entries ends in ".NAME". In sweep files each entry is a table:
+    `[task.fields.home]`. Equal mappings have equal entries in the same order.
+    """
+
+    def _refuse(self, *arguments: Any, **named: Any) -> Any:
+        raise TypeError("named settings are read-only; use `but` of the settings that have them")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, dict) and list(self.items()) == list(other.items())
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(tuple(self.items()))
+
+    def __reduce__(self) -> Any:
+        return Named, (dict(self),)
+
+
+def named_groups(cls: Any) -> Iterator[Setting]:
+    """Yield the settings of a class, and of its groups, that are mappings of named settings."""
+    return (one for one in all_of(cls) if one.kind is Named)
 
 
 _DECLARED: dict[Any, tuple[Setting, ...]] = {}
@@ -303,9 +370,10 @@ def _read(cls: Any) -> Iterator[Setting]:
         rule = Is()
         for more in rules:
             rule = rule.but(more)
+        entry = get_args(kind)[0] if get_origin(kind) is Named else NoneType
         kind, words, optional = _kind_of(kind)
         path = _below(getattr(cls, "path", "world"), name)  # functions build worlds
-        yield Setting(name, path, kind, words, optional, default, rule)
+        yield Setting(name, path, kind, words, optional, default, rule, entry)
 
 
 def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
@@ -396,6 +464,8 @@ def _kind_of(hint: Any) -> tuple[type, tuple[str, ...], bool]:
         (hint,) = [one for one in get_args(hint) if one is not NoneType]
     if get_origin(hint) is Literal:
         return str, get_args(hint), optional
+    if get_origin(hint) is Named:
+        return Named, (), optional
     return list if get_origin(hint) is Sequence else hint, (), optional
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import pickle
 import re
-from dataclasses import MISSING, dataclass, replace
+from copy import deepcopy
+from dataclasses import MISSING, asdict, dataclass, field, replace
 from decimal import Decimal
 from fractions import Fraction
 from operator import attrgetter
@@ -15,7 +17,17 @@ import pytest
 from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, learners
-from taichi_ants.settings import Is, Setting, Settings, all_of, declared, nested
+from taichi_ants.settings import (
+    Is,
+    Named,
+    Setting,
+    Settings,
+    all_of,
+    declared,
+    named_groups,
+    nested,
+)
+from taichi_ants.studies.command_line import Parser, add_settings, given_settings
 from taichi_ants.task import Pheromone, Task, Traffic
 from taichi_ants.worlds import double_bridge, open_world
 
@@ -23,7 +35,7 @@ KINDS = (Task, TrainingConfig, open_world, double_bridge)
 EVERY = {
     one.path: one
     for kind in (*KINDS, *(learners.get(n).hyperparameters for n in learners.names()))
-    for one in all_of(kind)
+    for one in (*all_of(kind), *(more for n in named_groups(kind) for more in all_of(n.entry)))
 }
 WRONG = {
     bool: [1, 0, "off", None],
@@ -31,6 +43,7 @@ WRONG = {
     float: [True, np.True_, "0.5", [0.5], 1j, math.nan, math.inf, -math.inf, 10**400, Decimal(1)],
     str: ["no such word", 5, ["set"], {}],
     list: [3, "3", 0.5],
+    Named: [3, "home", [("home", {})], {"two words": {}}, {3: {}}, {"home": 3}],
 }
 
 
@@ -88,11 +101,19 @@ class Soup(Settings, path="kitchen.soup"):
     note: str = ""  # not a setting
 
 
+@dataclass(frozen=True)
+class NamedSoup(Soup, path="kitchen.soups.NAME"):
+    """A soup with a name."""
+
+
 def table(cls: type) -> str:
     """The settings of a class as a table of the documentation, in Markdown."""
     rows = ["| Setting | Values | Default | Meaning |", "|---|---|---|---|"]
     for one in all_of(cls):
-        if not one.is_group:
+        if one.kind is Named:
+            rows.append(f"| `{one.path}` | {one.allowed} | none | {one.rule.help} |")
+            rows += table(one.entry).splitlines()[2:]
+        elif not one.is_group:
             unit = f", in {one.rule.unit}" if one.rule.unit else ""
             usual = one.default if one.rule.usual is None else one.rule.usual
             words = {MISSING: "required", None: "none" if one.kind is list else "off"}
@@ -132,6 +153,48 @@ def test_what_depends_on_another_setting():
     assert refused(lambda: replace(Soup("thick"), kind="thin")).endswith(
         "unless `kind` is 'thick'."
     )
+
+
+@dataclass(frozen=True)
+class Kitchen(Settings, path="kitchen"):
+    """Settings of a test, with named ones."""
+
+    soups: Annotated[Named[NamedSoup], Is("the soups")] = field(default_factory=Named)
+
+
+def test_named_settings_are_checked_changed_and_compared_by_name_and_order():
+    one = Kitchen({"first": {"salt": 5}, "second": NamedSoup(salt=7)})
+    assert one.soups == {"first": NamedSoup(salt=5), "second": NamedSoup(salt=7)}
+    assert one == Kitchen(one.soups) == pickle.loads(pickle.dumps(one)) == deepcopy(one)
+    assert hash(one) == hash(Kitchen(deepcopy(one.soups)))
+    assert asdict(one)["soups"]["first"]["salt"] == 5
+    assert one != Kitchen(dict(reversed(one.soups.items())))
+    more = one.but(soups={"first": {"kind": "thick"}, "third": {}})
+    assert list(more.soups.values()) == [NamedSoup("thick", salt=5), NamedSoup(salt=7), NamedSoup()]
+    with pytest.raises(TypeError, match="read-only"):
+        one.soups["first"] = NamedSoup()
+
+
+def test_messages_of_named_settings_name_the_entry():
+    says = "`kitchen.soups.first.salt` is -1; it must be between 0 and 50 000."
+    assert refused(lambda: Kitchen({"first": {"salt": -1}})) == says
+    says = "`kitchen.soups` is 3; it must be a table of names, each with a NamedSoup."
+    assert refused(lambda: Kitchen(3)) == says
+    assert "`kitchen.soups` has the name 'two words'" in refused(lambda: Kitchen({"two words": {}}))
+    says = "`kitchen.soups.first` is 3; it must be a table of settings."
+    assert refused(lambda: Kitchen({"first": 3})) == says
+    says = "`kitchen.soups.first.flower` is not a setting; choose flour."
+    assert refused(lambda: Kitchen({"first": {"flower": 3}})) == says
+
+
+def test_options_of_named_settings_take_any_name():
+    parser = Parser()
+    add_settings(parser, Kitchen())
+    given = given_settings(
+        parser.parse_args(["--kitchen.soups.first.salt", "5", "--kitchen.soups.b.kind=thick"])
+    )
+    assert given == {"kitchen": {"soups": {"first": {"salt": 5}, "b": {"kind": "thick"}}}}
+    assert "--kitchen.soups.NAME.SETTING: the soups" in " ".join(parser.format_help().split())
 
 
 def test_full_names_become_tables_in_any_order():

@@ -18,7 +18,7 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, s
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
 from taichi_ants.live.setup import MOST_ANTS, MOST_TEXT, Setup
-from taichi_ants.settings import MISSING, Setting, all_of, declared, flat, nested
+from taichi_ants.settings import MISSING, Named, Setting, all_of, declared, flat, nested
 from taichi_ants.task import Task, observations
 
 WORLDS = {
@@ -47,7 +47,7 @@ def fields() -> Iterator[dict[str, Any]]:
     "default". "only" (a path and its values), "world" and "learner" limit a field to these.
     """
     for one in all_of(Task):
-        if not one.is_group:
+        if not one.is_group and one.kind is not Named:
             yield _field(one)
     for one in declared(TrainingConfig)[1:]:
         yield {**_field(one), "default": _LEARNING.get(one.name, one.default), "learner": ""}

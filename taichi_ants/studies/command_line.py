@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
-from taichi_ants.settings import Settings, declared, nested
+from taichi_ants.settings import Named, Setting, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ class Parser(argparse.ArgumentParser):
     """
 
     open_settings: tuple[str, ...] = ()  # for example "world": accept any option --world.NAME
+    named_groups: tuple[str, ...] = ()  # for example "task.fields": accept --task.fields.NAME.level
     own_settings: Container[str] = ()  # full names of settings that the command determines itself
     program: str | None = None  # the name in --help; None: the name of the script
 
@@ -77,8 +78,16 @@ class Parser(argparse.ArgumentParser):
         if path in self.own_settings:
             self.error(f"this command sets {flag} itself; leave it out")
         part, dot, _ = path.partition(".")
-        if dot and part in self.open_settings and flag not in self._option_string_actions:
+        is_open = dot and part in self.open_settings
+        if flag not in self._option_string_actions and (is_open or self._is_named(path)):
             self.add_argument(flag, dest=path, type=_literal, nargs="*", action=_OneOrList)
+
+    def _is_named(self, path: str) -> bool:
+        """Return whether a path such as task.fields.home.level leads to a setting of an entry."""
+        return any(
+            path.startswith(f"{group}.") and path.count(".") > group.count(".") + 1
+            for group in self.named_groups
+        )
 
     def error(self, message: str) -> NoReturn:
         text = without_middle(" ".join(message.splitlines())).removeprefix("argument ").rstrip(".")
@@ -136,7 +145,10 @@ def add_settings(parser: Parser, base: Settings) -> None:
     group = parser.add_argument_group(f"{base.path} settings")
     for one in declared(type(base)):
         value = getattr(base, one.name)
-        if one.path not in parser.own_settings and (one.has_names or not one.is_group):
+        if one.kind is Named:
+            parser.named_groups += (one.path,)
+            group.description = f"{group.description or ''}{_help_of_entries(one)}"
+        elif one.path not in parser.own_settings and (one.has_names or not one.is_group):
             # The value is checked where it is used.
             how: dict[str, Any] = {"metavar": {int: "N", float: "X"}.get(one.kind, "NAME")}
             if one.kind is bool:
@@ -146,6 +158,13 @@ def add_settings(parser: Parser, base: Settings) -> None:
             group.add_argument(f"--{one.path.replace('_', '-')}", **how, help=about)
         if one.is_group:
             add_settings(parser, value)
+
+
+def _help_of_entries(group: Setting) -> str:
+    """Return the help of options such as --task.fields.home.level, for any name."""
+    names = ", ".join(one.name.replace("_", "-") for one in declared(group.entry))
+    option = f"--{group.path.replace('_', '-')}.NAME.SETTING"
+    return f"{option}: {group.rule.help}; SETTING is one of {names}. "
 
 
 def _literal(text: str) -> Any:

@@ -21,7 +21,7 @@ from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.files.results import REPORT
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.settings import all_of, declared, flat, nested
+from taichi_ants.settings import all_of, declared, flat, named_groups, nested
 from taichi_ants.studies.runner import ColonyPoint, Outcome, Point, Progress, RunPoint, Study
 from taichi_ants.task import Task
 
@@ -248,9 +248,10 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
         *(one.path for one in all_of(Task) if not one.is_group or one.has_names),
         *(one.path for one in (*declared(TrainingConfig), *more)),
     ]
+    named = "|".join(re.escape(one.path) for one in named_groups(Task)) or "-"
     for name in settings:
-        # The world itself checks its settings.
-        if name not in known and not re.fullmatch(r"world\.[^.]*", name):
+        # The world checks its settings, and named groups check theirs.
+        if name not in known and not re.fullmatch(rf"world\.[^.]*|({named})\..*", name):
             raise AntsError(f"{shown(name)} is not a setting {_rather(name, kind, known)}.")
     tree = nested(settings)
     world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])

@@ -39,37 +39,42 @@ class Phase(NamedTuple):
     do: Callable[..., None]
 
 
-class Variant:
-    """The properties compiled into a kernel, `v` in the functions of the colony.
+class Features(NamedTuple):
+    """The features of a model that decide what is compiled, and nothing else.
 
     With `own_tables` there is a table for each slot, not one for each world; for the others, see
-    `ColonyState` and `Pheromone`. Kernels without births, deaths or food that changes are faster,
-    and compile much faster.
+    `ColonyState` and `Pheromone`. A model does not pay for features that it does not use: kernels
+    without births, deaths or food that changes are faster, and compile much faster.
     """
 
-    def __init__(
-        self,
-        learner: Learner | None,
-        own_tables: bool,
-        is_given_actions: bool,
-        observation: Observation,
-        dense: bool,
-        view: str,
-        traffic: Traffic,
-        ants_change: bool,
-        food_changes: bool,
-    ) -> None:
-        self.own_tables, self.dense = own_tables, dense
-        self.is_given_actions = is_given_actions
-        self.view, self.half, self.traffic = view, view == "half", traffic
+    learner: Learner | None
+    own_tables: bool
+    is_given_actions: bool
+    observation: Observation
+    dense: bool
+    view: str
+    traffic: Traffic
+    ants_change: bool
+    food_changes: bool
+
+
+class Variant:
+    """What is compiled into a kernel: `v` in the functions of the colony."""
+
+    def __init__(self, features: Features) -> None:
+        learner, observation = features.learner, features.observation
+        self.own_tables, self.dense = features.own_tables, features.dense
+        self.is_given_actions = features.is_given_actions
+        self.view, self.half = features.view, features.view == "half"
+        self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
-        self.idle = STANDS if traffic.shared else 0
-        self.ants_change, self.food_changes = ants_change, food_changes
+        self.idle = STANDS if self.traffic.shared else 0
+        self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
-        self.alone = learner is not None and own_tables
-        self.together = learner is not None and not own_tables
+        self.alone = learner is not None and self.own_tables
+        self.together = learner is not None and not self.own_tables
         self.begins = self.alone and learner.begin is not None
         self.plans_together = self.together and learner.plans
         if learner is not None:
@@ -80,10 +85,10 @@ class Variant:
         self.n_pairs = observation.n_states * ROW  # state-action pairs, and unused numbers
         self.sees_percept = observation.name == "paper"  # the percept is the state index
         # Whether the cell of an ant must show that the ant carries food.
-        self.sees_ants = not self.sees_percept or view == "strongest_under_carriers"
+        self.sees_ants = not self.sees_percept or self.view == "strongest_under_carriers"
         if not self.sees_percept:
             self.encode = views.encode_function(observation)
-            self.view_type = views.view_type(observation, dense)
+            self.view_type = views.view_type(observation, self.dense)
 
 
 variant = cache(Variant)

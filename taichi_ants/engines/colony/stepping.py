@@ -120,11 +120,18 @@ class Stepper:
         from taichi_ants.engines.colony import kernels
 
         task, pheromone = state.task, state.pheromone
-        variant = kernels.variant(
-            *(state.learner, state.one_a_slot, state.is_given_actions, task.sees),
-            *(pheromone.dense, pheromone.view, task.traffic),
-            *(state.ants_change, state.food_changes),
+        features = kernels.Features(
+            learner=state.learner,
+            own_tables=state.one_a_slot,
+            is_given_actions=state.is_given_actions,
+            observation=task.sees,
+            dense=pheromone.dense,
+            view=pheromone.view,
+            traffic=task.traffic,
+            ants_change=state.ants_change,
+            food_changes=state.food_changes,
         )
+        variant = kernels.variant(features)
         if name == "ticks":
             return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))
         return Launch(partial(kernels.loops, variant, getattr(kernels, name)))
