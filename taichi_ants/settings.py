@@ -93,9 +93,9 @@ Flag = Annotated[bool, Is()]
 class Setting(NamedTuple):
     """A declared setting.
 
-    `path` is its full name; `kind` is bool, int, float, str, list, `Named`, or a class of settings;
-    `words` are the allowed words if they are fixed; `default` is MISSING if the setting is
-    required; `entry` is the class of the entries of a `Named`.
+    `path` is its full name. `kind` is bool, int, float, str, list, `Named`, or a class of settings;
+    `entry` is the class of the entries of a `Named`. `words` are the allowed words if they are
+    fixed; `default` is MISSING if the setting is required.
     """
 
     name: str
