@@ -137,7 +137,8 @@ class Setting(NamedTuple):
 
     def checked(self, value: Any) -> Any:
         """Return a value as a Python object of the setting's kind; AntsError if not allowed."""
-        if self.optional and (value is None or (value == "none" and self.kind is not str)):
+        word = self.kind is not str and isinstance(value, str) and value == "none"
+        if self.optional and (value is None or word):
             return None  # files and command lines write "none", because they have no None
         found = self._converted(value)
         if found is None:
@@ -165,8 +166,8 @@ class Setting(NamedTuple):
             return entries_of(value)
         if self.kind is Named:
             return self._named(value, {}) if isinstance(value, Mapping) else None
-        if issubclass(self.kind, Settings) and isinstance(value, str):
-            value = self.kind.named().get(value)
+        if issubclass(self.kind, Settings):
+            value = self.kind.converted(value)
         return value if isinstance(value, self.kind) else None
 
     def _named(self, value: Mapping[Any, Any], start: Mapping[str, Any]) -> Named[Any]:
@@ -213,7 +214,8 @@ class Setting(NamedTuple):
             return f"a table of names, each with a {self.entry.__name__}"
         if self.is_group:
             words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
-            return f"a {self.kind.__name__}" + (f", or one of {words}" if words else "")
+            form = self.kind.form or f"a {self.kind.__name__}"  # type: ignore[attr-defined]
+            return form + (f", or one of {words}" if words else "")
         return _KINDS[self.kind]
 
     @property
@@ -238,6 +240,7 @@ class Settings:
     """
 
     path: ClassVar[str] = ""
+    form: ClassVar[str] = ""  # the values that stand for these settings, in the words of messages
 
     def __init_subclass__(cls, path: str = "", **more: Any) -> None:
         super().__init_subclass__(**more)
@@ -250,6 +253,11 @@ class Settings:
     def named(cls) -> Mapping[str, Any]:
         """Return the named values of this class."""
         return {}
+
+    @classmethod
+    def converted(cls, value: Any) -> Any:
+        """Return the settings that another value stands for, by default a name; else the value."""
+        return cls.named().get(value) if isinstance(value, str) else value
 
     def check(self) -> None:
         """Check each value, and convert it to its kind."""

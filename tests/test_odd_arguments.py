@@ -87,8 +87,8 @@ ODD = {
     "data of a model": lambda _: offline.EmpiricalModel.of(None, SCALAR),
     "one dimension": lambda _: statistics.bootstrap_interval(np.arange(5.0)),
     "one dimension of Student's": lambda _: statistics.student_interval(np.arange(5.0)),
-    "three worlds": lambda _: Interventions(
-        Colony(WORLD, None, None, range(3), 2, sharing="frozen")
+    "numbers of worlds": lambda _: Interventions(
+        Colony(WORLD, None, None, range(3), 2, sharing="frozen"), RAGGED
     ),
     "two runs": lambda _: rollout(WORLD, train(WORLD, CONFIG, range(2), 1)),
     "two policies": lambda _: policy_sheet(np.zeros((2, 128, 5))),

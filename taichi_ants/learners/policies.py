@@ -124,6 +124,10 @@ def trail_follower(observation: str = "paper") -> ActionValues:
     return q_values
 
 
+# Policies that need no learning, by name: functions of the name of an observation.
+NAMED = {"random": random_policy, "trail_follower": trail_follower}
+
+
 def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
     """Return the actions that a rule allows, by the letters seen left, forward and right."""
     takes, fails = (GIVE, PICK_UP) if carries else (PICK_UP, GIVE)

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
 from taichi_ants.reference.ants import start_order
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, normal_form
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import Trail
+from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds.world import World
 
@@ -27,7 +30,7 @@ class Interventions:
 
     def __init__(self, colony: ReferenceColony) -> None:
         self.colony, self.ants = colony, colony.n_ants
-        self._stream = RandomStream(stream_state(colony.seed, STREAM_INTERVENTION, 0))
+        self._set_stream()
         self._epsilon: float | None = None  # as an intervention has set them
         self._learning_rate: float | None = None
         self._first = colony.start_world
@@ -38,6 +41,11 @@ class Interventions:
         self._start: dict[Cell, int] = {world.queen: QUEEN}
         self._start |= dict.fromkeys(listed_cells(world.foods), FOOD)
         self._start |= dict.fromkeys(listed_cells(world.obstacles), OBSTACLE)
+
+    def _set_stream(self) -> None:
+        """Start the stream of random numbers of the present episode."""
+        state = stream_state(self.colony.seed, STREAM_INTERVENTION, max(self.colony.episode, 0))
+        self._stream = RandomStream(state)
 
     def _observe(self) -> None:
         for ant in self.colony.ants.values():
@@ -74,9 +82,25 @@ class Interventions:
                     ant = world.ants[there] = world.ants.pop(cell)
                     ant.cell = there
 
-    def move_queen(self, cell: Cell) -> None:
-        """Move the queen to an empty cell, now and later."""
+    def move(self, cell: Cell, to: Cell) -> None:
+        """Move rock, food or the queen to an empty cell, now and later; ants move aside."""
         world = self.colony.world
+        what = world.ground[cell]
+        if what == EMPTY or world.ground[to] != EMPTY:
+            return
+        self._move_aside([to])
+        if to in world.ants:
+            return
+        if what == QUEEN:
+            self.move_queen(to)
+        else:
+            self.put([cell], EMPTY)
+            self.put([to], what)
+
+    def move_queen(self, cell: Cell) -> None:
+        """Move the queen to an empty cell, now and later; an ant there moves aside."""
+        world = self.colony.world
+        self._move_aside([cell])
         assert world.content(cell) == EMPTY
         for ground in (world.ground, self._start):
             ground[world.queen], ground[cell] = EMPTY, QUEEN
@@ -117,6 +141,32 @@ class Interventions:
             colony.new_ant(cell, towards, slot)
         self._observe()
 
+    def add_some(self, n: int, heading: int | None = None) -> None:
+        """Put n ants on free cells, in the order of `ants.starts`."""
+        colony, world = self.colony, self.colony.world
+        order = start_order(self._first, world.queen, colony.seed, colony.start)
+        self.add_ants([cell for cell in order if world.content(cell) == EMPTY][:n], heading)
+
+    def remove_some(self, n: int) -> None:
+        """Remove n random ants: those whose draws are the smallest."""
+        draws = {}
+        for ant in sorted(self.colony.ants.values(), key=lambda ant: ant.number):
+            high, low = self._stream.draw()
+            draws[high, low] = ant.cell
+        self.remove_ants([draws[draw] for draw in sorted(draws)[:n]])
+
+    def set_task(self, task: Task) -> None:
+        """Change numbers of the task."""
+        self.colony.task, self._pheromone = task, task.pheromone
+        learns = self.colony.sharing != "frozen"
+        self._falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
+        self.set_pheromone()
+
+    def set_policy(self, q_values: np.ndarray) -> None:
+        """Let all ants follow a table."""
+        for learner in self.colony.minds.tables:
+            learner.rows = [list(row) for row in np.asarray(q_values, np.float32)]
+
     def remove_ants(self, cells: Sequence[Cell]) -> None:
         """Remove the ants on these cells, with their food."""
         for cell in cells:
@@ -130,13 +180,11 @@ class Interventions:
 
         New ants take free cells as in `ants.starts`; the highest numbers are removed first.
         """
-        colony, world = self.colony, self.colony.world
+        colony = self.colony
         self.ants = n
         by_number = sorted(colony.ants.values(), key=lambda ant: ant.number)
         self.remove_ants([ant.cell for ant in by_number[n:]])
-        order = start_order(self._first, world.queen, colony.seed, colony.start)
-        free = [cell for cell in order if world.content(cell) == EMPTY]
-        self.add_ants(free[: max(0, n - len(by_number))])
+        self.add_some(max(0, n - len(by_number)))
 
     def set_evaporation(self, falls: bool) -> None:
         """Switch evaporation on (that of the task, or 1 per tick if it has none) or off."""
@@ -183,3 +231,4 @@ class Interventions:
         ants = [(cell, heading) for cell, heading in ants if start.get(cell, EMPTY) == EMPTY]
         [queen] = held[QUEEN]
         colony.begin_episode(World(first.ranges, queen, held[FOOD], held[OBSTACLE], trails, ants))
+        self._set_stream()

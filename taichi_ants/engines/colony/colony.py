@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -11,8 +12,11 @@ import numpy as np
 from taichi_ants import checks
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState, checked_worlds
-from taichi_ants.engines.colony.stepping import Stepper
+from taichi_ants.engines.colony.stepping import Stepper, features_of
+from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, array_of, checked_whole, entries_of, shown
+from taichi_ants.protocol import Event
+from taichi_ants.task import Task
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -111,6 +115,19 @@ class Colony(ColonyState):
         self.check_begun()
         self._stepper.launch(self, "intervention_phases")
 
+    def check_same_kernels(self, task: Task) -> None:
+        """Raise an AntsError if kernels would have to be compiled anew for another task."""
+        other = copy.copy(self)
+        other.take_task(task)
+        present, needed = features_of(self), features_of(other)
+        for name in present._fields:
+            if getattr(present, name) != getattr(needed, name):
+                raise AntsError(
+                    f"the task cannot change its {name.replace('_', ' ')} in an episode, because "
+                    "kernels are compiled for it; change settings that kernels read as numbers, "
+                    "for example pheromone.level."
+                )
+
     def tick(self, n: int = 1) -> None:
         """Advance by n ticks, except worlds whose episode has ended."""
         self.check_begun()
@@ -164,26 +181,31 @@ class Colony(ColonyState):
         ticks: int,
         progress: Progress | None = None,
         worlds: Sequence[World | Sequence[World]] | None = None,
+        *,
+        protocol: Event | Sequence[Event] = (),
     ) -> ColonyEpisodes:
         """Return the results of whole episodes with a fixed number of ticks.
 
         Args:
             progress: A function that is called with the share of the work done, 0 to 1.
             worlds: The `world` of `begin_episode` for each episode; None keeps the present worlds.
+            protocol: Events with interventions, see `taichi_ants.protocol`. They happen in each
+                episode, which begins without the changes of the one before.
         """
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         places = self._checked_places(worlds, episodes)
         checks.check_progress(progress)
-        outcomes = []
+        timetable, outcomes = Timetable(self, protocol, ticks), []
         for episode in range(episodes):
             self.begin_episode(ticks, places[episode])
-            for _ in self._stepper.pieces(self, ticks):
-                if progress is not None:
-                    progress((episode + self.ticks / ticks) / episodes)
-                if not self.running.any():
-                    break
-            outcomes.append(self.outcome())
+            with timetable:
+                for _ in timetable.pieces(self._stepper, ticks):
+                    if progress is not None:
+                        progress((episode + self.ticks / ticks) / episodes)
+                    if not self.running.any():
+                        break
+                outcomes.append(self.outcome())
             self.end_episode()
         return ColonyEpisodes(
             **{name: np.stack([vars(one)[name][0] for one in outcomes])

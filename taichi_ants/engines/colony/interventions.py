@@ -1,25 +1,32 @@
-"""Interventions: changes of a colony of one world between two ticks.
+"""Interventions: changes of the worlds of a colony between two ticks.
 
-Changes of rocks, food and the queen persist in later episodes. Changes of trails and of single ants
-last for the present episode. After each change the ants observe again, but still take the actions
-that they have already drawn.
+Changes of single ants and of trails last for the present episode. Changes of rock, food and the
+queen persist in later episodes that `Interventions.begin_episode` starts; `Colony.begin_episode`
+starts from the colony's own worlds. After each change the ants observe again, but still take the
+actions that they have already drawn.
 
-Rock and food move ants aside to empty cells up to `REACH` steps away. Candidate cells are tried by
-distance, then by cube coordinates. If none is empty, the ant and its cell do not change.
+Rock, food and the queen move ants aside to empty cells up to `REACH` steps away. Candidate cells
+are tried by distance, then by cube coordinates. If none is empty, the ant and its cell do not
+change.
+
+Random numbers come from the stream of (seed, STREAM_INTERVENTION, episode) of each world, in the
+order of the changes. Adding n ants draws n headings. Removing n of m living ants draws m words of
+64 bits, one for each ant in the order of numbers, and removes the ants with the n smallest words.
 """
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taichi_ants import files
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import ANT_GROUND, FoodSourceRow, Stage, WorldRow
-from taichi_ants.errors import AntsError, count
+from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_BORN,
@@ -29,7 +36,7 @@ from taichi_ants.grid.constants import (
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
@@ -46,32 +53,72 @@ _STEPS = axial(_CELLS[_ORDER[1:]])
 
 
 class Interventions:
-    """Changes of a colony of one world, and of the start of its later episodes.
+    """Changes of some worlds of a colony, and of the start of their later episodes.
 
-    Cells are flat indices, int (n,), without duplicates. A cell on which something cannot be
-    placed, because an ant, a rock or the queen is on it, does not change. A method that raises an
-    error changes nothing. `ants` is the number of ants at the start of later episodes.
+    Cells are flat indices, int (n,), without duplicates, see `index`. A cell on which something
+    cannot be placed, because an ant, a rock or the queen is on it, does not change. A method that
+    raises an error changes nothing, except worlds before the one with the error.
+
+    Args:
+        worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
+            of the task, epsilon, the learning rate and the number of ants at the start, so these
+            can only change in all worlds that are still running.
+        lasting: Whether later episodes start with the changes, which requires room for the ants
+            and, if they learn, food.
+
+    Attributes:
+        ants: The number of ants at the start of later episodes.
 
     Raises:
-        AntsError: The colony has several worlds.
+        AntsError: The colony does not have one of the worlds.
     """
 
-    def __init__(self, colony: Colony) -> None:
-        if len(colony.worlds) != 1:
-            raise AntsError(
-                f"the colony has {len(colony.worlds)} worlds, but interventions require a colony "
-                "of one world; pass a single seed."
-            )
-        self.colony, self.ants = colony, colony.ants
-        (self._first,) = colony.worlds
-        self._start = self._first.ground()
-        self._stream = Stream(colony.seeds[0], STREAM_INTERVENTION)
+    def __init__(
+        self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
+    ) -> None:
+        self.colony, self.ants, self.lasting = colony, colony.ants, lasting
+        self.worlds = self._checked_worlds(worlds)
+        self._first = colony.worlds
+        self._starts = [world.ground() for world in colony.worlds] if lasting else []
+        self._streams: dict[int, tuple[int, Stream]] = {}  # by world: the episode and its stream
         self._changed = False  # whether the start of the next episode differs from the present one
+
+    def _checked_worlds(self, worlds: Sequence[int] | None) -> tuple[int, ...]:
+        n = len(self.colony.worlds)
+        several = range(n) if worlds is None else entries_of(worlds)
+        if several is None or not all(
+            isinstance(w, (int, np.integer)) and 0 <= w < n for w in several
+        ):
+            raise AntsError(
+                f"worlds is {shown(worlds)}; it must be a list of numbers from 0 to {n - 1}, or "
+                "None for all worlds."
+            )
+        return tuple(dict.fromkeys(map(int, several)))
 
     @property
     def living(self) -> int:
-        """The number of living ants."""
-        return int(self.colony.arrays["worlds"][WorldRow.LIVING, 0])
+        """The number of living ants in the first of the worlds."""
+        return int(self.colony.arrays["worlds"][WorldRow.LIVING, self.worlds[0]])
+
+    def index(self, cells: Sequence[Any]) -> np.ndarray:
+        """Return the flat indices of cells (x, y, z) or flat indices, without duplicates.
+
+        AntsError if a cell does not exist.
+        """
+        grid, found = self.colony.grid, []
+        for cell in cells:
+            flat = int(cell if np.ndim(cell) == 0 else grid.index(cell))
+            if not 0 <= flat < grid.size or not grid.exists[flat]:
+                raise AntsError(
+                    f"the cell {cell} is outside the world; choose a cell within the ranges "
+                    f"{grid.ranges}."
+                )
+            found.append(flat)
+        return np.array(list(dict.fromkeys(found)), np.int64)
+
+    def everywhere(self) -> np.ndarray:
+        """Return the flat indices of all cells."""
+        return np.flatnonzero(self.colony.grid.exists)
 
     def put(self, cells: np.ndarray, what: int) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD, except those of the queen and of ants that stay.
@@ -80,30 +127,262 @@ class Interventions:
         source: it grows back, and wanders with adjacent food. AntsError if later episodes would
         have no room for the ants, or no food to learn from.
         """
-        arrays = self.colony.arrays
-        held = arrays["ground"][cells]
-        ants, to = self._aside(cells) if what != EMPTY else (cells[:0], cells[:0])
-        at = arrays["cell"][ants]
-        cells = cells[((held >> 4 == 0) | np.isin(cells, at)) & (held != QUEEN)]  # see `layout`
-        start = self._start.copy()
-        start[cells] = what
-        self._begin_with(start)
-        arrays["cell"][ants] = to
-        arrays["ground"][to] = arrays["ground"][at]
-        arrays["ground"][cells] = what
-        arrays["walls"][cells] = what == OBSTACLE
-        if what == OBSTACLE:
-            self._lay(cells, 0)
-        self._change_food_sources(cells, what)
+        for one in self._each():
+            one.put(cells, what)
         self.colony.observe()
+
+    def move_queen(self, cell: int) -> None:
+        """Move the queen to a cell without rock or food; an ant there moves aside.
+
+        AntsError if the cell is not free, or later episodes would lack food.
+        """
+        for one in self._each():
+            one.move_queen(cell)
+        self.colony.observe()
+
+    def move(self, cell: int, to: int) -> None:
+        """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
+
+        Has no effect if the first cell has none of them, or the other one is not free.
+        """
+        for one in self._each():
+            one.move(cell, to)
+        self.colony.observe()
+
+    def lay_trail(self, cells: np.ndarray, level: int) -> None:
+        """Set the trail of cells other than rocks."""
+        for one in self._each():
+            one.lay(cells[one.view("walls")[cells] == 0], level)
+        self.colony.observe()
+
+    def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
+        """Put newborn ants on those of the cells that are empty, with random headings by default.
+
+        AntsError if the capacity of the colony is too small.
+        """
+        for one in self._each():
+            one.add(cells, heading)
+        self.colony.observe()
+
+    def add_some(self, number: int | None, share: float | None, heading: int | None = None) -> None:
+        """Put a number of newborn ants, or a share of the living ones, on free start cells.
+
+        AntsError if there is too little room.
+        """
+        for one in self._each():
+            one.add_some(one.amount(number, share), heading)
+        self.colony.observe()
+
+    def remove_ants(self, cells: np.ndarray) -> None:
+        """Remove the ants on these cells, with the food that they carry."""
+        for one in self._each():
+            one.remove(one.living_slots()[np.isin(one.cells[one.living_slots()], cells)])
+        self.colony.observe()
+
+    def remove_some(self, number: int | None, share: float | None) -> None:
+        """Remove a number of random ants, or a share; all ants if there are fewer."""
+        for one in self._each():
+            one.remove_some(one.amount(number, share))
+        self.colony.observe()
+
+    def set_ants(self, n: int) -> None:
+        """Set the number of ants, now and, if the changes are lasting, in later episodes.
+
+        New ants take free cells in the order of `World.start`; ants with the highest numbers are
+        removed. AntsError if there is too little room.
+        """
+        if self.lasting:
+            self._check_all("the number of ants at the start")
+        for one in self._each():
+            one.check_room(n)
+        for one in self._each():
+            one.set_ants(n)
+        if self.lasting:
+            self._changed |= n != self.ants
+            self.ants = n
+        self.colony.observe()
+
+    def set_task(self, task: Task) -> None:
+        """Set a task that differs only in settings that kernels read as numbers."""
+        self._check_all("the task")
+        colony = self.colony
+        colony.check_same_kernels(task)
+        levels = [np.maximum(one.view("trail") - one.clock, 0) for one in self._all()]
+        colony.set_task(task)
+        if not colony.pheromone.dense:
+            for one, level in zip(self._all(), levels, strict=True):
+                one.view("trail")[:] = np.where(level > 0, level + one.clock, 0)
+
+    def set_epsilon(self, epsilon: float) -> None:
+        """Set epsilon, which no longer decays."""
+        self._check_all("epsilon")
+        colony = self.colony
+        colony.epsilon = epsilon
+        colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
+
+    def set_learning_rate(self, learning_rate: float) -> None:
+        """Set the learning rate, which no longer decays; AntsError if no ant learns."""
+        self._check_all("the learning rate")
+        colony = self.colony
+        if not colony.learns:
+            raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
+        colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
+        colony.set_learning_rate(learning_rate)
+
+    def set_policy(self, q_values: np.ndarray) -> None:
+        """Set the table (n_states, 5) that ants follow; see `check_follow`."""
+        self.check_follow()
+        for one in self._each():
+            one.view("q").reshape(-1, len(q_values), ROW)[..., :N_ACTIONS] = q_values
+
+    def check_follow(self) -> None:
+        """Raise an AntsError unless the ants follow a policy and do not learn."""
+        colony = self.colony
+        if colony.learns or colony.is_given_actions:
+            raise AntsError(
+                "the ants of this colony do not follow a policy; make a colony with "
+                'sharing="frozen" and q_values.'
+            )
+
+    def state(self) -> str:
+        """Return a hash of the whole state; colonies with equal hashes behave identically."""
+        colony = self.colony
+        moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
+        streams = [self.stream(w).state for w in self.worlds]
+        rest = (self.ants, streams, colony.task.as_dict(), colony.training.as_dict())
+        arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
+        arrays |= {f"start {w}": start for w, start in enumerate(self._starts)}
+        digest = hashlib.sha256(files.to_json([*moment, *rest]).encode())
+        for name, array in sorted(arrays.items()):
+            digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+            digest.update(np.ascontiguousarray(array).data)
+        return digest.hexdigest()
+
+    def stream(self, w: int) -> Stream:
+        """Return the random stream of the present episode of a world."""
+        episode = int(self.colony.arrays["episodes"][w])
+        if w not in self._streams or self._streams[w][0] != episode:
+            stream = Stream(self.colony.seeds[w], STREAM_INTERVENTION, max(episode, 0))
+            self._streams[w] = episode, stream
+        return self._streams[w][1]
+
+    def world(self, w: int = 0) -> World:
+        """Return the world in which later episodes of world number `w` start."""
+        first, grid, start = self._first[w], self.colony.grid, self._starts[w]
+        trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
+        return World(
+            first.ranges,
+            grid.cells(int(np.argmax(start == QUEEN))).tolist(),
+            grid.cells(np.flatnonzero(start == FOOD)),
+            grid.cells(np.flatnonzero((start == OBSTACLE) & grid.exists)),
+            first.trails[start[trails] != OBSTACLE],
+            first.ants[start[ants] == EMPTY],
+        )
+
+    def begin_episode(self, length: int | None = None) -> None:
+        """End the present episode, if any, and start the next one; see `Colony.begin_episode`."""
+        colony = self.colony
+        if colony.episode >= 0:
+            colony.end_episode()
+        colony.ants = self.ants
+        worlds = [self.world(w) for w in range(len(self._first))] if self._changed else None
+        colony.begin_episode(length, worlds)
+        self._changed = False
+
+    def begin_with(self, w: int, start: np.ndarray) -> None:
+        """Set the ground at the start of a world's later episodes; AntsError if not allowed."""
+        if not self.lasting:
+            return
+        ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
+        if ants > room:
+            raise AntsError(
+                f"{count(ants, 'ant')} start each episode, but this change would leave "
+                f"{count(int(room), 'free cell')}; leave more cells free."
+            )
+        if self.colony.learns and not (start == FOOD).any():
+            raise AntsError("this would remove the last food, but ants learn from it; leave some.")
+        self._starts[w], self._changed = start, True
+
+    def start(self, w: int) -> np.ndarray:
+        """Return a copy of the ground at the start of a world's later episodes."""
+        return self._starts[w].copy() if self.lasting else np.zeros(self.colony.grid.size, np.uint8)
+
+    def _check_all(self, what: str) -> None:
+        running = np.flatnonzero(self.colony.running).tolist()
+        if self.colony.episode >= 0 and not set(running) <= set(self.worlds):
+            raise AntsError(
+                f"the worlds of a colony share {what}, so it cannot change in some of them; change "
+                "all worlds, or make a colony with a single seed."
+            )
+
+    def _each(self) -> Iterator[_World]:
+        return (_World(self, w) for w in self.worlds)
+
+    def _all(self) -> list[_World]:
+        return [_World(self, w) for w in range(len(self.colony.worlds))]
+
+
+class _World:
+    """One world of a colony with interventions; its slots, cells and arrays are of this world."""
+
+    def __init__(self, interventions: Interventions, w: int) -> None:
+        self.all, self.w, self.colony = interventions, w, interventions.colony
+        self.rows = self.colony.arrays["worlds"][:, w]
+
+    def view(self, name: str) -> np.ndarray:
+        """Return a view of the world's part of an array."""
+        array = self.colony.arrays[name]
+        # A colony has only one of the arrays "trail" and "level".
+        return array if array.size == 1 else array.reshape(len(self.colony.worlds), -1)[self.w]
+
+    @property
+    def cells(self) -> np.ndarray:
+        """The cell of each slot."""
+        return self.view("cell")
+
+    @property
+    def clock(self) -> int:
+        """The clock of the trails."""
+        return self.colony.trail_clock(self.w)
+
+    def living_slots(self) -> np.ndarray:
+        """Return the slots of the living ants, in the order of their numbers."""
+        slots = np.flatnonzero(self.colony.living[self.w])
+        return slots[np.argsort(self.view("number")[slots])]
+
+    def amount(self, number: int | None, share: float | None) -> int:
+        """Return a number of ants, or the number of a share of the living ones, rounded."""
+        if share is None:
+            assert number is not None
+            return number
+        return int(share * int(self.rows[WorldRow.LIVING]) + 0.5)
+
+    def put(self, cells: np.ndarray, what: int) -> None:
+        """Make cells EMPTY, OBSTACLE or FOOD; see `Interventions.put`."""
+        ground = self.view("ground")
+        held = ground[cells]
+        ants, to = self._aside(cells) if what != EMPTY else (cells[:0], cells[:0])
+        at = self.cells[ants]
+        cells = cells[((held >> 4 == 0) | np.isin(cells, at)) & (held != QUEEN)]  # see `layout`
+        start = self.all.start(self.w)
+        start[cells] = what
+        self.all.begin_with(self.w, start)
+        self._step_aside(ants, to)
+        ground[cells] = what
+        self.view("walls")[cells] = what == OBSTACLE
+        self.colony.changed[self.w] = True
+        if what == OBSTACLE:
+            self.lay(cells, 0)
+        self._change_food_sources(cells, what)
 
     def _aside(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the slots of the ants on cells that can move aside, and their new cells."""
-        colony, grid = self.colony, self.colony.grid
-        free = (colony.arrays["ground"] == EMPTY) & grid.exists
+        grid = self.colony.grid
+        free = (self.view("ground") == EMPTY) & grid.exists
         free[cells] = False
-        slots = np.flatnonzero(colony.living[0] & np.isin(colony.cells[0], cells))
-        row, column = np.divmod(colony.cells[0, slots], grid.width)
+        living = np.flatnonzero(self.colony.living[self.w])
+        slots = living[np.isin(self.cells[living], cells)]
+        row, column = np.divmod(self.cells[slots], grid.width)
         to = np.full(len(slots), -1)
         for q, r in _STEPS.tolist():
             waiting = np.flatnonzero(to < 0)
@@ -117,55 +396,72 @@ class Interventions:
             free[there[goes]] = False
         return slots[to >= 0], to[to >= 0]
 
+    def _step_aside(self, ants: np.ndarray, to: np.ndarray) -> None:
+        """Move the ants in some slots to other cells."""
+        ground, at = self.view("ground"), self.cells[ants]
+        self.cells[ants] = to
+        ground[to] = ground[at]
+        ground[at] = EMPTY
+
+    def move(self, cell: int, to: int) -> None:
+        """Move the content of a cell; see `Interventions.move`."""
+        what = int(self.view("ground")[cell])
+        if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
+            return
+        if what == QUEEN:
+            self.move_queen(to)
+        else:
+            self._step_aside(*self._aside(np.array([to])))
+            self.put(np.array([cell]), EMPTY)
+            self.put(np.array([to]), what)
+
+    def _can_be_free(self, cell: int) -> bool:
+        """Return whether a cell is empty, except for an ant that can move aside."""
+        slots, _ = self._aside(np.array([cell]))
+        return bool(self.view("ground")[cell] == EMPTY) or len(slots) > 0
+
     def move_queen(self, cell: int) -> None:
-        """Move the queen; AntsError if the cell is not empty, or later episodes would lack food."""
-        arrays, grid = self.colony.arrays, self.colony.grid
-        if arrays["ground"][cell] != EMPTY:
+        """Move the queen; see `Interventions.move_queen`."""
+        grid, ground = self.colony.grid, self.view("ground")
+        if not self._can_be_free(cell):
             raise AntsError(
                 f"the queen cannot move to cell {tuple(grid.cells(cell).tolist())}, because it is "
                 "not empty; choose an empty cell."
             )
-        old = arrays["worlds"][WorldRow.QUEEN_CELL, 0]
-        start = self._start.copy()
+        old = self.rows[WorldRow.QUEEN_CELL]
+        start = self.all.start(self.w)
         start[old], start[cell] = EMPTY, QUEEN
-        self._begin_with(start)
-        arrays["ground"][old], arrays["ground"][cell] = EMPTY, QUEEN
-        arrays["worlds"][WorldRow.QUEEN_CELL, 0] = cell
-        arrays["closer"][:] = World(grid.ranges, grid.cells(cell).tolist()).closer()
+        self.all.begin_with(self.w, start)
+        self._step_aside(*self._aside(np.array([cell])))
+        ground[old], ground[cell] = EMPTY, QUEEN
+        self.rows[WorldRow.QUEEN_CELL] = cell
+        self.view("closer")[:] = World(grid.ranges, grid.cells(cell).tolist()).closer()
+        self.colony.changed[self.w] = True
         self._change_food_sources(np.array([cell]), QUEEN)
-        self.colony.observe()
 
-    def lay_trail(self, cells: np.ndarray, level: int) -> None:
-        """Set the trail of cells other than rocks."""
-        self._lay(cells[self.colony.arrays["walls"][cells] == 0], level)
-        self.colony.observe()
-
-    def _lay(self, cells: np.ndarray, level: int) -> None:
-        arrays = self.colony.arrays
+    def lay(self, cells: np.ndarray, level: int) -> None:
+        """Set the trail of cells."""
         if self.colony.pheromone.dense:
-            arrays["level"][cells] = level
+            self.view("level")[cells] = level
         else:
-            arrays["trail"][cells] = level + self.colony.trail_clock(0) if level else 0
+            self.view("trail")[cells] = level + self.clock if level else 0
 
-    def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
-        """Put newborn ants on those of the cells that are empty, with random headings by default.
-
-        AntsError if the capacity of the colony is too small.
-        """
-        colony, arrays = self.colony, self.colony.arrays
-        world = arrays["worlds"][:, 0]
-        cells = cells[arrays["ground"][cells] == EMPTY]
-        n, living = len(cells), self.living
+    def add(self, cells: np.ndarray, heading: int | None = None) -> None:
+        """Put newborn ants on cells; see `Interventions.add_ants`."""
+        colony, ground, rows = self.colony, self.view("ground"), self.rows
+        cells = cells[ground[cells] == EMPTY]
+        n, living = len(cells), int(rows[WorldRow.LIVING])
         if living + n > colony.capacity:
             raise AntsError(
                 f"{count(n, 'ant')} cannot join {count(living, 'ant')}, because the capacity of "
                 f"this colony is {colony.capacity}; remove ants, or start with a larger capacity."
             )
-        slots = np.flatnonzero(arrays["stage"] == Stage.VACANT)[:n]
-        numbers = world[WorldRow.NEXT_NUMBER] + np.arange(n)
-        drawn = heading is None
-        headings = choose(self._stream.bits(n) >> np.uint64(32), N_HEADINGS) if drawn else heading
-        born = (colony.episode << 32) + numbers.astype(np.int64)
+        slots = np.flatnonzero(self.view("stage") == Stage.VACANT)[:n]
+        numbers = rows[WorldRow.NEXT_NUMBER] + np.arange(n)
+        words = self.all.stream(self.w).bits(n) if heading is None else np.zeros(0, np.uint64)
+        headings = choose(words >> np.uint64(32), N_HEADINGS) if heading is None else heading
+        episode = int(colony.arrays["episodes"][self.w])
+        born = (episode << 32) + numbers.astype(np.int64)
         newborn = {
             "cell": cells,
             "heading": headings,
@@ -173,127 +469,68 @@ class Interventions:
             "action": -1,
             "next_action": -1,
             "stage": Stage.NEWBORN,
-            "streams": stream_state(colony.seeds[0], STREAM_BORN, born),
+            "streams": stream_state(colony.seeds[self.w], STREAM_BORN, born),
         }
         for name in colony.columns():
-            arrays[name][slots] = newborn.get(name, 0)
-        arrays["ground"][cells] = ANT_GROUND
-        world[WorldRow.NEXT_NUMBER] += n
+            self.view(name)[slots] = newborn.get(name, 0)
+        ground[cells] = ANT_GROUND
+        rows[WorldRow.NEXT_NUMBER] += n
         self._count_ants()
-        colony.observe()
 
-    def remove_ants(self, cells: np.ndarray) -> None:
-        """Remove the ants on these cells, with the food that they carry."""
+    def add_some(self, n: int, heading: int | None = None) -> None:
+        """Put newborn ants on free cells in the order in which ants would start there."""
+        colony, grid = self.colony, self.colony.grid
+        free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
+        if n > len(free):
+            raise AntsError(
+                f"{count(n, 'ant')} cannot join, because there are {count(len(free), 'free cell')};"
+                " add fewer ants."
+            )
+        seed = colony.seeds[self.w]
+        words = stream_state(seed, STREAM_START_CELL, grid.number(grid.cells(free)))
+        queen = grid.cells(self.rows[WorldRow.QUEEN_CELL])
+        far = grid.distances(tuple(queen.tolist()))[free]
+        order = np.lexsort((words, far * (colony.start == "nest")))
+        self.add(free[order[:n]], heading)
+
+    def remove_some(self, n: int) -> None:
+        """Remove n random ants."""
+        slots = self.living_slots()
+        words = self.all.stream(self.w).bits(len(slots))
+        self.remove(slots[np.argsort(words, kind="stable")[:n]])
+
+    def remove(self, slots: np.ndarray) -> None:
+        """Remove the ants in some slots."""
         colony = self.colony
-        self._remove(np.flatnonzero(colony.living[0] & np.isin(colony.cells[0], cells)))
-
-    def _remove(self, slots: np.ndarray) -> None:
-        arrays = self.colony.arrays
-        numbers = arrays["number"][slots]
-        first = numbers < self.colony.ants  # their streams continue in the next episode
-        arrays["first_streams"][numbers[first]] = arrays["streams"][slots[first]]
-        arrays["ground"][arrays["cell"][slots]] = EMPTY
-        arrays["stage"][slots] = Stage.VACANT
+        numbers = self.view("number")[slots]
+        first = numbers < colony.ants  # their streams continue in the next episode
+        self.view("first_streams")[numbers[first]] = self.view("streams")[slots[first]]
+        self.view("ground")[self.cells[slots]] = EMPTY
+        self.view("stage")[slots] = Stage.VACANT
         self._count_ants()
-        self.colony.observe()
 
     def _count_ants(self) -> None:
-        world = self.colony.arrays["worlds"][:, 0]
-        taken = self.colony.arrays["stage"] != Stage.VACANT
-        world[WorldRow.LIVING] = np.count_nonzero(taken)
-        world[WorldRow.TOP] = np.max(np.flatnonzero(taken), initial=-1) + 1
-        world[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
+        taken = self.view("stage") != Stage.VACANT
+        self.rows[WorldRow.LIVING] = np.count_nonzero(taken)
+        self.rows[WorldRow.TOP] = np.max(np.flatnonzero(taken), initial=-1) + 1
+        self.rows[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
 
-    def set_ants(self, n: int) -> None:
-        """Set the number of ants, now and at the start of later episodes.
-
-        New ants take free cells in the order of `World.start`; ants with the highest numbers are
-        removed. AntsError if there is too little room.
-        """
-        colony = self.colony
-        (slots,) = np.nonzero(colony.living[0])
-        missing, free = n - len(slots), np.flatnonzero(colony.arrays["ground"] == EMPTY)
-        later = int(np.count_nonzero(self._start == EMPTY))
-        room = min(colony.capacity, len(free) + len(slots), later)
+    def check_room(self, n: int) -> None:
+        """Raise AntsError if there is no room for n ants."""
+        free = int(np.count_nonzero(self.view("ground") == EMPTY))
+        room = min(self.colony.capacity, free + int(self.rows[WorldRow.LIVING]))
+        if self.all.lasting:
+            room = min(room, int(np.count_nonzero(self.all.start(self.w) == EMPTY)))
         if n > room:
             raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
-        self._changed |= n != self.ants
-        self.ants = n
-        if missing > 0:
-            # The order in which ants would start there.
-            grid = colony.grid
-            words = stream_state(colony.seeds[0], STREAM_START_CELL, grid.number(grid.cells(free)))
-            queen = grid.cells(colony.arrays["worlds"][WorldRow.QUEEN_CELL, 0])
-            far = grid.distances(tuple(queen.tolist()))[free]
-            order = np.lexsort((words, far * (colony.start == "nest")))
-            self.add_ants(free[order[:missing]])
-        elif missing < 0:
-            self._remove(slots[np.argsort(colony.numbers[0, slots])[missing:]])
 
-    def set_task(self, task: Task) -> None:
-        """Set a task that differs only in numbers of the pheromone and in evaporation."""
-        colony, arrays = self.colony, self.colony.arrays
-        levels = np.maximum(arrays["trail"] - colony.trail_clock(0), 0)
-        colony.task, colony.pheromone = task, task.pheromone_while(colony.learns)
-        arrays["trail"][:] = np.where(levels > 0, levels + colony.trail_clock(0), 0)
-
-    def set_epsilon(self, epsilon: float) -> None:
-        """Set epsilon, which no longer decays."""
-        colony = self.colony
-        colony.epsilon = epsilon
-        colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
-
-    def set_learning_rate(self, learning_rate: float) -> None:
-        """Set the learning rate, which no longer decays."""
-        colony = self.colony
-        colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
-        colony.set_learning_rate(learning_rate)
-
-    def state(self) -> str:
-        """Return a hash of the whole state; colonies with equal hashes behave identically."""
-        colony = self.colony
-        moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
-        rest = (self.ants, self._stream.state, colony.task.as_dict(), colony.training.as_dict())
-        arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
-        digest = hashlib.sha256(files.to_json([*moment, *rest]).encode())
-        for name, array in sorted({**arrays, "start": self._start}.items()):
-            digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
-            digest.update(np.ascontiguousarray(array).data)
-        return digest.hexdigest()
-
-    def world(self) -> World:
-        """Return the world in which later episodes start."""
-        first, grid, start = self._first, self.colony.grid, self._start
-        trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
-        return World(
-            first.ranges,
-            grid.cells(int(np.argmax(start == QUEEN))).tolist(),
-            grid.cells(np.flatnonzero(start == FOOD)),
-            grid.cells(np.flatnonzero((start == OBSTACLE) & grid.exists)),
-            first.trails[start[trails] != OBSTACLE],
-            first.ants[start[ants] == EMPTY],
-        )
-
-    def begin_episode(self, length: int | None) -> None:
-        """End the present episode, if any, and start the next one; see `Colony.begin_episode`."""
-        colony = self.colony
-        if colony.episode >= 0:
-            colony.end_episode()
-        colony.ants = self.ants
-        colony.begin_episode(length, self.world() if self._changed else None)
-        self._changed = False
-
-    def _begin_with(self, start: np.ndarray) -> None:
-        """Set the ground at the start of later episodes; AntsError if it is not allowed."""
-        ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
-        if ants > room:
-            raise AntsError(
-                f"{count(ants, 'ant')} start each episode, but this change would leave "
-                f"{count(int(room), 'free cell')}; leave more cells free."
-            )
-        if self.colony.learns and not (start == FOOD).any():
-            raise AntsError("this would remove the last food, but ants learn from it; leave some.")
-        self._start, self._changed = start, True
+    def set_ants(self, n: int) -> None:
+        """Set the number of ants; see `Interventions.set_ants`."""
+        slots = self.living_slots()
+        if n > len(slots):
+            self.add_some(n - len(slots))
+        elif n < len(slots):
+            self.remove(slots[n:])
 
     def _change_food_sources(self, cells: np.ndarray, what: int) -> None:
         """Add food sources for FOOD on cells, or remove the sources of cells with anything else.
@@ -304,12 +541,11 @@ class Interventions:
         colony, arrays = self.colony, self.colony.arrays
         if not colony.food_changes:
             return
-        known = arrays["food_sources"][:, : arrays["worlds"][WorldRow.FOOD_SOURCES, 0]]
+        several = [self._sources(w) for w in range(len(colony.worlds))]
+        known = several[self.w]
         if what != FOOD:
-            known = known[:, ~np.isin(known[FoodSourceRow.CELL], cells)]
-        at, taken, pile = known[
-            [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE]
-        ].tolist()
+            known = known[:, ~np.isin(known[0], cells)]
+        at, taken, pile = known.tolist()
         on: dict[int, list[int]] = {}
         for source, cell in enumerate(at):
             on.setdefault(cell, []).append(source)
@@ -325,8 +561,15 @@ class Interventions:
             if all(taken[source] >= 0 for source in here):
                 taken[here[0]] = -1
         _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
-        colony.n_food_sources = max(len(at), int(np.count_nonzero(self._start == FOOD)))
-        sources = [np.array([at, taken, pile], int).reshape(3, -1)]
+        several[self.w] = np.array([at, taken, pile], int).reshape(3, -1)
+        colony.make_food_sources_fit(len(at))
         arrays |= food_sources.arrays(
-            sources, arrays["worlds"], colony.n_food_sources, colony.grid.size
+            several, arrays["worlds"], colony.n_food_sources, colony.grid.size
         )
+
+    def _sources(self, w: int) -> np.ndarray:
+        """Return the rows CELL, TAKEN and PILE of the food sources of a world, (3, n)."""
+        arrays, room = self.colony.arrays, self.colony.n_food_sources
+        n = arrays["worlds"][WorldRow.FOOD_SOURCES, w]
+        rows = [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE]
+        return arrays["food_sources"][rows, w * room : w * room + n]

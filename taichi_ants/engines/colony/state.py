@@ -109,6 +109,7 @@ class ColonyState:
         length: Length of the episode in ticks; 0 if unknown.
         ticks: Number of ticks since an episode started in all worlds.
         delivered: int64 (W,), food items delivered in previous episodes.
+        changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
     """
 
     def __init__(
@@ -160,10 +161,7 @@ class ColonyState:
         self.one_a_slot = sharing == "independent" or (
             not self.learns and table is not None and table.ndim == 4
         )
-        life = self.task.life
-        self.ants_change = life.births or life.lifespan is not None
-        self.food_changes = life.regrowth is not None or life.wander is not None
-        self.pheromone = self.task.pheromone_while(self.learns)
+        self.take_task(self.task)
         self.memory = Memory()
         if self.learner and (self.one_a_slot or self.plans_together):
             self.memory = padded(self.learner.memory_for(self.training, self.task.n_states))
@@ -174,6 +172,13 @@ class ColonyState:
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
         self.length = self.ticks = 0
         self.delivered = np.zeros(len(self.seeds), np.int64)
+
+    def take_task(self, task: Task) -> None:
+        """Set the attributes that depend on the task."""
+        life = task.life
+        self.task, self.pheromone = task, task.pheromone_while(self.learns)
+        self.ants_change = life.births or life.lifespan is not None
+        self.food_changes = life.regrowth is not None or life.wander is not None
 
     @property
     def learner(self) -> Learner | None:
@@ -330,6 +335,7 @@ class ColonyState:
     def lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
         self.worlds, self.grid = worlds, worlds[0].grid
+        self.changed = np.zeros(len(worlds), bool)
         most = max(len(world.foods) for world in worlds)
         self.make_room_for_food(most if self.food_changes else 0)
         self.arrays |= self._constants()
@@ -341,13 +347,33 @@ class ColonyState:
         self.arrays |= (changing := self._of_episode())
         self._changing = tuple(changing)
 
+    def make_food_sources_fit(self, n: int) -> None:
+        """Let the start of episodes have room for n food sources in each world, if it has less."""
+        if n > self.n_food_sources:
+            self.n_food_sources = n
+            self.at_start = self._start_of_episode()
+
     def begin(self, which: Which = ALL) -> None:
         """Reset worlds to the start of an episode; tables, memories and random streams stay."""
         self.delivered[which] += self.deliveries[which]
         self.set_learning_rate(self.learning_rate)
         self._set_to_start(self.arrays, which)
+        self._undo_interventions(which)
         self._copy_worlds(self.arrays, {"streams": self.arrays["first_streams"]}, which)
         self.arrays["episodes"][which] += 1
+
+    def _undo_interventions(self, which: Which) -> None:
+        """Reset the constants of those of some worlds that interventions have changed."""
+        stale = np.zeros_like(self.changed)
+        stale[which] = self.changed[which]
+        if stale.any():
+            self._copy_worlds(self.arrays, self._ground_constants(), stale)
+            self.changed[stale] = False
+
+    def set_task(self, task: Task) -> None:
+        """Set a task for which the colony has the right arrays and kernels."""
+        self.take_task(task)
+        self.arrays["rewards"][:] = task.rewards.by_event()
 
     def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
         """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
@@ -533,10 +559,7 @@ class ColonyState:
         pairs = self.task.n_states * ROW if self.sharing == "shared" else 0
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
-            # 1 for rocks and outside.
-            "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
-            # By cell: a bit for each heading that leads nearer to the queen.
-            "closer": self._of_each(World.closer).reshape(-1),
+            **self._ground_constants(),
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
             "rewards": self.task.rewards.by_event(),
@@ -555,6 +578,15 @@ class ColonyState:
             "sums_of": np.zeros((len(SumRow), sums), np.int32),
             # By chunk: the number of pairs with updates, then these pairs.
             "touched": np.zeros(chunks * (pairs + 1), np.int32),
+        }
+
+    def _ground_constants(self) -> Arrays:
+        """Return the constants that depend on rocks and the queen."""
+        return {
+            # 1 for rocks and outside.
+            "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
+            # By cell: a bit for each heading that leads nearer to the queen.
+            "closer": self._of_each(World.closer).reshape(-1),
         }
 
     def _of_each(self, make: Callable[[World], np.ndarray]) -> np.ndarray:

@@ -6,13 +6,16 @@ import math
 import time
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.kernels import Features
 
 # Ants are sorted after this many steps of all ants, within limits in ticks.
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
@@ -119,22 +122,28 @@ class Stepper:
         from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.colony import kernels
 
-        task, pheromone = state.task, state.pheromone
-        features = kernels.Features(
-            learner=state.learner,
-            own_tables=state.one_a_slot,
-            is_given_actions=state.is_given_actions,
-            observation=task.sees,
-            dense=pheromone.dense,
-            view=pheromone.view,
-            traffic=task.traffic,
-            ants_change=state.ants_change,
-            food_changes=state.food_changes,
-        )
-        variant = kernels.variant(features)
+        variant = kernels.variant(features_of(state))
         if name == "ticks":
             return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))
         return Launch(partial(kernels.loops, variant, getattr(kernels, name)))
+
+
+def features_of(state: ColonyState) -> Features:
+    """Return the features of a colony for which kernels are compiled."""
+    from taichi_ants.engines.colony import kernels
+
+    task, pheromone = state.task, state.pheromone
+    return kernels.Features(
+        learner=state.learner,
+        own_tables=state.one_a_slot,
+        is_given_actions=state.is_given_actions,
+        observation=task.sees,
+        dense=pheromone.dense,
+        view=pheromone.view,
+        traffic=task.traffic,
+        ants_change=state.ants_change,
+        food_changes=state.food_changes,
+    )
 
 
 def _has_barrier(running: runtime.Runtime) -> bool:

@@ -1,0 +1,105 @@
+"""The timetable of a protocol: the ticks at which a run of a colony is cut, and what happens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants import measures
+from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.errors import AntsError
+from taichi_ants.interventions import Policy, TaskNumbers
+from taichi_ants.protocol import Event, When, checked_protocol
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
+    from taichi_ants.engines.colony.stepping import Stepper
+
+
+class Timetable:
+    """The events of a protocol in the episodes of a colony.
+
+    A context manager for an episode that has begun. At its end, the numbers and tables of the
+    colony are again those of its beginning; `ColonyState.begin` resets the worlds.
+
+    Raises:
+        AntsError: An event cannot happen in an episode of `length` ticks, or in this colony.
+    """
+
+    def __init__(self, colony: Colony, protocol: Any, length: int) -> None:
+        self._colony, self._events = colony, checked_protocol(protocol)
+        self._at: dict[int, list[tuple[int, Event]]] = {}  # by tick: indices and events
+        for number, event in enumerate(self._events):
+            for tick in event.times(length):
+                self._at.setdefault(tick, []).append((number, event))
+        self._stops = sorted(self._at)
+        self._measures = {
+            one.measure: measures.get(one.measure) for one in self._events if isinstance(one, When)
+        }
+        self._check_colony()
+
+    def _check_colony(self) -> None:
+        """Raise an AntsError if an intervention cannot happen in this colony."""
+        colony, interventions = self._colony, Interventions(self._colony, lasting=False)
+        for event in self._events:
+            for one in event.interventions:
+                if isinstance(event, When) and one.in_all_worlds and len(colony.worlds) > 1:
+                    raise AntsError(
+                        f"`when.{one.path}` would change all {len(colony.worlds)} worlds of the "
+                        "colony, which share it; make a colony with a single seed."
+                    )
+                if isinstance(one, TaskNumbers):
+                    colony.check_same_kernels(one.changed(colony.task))
+                if isinstance(one, Policy):
+                    interventions.check_follow()
+                    one.table_for(colony.task)
+                interventions.index(one.all_cells)
+
+    def __enter__(self) -> None:
+        colony = self._colony
+        self._interventions = Interventions(colony, lasting=False)
+        self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
+        self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
+        replaces = any(isinstance(x, Policy) for one in self._events for x in one.interventions)
+        self._q = colony.arrays["q"].copy() if replaces else None
+
+    def __exit__(self, *_: object) -> None:
+        colony, (task, training, epsilon, learning_rate) = self._colony, self._before
+        if colony.task != task:
+            Interventions(colony, lasting=False).set_task(task)
+        colony.training, colony.epsilon = training, epsilon
+        if colony.learning_rate != learning_rate:
+            colony.set_learning_rate(learning_rate)
+        if self._q is not None:
+            colony.arrays["q"][:] = self._q
+
+    def pieces(self, stepper: Stepper, n: int) -> Iterator[None]:
+        """Advance by n ticks with all events on the way; yield as `Stepper.pieces` does."""
+        colony = self._colony
+        end = colony.ticks + n
+        while colony.ticks < end:
+            for number, event in self._at.get(colony.ticks, ()):
+                self._happen(number, event)
+            stop = next((tick for tick in self._stops if tick > colony.ticks), end)
+            yield from stepper.pieces(colony, min(stop, end) - colony.ticks)
+
+    def _happen(self, number: int, event: Event) -> None:
+        """Let an event happen in the worlds that are running, if its condition holds there."""
+        colony = self._colony
+        worlds = colony.running.copy()
+        if isinstance(event, When):
+            done = self._done.setdefault(number, np.zeros_like(worlds))
+            worlds &= ~(done & event.once)
+            for w in np.flatnonzero(worlds):
+                worlds[w] = event.holds(self._measures[event.measure](colony.snapshot(int(w))))
+            done |= worlds
+        if not worlds.any():
+            return
+        self._interventions.worlds = tuple(np.flatnonzero(worlds).tolist())
+        try:
+            for one in event.interventions:
+                one.apply(self._interventions)
+        except AntsError as error:
+            raise AntsError(f"after {colony.ticks} ticks, {error}") from error

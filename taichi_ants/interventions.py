@@ -1,0 +1,422 @@
+"""Interventions: all that can be changed in a colony between two ticks.
+
+Each intervention is a record of settings with a method `apply`. Sweep files, protocols, the live
+page and its session files use the same names and settings:
+
+    interventions.from_dict({"remove_ants": {"share": 0.5}}) == RemoveAnts(share=0.5)
+
+A cell is a triple (x, y, z) in any form of cube coordinates, or the flat index of a cell in the
+grid of the world, see `taichi_ants.grid.hexgrid`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
+
+import numpy as np
+
+from taichi_ants.errors import AntsError, check_one_of, entries_of, is_flag, shown, whole
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.learners.policies import NAMED, checked_values, load_policy
+from taichi_ants.settings import Is, Settings, Share, all_of, declared, flat, nested, not_a_setting
+from taichi_ants.task import Task
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
+from taichi_ants.task.pheromone import MAX_DEPOSIT
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.interventions import Interventions
+
+One = TypeVar("One", bound="Record")
+_GROUNDS = {"rock": OBSTACLE, "food": FOOD}
+_MOST = 2**24  # ants, see `checks.MAX_ANTS`
+_CELLS = Is("cells, each [x, y, z]")
+
+
+class Record(Settings):
+    """Settings that a mapping or, for some classes, a single value can stand for."""
+
+    @classmethod
+    def from_dict(cls: type[One], facts: Any) -> One:
+        """Return the record of a mapping of settings, or of a short form."""
+        found = cls.converted(facts)
+        if not isinstance(found, cls):
+            raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
+        return found
+
+    @classmethod
+    def converted(cls: type[One], value: Any) -> Any:
+        """Return the record that a mapping or a short form stands for; else the value itself."""
+        if isinstance(value, cls):
+            return value
+        given = value if isinstance(value, Mapping) else cls.short(value)
+        if given is None:
+            return value
+        known = {one.name: one for one in declared(cls)}
+        for name in given:
+            if name not in known:
+                raise AntsError(f"`{cls.path}.{name}` {not_a_setting(name, known)}")
+        for name, one in known.items():
+            if one.default is MISSING and name not in given:
+                raise AntsError(f"`{cls.path}.{name}` is missing; add it.")
+        return cls(**given)
+
+    @classmethod
+    def short(cls, value: Any) -> dict[str, Any] | None:
+        """Return the settings that a single value stands for; None if it is not allowed."""
+        return None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the settings that differ from their defaults, JSON-compatible."""
+        found = {one.name: getattr(self, one.name) for one in declared(type(self))}
+        usual = {one.name: one.default for one in declared(type(self))}
+        found = {name: value for name, value in found.items() if value != usual[name]}
+        return {k: v.as_dict() if isinstance(v, Record) else v for k, v in found.items()}
+
+
+class Intervention(Record):
+    """A change of a colony between two ticks; the path of the class is its name."""
+
+    form = "a table of settings"
+    in_all_worlds: ClassVar[bool] = False  # because the worlds of a colony share what it changes
+
+    @property
+    def all_cells(self) -> Sequence:
+        """All cells in the settings."""
+        return getattr(self, "cells", None) or ()
+
+    def apply(self, to: Interventions) -> None:
+        """Apply the change; AntsError if a world does not allow it."""
+        raise NotImplementedError
+
+
+class _OfCells(Intervention):
+    """An intervention on some cells, of which a list is the short form."""
+
+    form = "a list of cells, or a table of settings"
+
+    def check(self) -> None:
+        super().check()
+        if getattr(self, "cells", None) is not None:
+            object.__setattr__(self, "cells", _checked_cells(f"{self.path}.cells", self.cells))  # type: ignore[attr-defined]
+
+    @classmethod
+    def short(cls, value: Any) -> dict[str, Any] | None:
+        cells = entries_of(value)
+        return None if cells is None else {"cells": cells}
+
+
+class _OfAnts(_OfCells):
+    """An intervention on a number of ants, a share of the living ants, or the ants on cells."""
+
+    form = "a number of ants, a share below 1, a list of cells, or a table of settings"
+    number: int | None
+    share: float | None
+    cells: Sequence | None
+
+    def check(self) -> None:
+        super().check()
+        given = [name for name in ("number", "share", "cells") if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise AntsError(
+                f"`{self.path}` has {' and '.join(given) or 'neither number, share nor cells'}; "
+                "give one of number, share and cells."
+            )
+
+    @classmethod
+    def short(cls, value: Any) -> dict[str, Any] | None:
+        if isinstance(value, (int, np.integer)) and not is_flag(value):
+            return {"number": value}
+        return {"share": value} if isinstance(value, float) else super().short(value)
+
+
+@dataclass(frozen=True)
+class RemoveAnts(_OfAnts, path="remove_ants"):
+    """Remove ants with the food that they carry: random ants, or those on cells.
+
+    A share is rounded to a number of ants, halves up.
+    """
+
+    number: Annotated[int | None, Is("number of ants", least=0, most=_MOST)] = None
+    share: Annotated[float | None, Is("share of the living ants", least=0, most=1)] = None
+    cells: Annotated[Sequence | None, _CELLS] = None
+
+    def apply(self, to: Interventions) -> None:
+        if self.cells is None:
+            to.remove_some(self.number, self.share)
+        else:
+            to.remove_ants(to.index(self.cells))
+
+
+@dataclass(frozen=True)
+class AddAnts(_OfAnts, path="add_ants"):
+    """Add ants on the cells on which further ants would start, or on those of the cells given
+    that are empty.
+
+    A share of the living ants is rounded to a number, halves up.
+    """
+
+    number: Annotated[int | None, Is("number of ants", least=0, most=_MOST)] = None
+    share: Annotated[float | None, Is("share of the living ants", least=0)] = None
+    cells: Annotated[Sequence | None, _CELLS] = None
+    heading: Annotated[
+        int | None, Is("heading of the new ants; random if left out", least=0, most=N_HEADINGS - 1)
+    ] = None
+
+    def apply(self, to: Interventions) -> None:
+        if self.cells is None:
+            to.add_some(self.number, self.share, self.heading)
+        else:
+            to.add_ants(to.index(self.cells), self.heading)
+
+
+@dataclass(frozen=True)
+class Place(_OfCells, path="place"):
+    """Place rock or food on cells, or the queen on one cell; ants there move aside.
+
+    Rock and food leave out the queen's cell, and cells whose ant has no room nearby.
+    """
+
+    what: Annotated[Literal["rock", "food", "queen"], Is("thing to place")]
+    cells: Annotated[Sequence, _CELLS]
+
+    def check(self) -> None:
+        super().check()
+        if self.what == "queen" and len(self.cells) != 1:
+            raise AntsError(
+                f"`place.cells` has {len(self.cells)} cells; give a single cell for the queen."
+            )
+
+    def apply(self, to: Interventions) -> None:
+        cells = to.index(self.cells)
+        if self.what == "queen":
+            to.move_queen(int(cells[0]))
+        else:
+            to.put(cells, _GROUNDS[self.what])
+
+
+@dataclass(frozen=True)
+class Move(_OfCells, path="move"):
+    """Move rock, food or the queen to an empty cell; an ant there moves aside.
+
+    Has no effect if there is nothing to move, or the new cell is not free.
+    """
+
+    cells: Annotated[Sequence, Is("cell to move from and cell to move to, each [x, y, z]")]
+
+    def check(self) -> None:
+        super().check()
+        if len(self.cells) != 2:
+            raise AntsError(
+                f"`move.cells` has {len(self.cells)} cells; give the cell to move from, then the "
+                "cell to move to."
+            )
+
+    def apply(self, to: Interventions) -> None:
+        cell, there = (int(to.index([one])[0]) for one in self.cells)
+        to.move(cell, there)
+
+
+@dataclass(frozen=True)
+class Clear(_OfCells, path="clear"):
+    """Remove rock and food from cells."""
+
+    cells: Annotated[Sequence, _CELLS]
+
+    def apply(self, to: Interventions) -> None:
+        to.put(to.index(self.cells), EMPTY)
+
+
+@dataclass(frozen=True)
+class Trail(_OfCells, path="trail"):
+    """Set the trail of cells without rock; level 0 clears it."""
+
+    level: Annotated[int, Is("trail level", least=0, most=MAX_DEPOSIT)]
+    cells: Annotated[Sequence | None, Is("cells, each [x, y, z]; all cells if left out")] = None
+
+    @classmethod
+    def short(cls, value: Any) -> dict[str, Any] | None:
+        return {"level": value} if isinstance(value, (int, np.integer)) else None
+
+    def apply(self, to: Interventions) -> None:
+        cells = to.everywhere() if self.cells is None else to.index(self.cells)
+        to.lay_trail(cells, self.level)
+
+
+@dataclass(frozen=True)
+class Ants(Intervention, path="ants"):
+    """Set the number of living ants; ants with the highest numbers are removed first."""
+
+    number: Annotated[int, Is("number of ants", least=1, most=_MOST)]
+
+    @classmethod
+    def short(cls, value: Any) -> dict[str, Any] | None:
+        return {"number": value} if isinstance(value, (int, np.integer)) else None
+
+    def apply(self, to: Interventions) -> None:
+        to.set_ants(self.number)
+
+
+@dataclass(frozen=True)
+class TaskNumbers(Intervention, path="task"):
+    """Change settings of the task that kernels read as numbers, for example "pheromone.half_life".
+
+    A setting by which kernels are compiled, such as the observation, cannot change in an episode.
+    """
+
+    values: tuple[tuple[str, Any], ...]  # the names of settings without "task.", and their values
+    in_all_worlds = True
+
+    def check(self) -> None:
+        known = {one.path.removeprefix("task."): one for one in all_of(Task)}
+        if not self.values:
+            raise AntsError("`task` has no settings; name at least one, with its new value.")
+        values = []
+        for name, value in self.values:
+            if name not in known:
+                raise AntsError(f"`task.{name}` {not_a_setting(name, known)}")
+            values.append((name, known[name].checked(value)))
+        object.__setattr__(self, "values", tuple(sorted(values)))
+
+    @classmethod
+    def converted(cls, value: Any) -> Any:
+        if not isinstance(value, Mapping):
+            return value
+        given = flat({k: v for k, v in value.items() if isinstance(k, str)})
+        return cls(tuple(given.items()))
+
+    def as_dict(self) -> dict[str, Any]:
+        return dict(self.values)
+
+    def changed(self, task: Task) -> Task:
+        """Return the task with the new values."""
+        return task.but(**nested(dict(self.values)))
+
+    def apply(self, to: Interventions) -> None:
+        to.set_task(self.changed(to.colony.task))
+
+
+class _Rate(Intervention):
+    form = "a number"
+    value: float
+    in_all_worlds = True
+
+    @classmethod
+    def short(cls, value: Any) -> dict[str, Any] | None:
+        return {"value": value}
+
+
+@dataclass(frozen=True)
+class Epsilon(_Rate, path="epsilon"):
+    """Set the exploration rate, which then does not decay."""
+
+    value: Annotated[Share, Is("exploration rate")]
+
+    def apply(self, to: Interventions) -> None:
+        to.set_epsilon(self.value)
+
+
+@dataclass(frozen=True)
+class LearningRate(_Rate, path="learning_rate"):
+    """Set the learning rate, which then does not decay."""
+
+    value: Annotated[Share, Is("learning rate")]
+
+    def apply(self, to: Interventions) -> None:
+        to.set_learning_rate(self.value)
+
+
+@dataclass(frozen=True)
+class Policy(Intervention, path="policy"):
+    """Replace the policy that the ants follow; for colonies that do not learn.
+
+    In Python, a table of action values or anything with `q_values` is a short form.
+    """
+
+    source: Annotated[str, Is("policy file, or the name of a hand-written policy")]
+    table: np.ndarray | None = field(default=None, compare=False, repr=False)
+    sha256: str = ""  # of the table; "" for hand-written policies
+
+    def check(self) -> None:
+        super().check()
+        if self.source in NAMED:
+            return
+        if self.table is None:
+            if not self.source.endswith(".npz") and not Path(self.source).exists():
+                names = ", ".join(NAMED)
+                raise AntsError(
+                    f"`policy` is {self.source!r}; it must be one of {names}, or a policy file."
+                )
+            object.__setattr__(self, "table", load_policy(self.source).q_values)
+        content = hashlib.sha256(np.ascontiguousarray(self.table, np.float32).tobytes())
+        object.__setattr__(self, "sha256", content.hexdigest())
+
+    @classmethod
+    def converted(cls, value: Any) -> Any:
+        if isinstance(value, (str, Path)):
+            return cls(str(value))
+        if isinstance(value, (Mapping, cls)):
+            return super().converted(value)
+        table = getattr(value, "q_values", value)
+        return cls("a table", np.asarray(table)) if isinstance(table, np.ndarray) else value
+
+    def as_dict(self) -> dict[str, Any]:
+        return {**super().as_dict(), **({"sha256": self.sha256} if self.sha256 else {})}
+
+    def table_for(self, task: Task) -> np.ndarray:
+        """Return the table; AntsError if it is not for the observation of the task."""
+        table = NAMED[self.source](task.observation) if self.table is None else self.table
+        return checked_values(table, task)
+
+    def apply(self, to: Interventions) -> None:
+        to.set_policy(self.table_for(to.colony.task))
+
+
+@dataclass(frozen=True)
+class Episode(Intervention, path="episode"):
+    """End the episode and begin the next one."""
+
+    in_all_worlds = True
+
+    def apply(self, to: Interventions) -> None:
+        to.begin_episode()
+
+
+INTERVENTIONS: dict[str, type[Intervention]] = {
+    one.path: one
+    for one in (
+        *(RemoveAnts, AddAnts, Ants, Place, Move, Clear, Trail),
+        *(TaskNumbers, Epsilon, LearningRate, Policy, Episode),
+    )
+}
+
+
+def from_dict(facts: Any) -> Intervention:
+    """Return the intervention of a mapping from its name to its settings or its short form."""
+    if not isinstance(facts, Mapping) or len(facts) != 1:
+        raise AntsError(
+            f"an intervention is {shown(facts)}; it must be a table with the name of one "
+            f"intervention: {', '.join(INTERVENTIONS)}."
+        )
+    ((name, settings),) = facts.items()
+    check_one_of("the name of an intervention", name, tuple(INTERVENTIONS))
+    return INTERVENTIONS[name].from_dict(settings)
+
+
+def _checked_cells(path: str, cells: Sequence) -> tuple:
+    """Return cells as triples or flat indices; AntsError if one is neither."""
+    found: list[Any] = []
+    for cell in cells:
+        parts = entries_of(cell)
+        if parts is not None and len(parts) != 3:
+            raise AntsError(
+                f"`{path}` has the cell {shown(cell)}; a cell is three whole numbers [x, y, z]."
+            )
+        name = f"a cell of `{path}`"
+        found.append(whole(name, cell) if parts is None else tuple(whole(name, x) for x in parts))
+    if not found:
+        raise AntsError(f"`{path}` is empty; give at least one cell.")
+    return tuple(found)

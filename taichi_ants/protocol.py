@@ -1,0 +1,188 @@
+"""Protocols: interventions at given ticks of an episode, or when a measure crosses a bound.
+
+    colony.run(4, 1000, protocol=[At(500, remove_ants=0.5), Every(100, trail=0)])
+
+An event has one or more interventions, each named as in `taichi_ants.interventions`. They are
+applied in the order of the fields of `Event`. Events of the same tick are applied in the order of
+the protocol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Annotated, Any
+
+from taichi_ants import measures
+from taichi_ants.errors import AntsError, entries_of, shown
+from taichi_ants.interventions import (
+    AddAnts,
+    Ants,
+    Clear,
+    Epsilon,
+    Intervention,
+    LearningRate,
+    Move,
+    Place,
+    Policy,
+    Record,
+    RemoveAnts,
+    TaskNumbers,
+    Trail,
+)
+from taichi_ants.settings import Is
+from taichi_ants.task.constants import MAX_STEPS
+
+Tick = Annotated[int, Is(unit="ticks of the episode", least=0, most=MAX_STEPS)]
+Interval = Annotated[int, Is(unit="ticks", least=1, most=MAX_STEPS)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Event(Record):
+    """The interventions of an event, in the order in which they are applied."""
+
+    remove_ants: Annotated[RemoveAnts | None, Is("ants to remove")] = None
+    add_ants: Annotated[AddAnts | None, Is("ants to add")] = None
+    ants: Annotated[Ants | None, Is("new number of ants")] = None
+    clear: Annotated[Clear | None, Is("cells from which to remove rock and food")] = None
+    move: Annotated[Move | None, Is("rock, food or queen to move")] = None
+    place: Annotated[Place | None, Is("rock, food or queen to place")] = None
+    trail: Annotated[Trail | None, Is("trail to lay or to clear")] = None
+    task: Annotated[TaskNumbers | None, Is("settings of the task to change")] = None
+    epsilon: Annotated[Epsilon | None, Is("new exploration rate")] = None
+    learning_rate: Annotated[LearningRate | None, Is("new learning rate")] = None
+    policy: Annotated[Policy | None, Is("policy to follow")] = None
+
+    def check(self) -> None:
+        """Check all settings."""
+        super().check()
+        if not self.interventions:
+            names = ", ".join(one.name for one in fields(Event))
+            raise AntsError(f"`{self.path}` has no intervention; give one or more of {names}.")
+
+    @property
+    def interventions(self) -> tuple[Intervention, ...]:
+        """The interventions, in the order in which they are applied."""
+        several = (getattr(self, one.name) for one in fields(Event))
+        return tuple(one for one in several if one is not None)
+
+    def times(self, length: int) -> range:
+        """Return the ticks of an episode at which the event can happen, after that many ticks.
+
+        AntsError if there are none in an episode of `length` ticks.
+        """
+        raise NotImplementedError
+
+    def _within(self, name: str, length: int) -> int:
+        """Return the tick in a setting; AntsError unless it lies within the episode."""
+        tick = getattr(self, name)
+        if tick >= length:
+            raise AntsError(
+                f"`{self.path}.{name}` is {tick}, but episodes have {length} ticks; choose at most "
+                f"{length - 1}."
+            )
+        return tick
+
+
+@dataclass(frozen=True)
+class At(Event, path="at"):
+    """Interventions after a number of ticks of each episode."""
+
+    tick: Annotated[Tick, Is("time of the event")]
+
+    def times(self, length: int) -> range:
+        """Return the tick."""
+        tick = self._within("tick", length)
+        return range(tick, tick + 1)
+
+
+@dataclass(frozen=True)
+class Every(Event, path="every"):
+    """Interventions at regular ticks of each episode."""
+
+    ticks: Annotated[Interval, Is("time between two events")]
+    start: Annotated[
+        int | None,
+        Is("time of the first event; `ticks` if left out", unit="ticks of the episode"),
+        Is(least=0, most=MAX_STEPS),
+    ] = None
+    stop: Annotated[
+        int | None,
+        Is("time of the last possible event", unit="ticks of the episode", least=0, most=MAX_STEPS),
+    ] = None
+
+    def check(self) -> None:
+        """Check all settings."""
+        super().check()
+        if self.start is None:
+            object.__setattr__(self, "start", self.ticks)
+        if self.stop is not None and self.stop < self.start:  # type: ignore[operator]
+            raise AntsError(
+                f"`every.stop` is {self.stop}, before the first event; choose at least "
+                f"{self.start}."
+            )
+
+    def times(self, length: int) -> range:
+        """Return the ticks."""
+        last = length - 1 if self.stop is None else min(self.stop, length - 1)
+        return range(self._within("start", length), last + 1, self.ticks)
+
+
+@dataclass(frozen=True)
+class When(Event, path="when"):
+    """Interventions when a measure of a world is above or below a bound.
+
+    Each world is checked for itself, every `interval` ticks. With `once`, the event happens at most
+    once in an episode, else at each check for which the condition holds.
+    """
+
+    measure: Annotated[str, Is("name of a registered measure")]
+    above: Annotated[float | None, Is("bound that the measure exceeds")] = None
+    below: Annotated[float | None, Is("bound that the measure is less than")] = None
+    interval: Annotated[Interval, Is("time between two checks")] = 10
+    once: Annotated[bool, Is("let the event happen only once in an episode")] = True
+
+    def check(self) -> None:
+        """Check all settings."""
+        super().check()
+        measures.get(self.measure)
+        if (self.above is None) == (self.below is None):
+            raise AntsError("`when` needs a bound; give either `above` or `below`.")
+
+    def times(self, length: int) -> range:
+        """Return the ticks of the checks."""
+        self._within("interval", length)
+        return range(self.interval, length, self.interval)
+
+    def holds(self, value: float) -> bool:
+        """Return whether the condition holds for a value of the measure."""
+        if self.above is not None:
+            return value > self.above
+        return self.below is not None and value < self.below
+
+
+EVENTS: dict[str, type[Event]] = {one.path: one for one in (At, Every, When)}
+
+
+def checked_protocol(protocol: Any) -> tuple[Event, ...]:
+    """Return the events of a protocol; AntsError if one is not an `Event`."""
+    events = [protocol] if isinstance(protocol, Event) else entries_of(protocol)
+    if events is None or not all(isinstance(one, Event) for one in events):
+        raise AntsError(f"protocol is {shown(protocol)}; it must be a list of At, Every and When.")
+    return tuple(events)
+
+
+def read(tables: Mapping[str, Sequence[Any]]) -> tuple[Event, ...]:
+    """Return the events of lists of tables by the names in `EVENTS`; those of `at` come first."""
+    return tuple(
+        _event(kind, table, number)
+        for name, kind in EVENTS.items()
+        for number, table in enumerate(tables.get(name, ()), start=1)
+    )
+
+
+def _event(kind: type[Event], table: Any, number: int) -> Event:
+    try:
+        return kind.from_dict(table)
+    except AntsError as error:
+        raise AntsError(f"in [[{kind.path}]] number {number}, {error}") from error

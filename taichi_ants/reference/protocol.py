@@ -1,0 +1,137 @@
+"""Protocols: interventions in a colony at given ticks, or when a measure crosses a bound."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from taichi_ants import interventions as language
+from taichi_ants.learners.policies import random_policy, trail_follower
+from taichi_ants.protocol import At, Event, Every, When
+from taichi_ants.reference.colony import EpisodeRecord, ReferenceColony
+from taichi_ants.reference.geometry import Cell, normal_form
+from taichi_ants.reference.interventions import Interventions
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
+
+MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
+    "deliveries": lambda colony: colony.record.deliveries,
+    "living": lambda colony: len(colony.ants),
+}
+_CONTENTS = {"rock": OBSTACLE, "food": FOOD}
+
+
+class Protocol:
+    """Events in each episode of a colony.
+
+    Each episode begins without the interventions of the one before. Call `before_tick` before each
+    tick.
+    """
+
+    def __init__(self, colony: ReferenceColony, events: Sequence[Event]) -> None:
+        self._colony, self._events = colony, events
+
+    def run(self, episodes: int, ticks: int) -> list[EpisodeRecord]:
+        """Run whole episodes, and return their records."""
+        for _ in range(episodes):
+            self.begin_episode()
+            while self._colony.record.ticks < ticks and not self._colony.over:
+                self.before_tick()
+                self._colony.tick(last=self._colony.record.ticks == ticks - 1)
+            self.end_episode()
+        return self._colony.records[-episodes:]
+
+    def begin_episode(self) -> None:
+        """Begin an episode of the colony."""
+        colony = self._colony
+        colony.begin_episode()
+        self._happened: set[int] = set()
+        self._interventions = Interventions(colony)
+        tables = copy.deepcopy([learner.rows for learner in colony.minds.tables])
+        self._before = colony.task, colony.pheromone, colony.epsilon, colony.learning_rate, tables
+
+    def end_episode(self) -> None:
+        """Undo changes of numbers and of policies, and end the episode."""
+        colony = self._colony
+        task, pheromone, epsilon, learning_rate, tables = self._before
+        colony.task, colony.pheromone, colony.epsilon = task, pheromone, epsilon
+        colony.minds.pace(learning_rate)
+        colony.learning_rate = learning_rate
+        if colony.sharing == "frozen":
+            for learner, rows in zip(colony.minds.tables, tables, strict=True):
+                learner.rows = rows
+        colony.end_episode()
+
+    def before_tick(self) -> None:
+        """Let all events of the present tick happen."""
+        for number, event in enumerate(self._events):
+            if self._happens(number, event):
+                self._happened.add(number)
+                for name in vars(event):
+                    if isinstance(getattr(event, name), language.Intervention):
+                        self.apply(getattr(event, name))
+
+    def _happens(self, number: int, event: Event) -> bool:
+        tick = self._colony.record.ticks
+        if isinstance(event, At):
+            return tick == event.tick
+        if isinstance(event, Every):
+            start = event.ticks if event.start is None else event.start
+            stop = tick if event.stop is None else event.stop
+            return start <= tick <= stop and (tick - start) % event.ticks == 0
+        assert isinstance(event, When)
+        if tick == 0 or tick % event.interval or (event.once and number in self._happened):
+            return False
+        value = MEASURES[event.measure](self._colony)
+        return value > event.above if event.above is not None else value < event.below  # type: ignore[operator]
+
+    def apply(self, one: Any) -> None:
+        """Apply an intervention."""
+        to = self._interventions
+        match one:
+            case language.RemoveAnts(cells=None):
+                to.remove_some(self._amount(one))
+            case language.RemoveAnts():
+                to.remove_ants(_cells(one))
+            case language.AddAnts(cells=None):
+                to.add_some(self._amount(one), one.heading)
+            case language.AddAnts():
+                to.add_ants(_cells(one), one.heading)
+            case language.Ants():
+                to.set_ants(one.number)
+            case language.Place(what="queen"):
+                to.move_queen(*_cells(one))
+            case language.Place():
+                to.put(_cells(one), _CONTENTS[one.what])
+            case language.Move():
+                to.move(*_cells(one))
+            case language.Clear():
+                to.put(_cells(one), EMPTY)
+            case language.Trail(cells=None):
+                to.lay_trail(list(self._colony.world.ground), one.level)
+            case language.Trail():
+                to.lay_trail(_cells(one), one.level)
+            case language.Epsilon():
+                self._colony.epsilon = one.value
+            case language.LearningRate():
+                to.set_learning_rate(one.value)
+            case language.Policy():
+                make = {"random": random_policy, "trail_follower": trail_follower}
+                to.set_policy(
+                    make[one.source](self._colony.task.observation)
+                    if one.table is None
+                    else one.table
+                )
+            case language.TaskNumbers():
+                to.set_task(one.changed(self._colony.task))
+
+    def _amount(self, one: Any) -> int:
+        """Return a number of ants; a share is rounded, halves up."""
+        if one.number is not None:
+            return one.number
+        return int(one.share * len(self._colony.ants) + 0.5)
+
+
+def _cells(one: Any) -> list[Cell]:
+    """Return the cells of an intervention, without duplicates."""
+    return list(dict.fromkeys(normal_form(*cell) for cell in one.cells))

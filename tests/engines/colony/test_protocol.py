@@ -1,0 +1,251 @@
+"""Protocols: kernels equal the reference at each tick, and worlds do not depend on each other."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from random_colonies import random_colony
+from random_protocols import random_protocol
+from same_colonies import assert_equal
+
+from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
+from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.engines.colony.timetable import Timetable
+from taichi_ants.interventions import from_dict
+from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
+from taichi_ants.protocol import At, Every, When
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.protocol import Protocol
+from taichi_ants.task import foraging
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
+
+# Each entry takes kernels of its own, see test_against_reference.py.
+KERNELS = [
+    ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
+    ("double_q", "independent", "ants_seen", True, "blocking", "half"),
+    ("q_learning", "frozen", "paper", True, "following", "strongest_under_carriers"),
+]
+MARKED = [*KERNELS[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in KERNELS[2:])]
+TICKS = 14
+FOLLOWS = TrainingConfig("q_learning", 1.0, 1.0, 0.05, 1.0)
+
+
+def several(world: World) -> list[World]:
+    """Three worlds with the same ranges."""
+    bare = World(world.ranges, world.queen, foods=world.foods, ants=world.ants)
+    return [world, bare, world]
+
+
+def drawn_cases(kernel, seed, n_worlds):
+    """The arguments of a colony of some worlds, and a protocol."""
+    learner, sharing, observation, dense, traffic, view = kernel
+    drawn = random_colony(
+        *(seed, 10, sharing, 5, None, learner, observation, dense),
+        traffic=traffic,
+        view=view,
+        changes=True,
+    )
+    rng = np.random.default_rng([seed, 7])
+    population = {**drawn.population, "ends_at_delivery": False}
+    population["capacity"] = capacity = population["ants"] + int(rng.integers(2, 9))
+    rules = {**population, "sharing": sharing, "q_values": drawn.q_values}
+    learns = sharing != "frozen"
+    protocol = random_protocol(rng, drawn.world, drawn.task, capacity, TICKS, n_worlds, learns)
+    places = several(drawn.world)[:n_worlds]
+    return places, drawn.task, drawn.training, drawn.seed, rules, protocol
+
+
+@pytest.mark.parametrize("kernel", MARKED, ids=lambda kernel: "-".join(map(str, kernel[:4])))
+def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
+    done, refused = Counter(), 0
+    for seed in range(30):
+        n_worlds = 1 + 2 * (seed % 3 > 0)
+        places, task, training, first, rules, protocol = drawn_cases(kernel, seed, n_worlds)
+        seeds = [first + w for w in range(n_worlds)]
+        schedule = ("by_world", "by_chunk")[seed % 2]
+        try:
+            colony = Colony(places, task, training, seeds, **rules, schedule=schedule)
+            timetable = Timetable(colony, protocol, TICKS)
+        except AntsError:
+            continue
+        plains = [
+            ReferenceColony(place, task, training, one, **rules)
+            for place, one in zip(places, seeds, strict=True)
+        ]
+        twins = [Protocol(plain, protocol) for plain in plains]
+        try:
+            for _ in range(2):
+                colony.begin_episode(TICKS)
+                for twin in twins:
+                    twin.begin_episode()
+                with timetable:
+                    for tick in range(TICKS):
+                        for _ in timetable.pieces(colony._stepper, 1):
+                            pass
+                        for w, (plain, twin) in enumerate(zip(plains, twins, strict=True)):
+                            twin.before_tick()
+                            plain.tick(last=tick == TICKS - 1)
+                            assert_equal(colony, plain, w)
+                colony.end_episode()
+                for twin in twins:
+                    twin.end_episode()
+            done.update(one.path for event in protocol for one in event.interventions)
+        except AntsError:
+            refused += 1
+    expected = {"remove_ants", "add_ants", "ants", "clear", "move", "place", "trail", "task"}
+    expected |= {"epsilon", "learning_rate" if kernel[1] != "frozen" else "policy"}
+    assert refused < 12
+    assert expected <= done.keys(), done
+
+
+FORAGING = foraging().but(life={"regrowth": 0})
+PROTOCOL = [
+    At(60, remove_ants=0.5),
+    Every(40, start=50, stop=130, trail=0),
+    When("deliveries", above=2, place={"what": "rock", "cells": [[0, 5, 5], [5, 5, 0]]}),
+    When("living", below=15, add_ants=3, once=False, interval=30),
+    At(120, policy="random", task={"pheromone.level": 100}, epsilon=0.2),
+]
+
+
+def followers(seeds, schedule=None, world=None):
+    """Colonies that follow the hand-written policy."""
+    given = world or worlds.paper(), FORAGING, FOLLOWS, seeds
+    rules = {"ants": 20, "sharing": "frozen", "q_values": trail_follower("ants")}
+    return Colony(*given, **rules, schedule=schedule)
+
+
+def test_runs_with_a_protocol_do_not_depend_on_other_worlds_or_the_schedule():
+    every = followers(range(4)).run(2, 160, protocol=PROTOCOL)
+    assert followers(range(4), "by_chunk").run(2, 160, protocol=PROTOCOL) == every
+    for seed in (0, 3):
+        alone = followers([seed]).run(2, 160, protocol=PROTOCOL)
+        for name, array in vars(alone).items():
+            if isinstance(array, np.ndarray):
+                assert np.array_equal(array[:, 0], getattr(every, name)[:, seed]), name
+        given = (worlds.paper(), FORAGING, FOLLOWS, seed, 20)
+        plain = ReferenceColony(*given, sharing="frozen", q_values=trail_follower("ants"))
+        records = Protocol(plain, PROTOCOL).run(2, 160)
+        for name in ("deliveries", "first_delivery", "moves", "blocked"):
+            assert [getattr(one, name) for one in records] == getattr(alone, name)[:, 0].tolist()
+
+
+def test_a_run_leaves_no_trace_of_its_protocol():
+    colony, other = followers(range(3)), followers(range(3))
+    colony.run(1, 160, protocol=PROTOCOL)
+    assert (colony.task, colony.epsilon) == (other.task, other.epsilon)
+    assert np.array_equal(colony.q_values, other.q_values)
+    colony.begin_episode()
+    other.begin_episode()
+    for name in ("walls", "closer", "ground"):
+        assert np.array_equal(colony.arrays[name], other.arrays[name]), name
+    assert followers([5]).run(2, 90) == followers([5]).run(2, 90, protocol=[])
+
+
+def test_half_of_the_ants_are_removed_and_food_is_added_in_each_episode():
+    colony = followers(range(3))
+    found = colony.run(2, 50, protocol=[At(20, remove_ants=0.5), At(30, remove_ants=1)])
+    assert (found.living == 9).all()
+    cells = [[1, 2, 0], [1, 3, 0]]
+    colony.run(1, 50, protocol=[At(10, place={"what": "food", "cells": cells})])
+    assert (colony.snapshot(1).ground[colony.grid.index(cells)] != OBSTACLE).all()
+    sources = colony.n_food_sources
+    colony.run(1, 50)
+    assert (sources, colony.n_food_sources) == (3, 3)
+
+
+def test_interventions_by_hand_change_the_worlds_that_are_named():
+    colony = followers(range(3))
+    colony.begin_episode()
+    cell = [3, 3, 0]
+    for one in ({"clear": [cell]}, {"place": {"what": "rock", "cells": [cell]}}):
+        from_dict(one).apply(Interventions(colony, worlds=[0, 2]))
+    from_dict({"remove_ants": 4}).apply(Interventions(colony, worlds=[1]))
+    grounds = [int(colony.snapshot(w).ground[colony.grid.index(cell)]) for w in range(3)]
+    assert grounds == [OBSTACLE, EMPTY, OBSTACLE]
+    assert colony.living.sum(axis=1).tolist() == [20, 16, 20]
+    for one in ({"epsilon": 0.5}, {"task": {"pheromone.level": 9}}, {"ants": 5}):
+        with pytest.raises(AntsError, match="the worlds of a colony share"):
+            from_dict(one).apply(Interventions(colony, worlds=[1]))
+    everywhere = Interventions(colony)
+    everywhere.put(colony.grid.index([[4, 4, 0]]), FOOD)
+    from_dict({"ants": 9}).apply(everywhere)
+    everywhere.begin_episode()
+    assert colony.living.sum(axis=1).tolist() == [9, 9, 9]
+    # Later episodes start with the changes of the object that begins them.
+    cells = colony.grid.index([cell, [4, 4, 0]])
+    now = [colony.snapshot(w).ground[cells].tolist() for w in range(3)]
+    assert now == [[EMPTY, FOOD]] * 3
+
+
+def test_a_policy_comes_from_a_file_a_name_or_a_table(tmp_path):
+    table = random_policy("ants")
+    save_policy(tmp_path / "p.npz", table, {}, "ants")
+    found = [
+        followers([1]).run(1, 80, protocol=At(20, policy=one))
+        for one in (str(tmp_path / "p.npz"), "random", table)
+    ]
+    assert found[0] == found[1] == found[2]
+    one, two = (At(20, policy=table + k) for k in (0, 1))
+    assert one != two
+    assert hash(one) == hash(At(20, policy=table))
+    assert one.as_dict()["policy"].keys() == {"source", "sha256"}
+
+
+WRONG = [
+    (lambda: At(1), "`at` has no intervention; give one or more of remove_ants"),
+    (lambda: At(-1, trail=0), "`at.tick` is -1; it must be between"),
+    (lambda: At(3, remove_ants=1.5), "`remove_ants.share` is 1.5; it must be between 0 and 1"),
+    (lambda: At(3, remove_ants={"shar": 1}), "`remove_ants.shar` is not a setting; choose share"),
+    (lambda: At(3, remove_ants=True), "`at.remove_ants` is True; it must be a number of ants"),
+    (lambda: At(3, remove_ants={"number": 1, "share": 0.5}), "has number and share; give one of"),
+    (lambda: At(3, place={"cells": [[1, 2, 3]]}), "`place.what` is missing; add it"),
+    (lambda: At(3, place={"what": "lava", "cells": [[1, 2, 3]]}), "`place.what` is 'lava'"),
+    (lambda: At(3, clear=[[1, 2]]), "`clear.cells` has the cell [1, 2]; a cell is three"),
+    (lambda: At(3, clear=[]), "`clear.cells` is empty; give at least one cell"),
+    (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` has 1 cells; give the cell to move from"),
+    (lambda: At(3, policy="nix"), "`policy` is 'nix'; it must be one of random, trail_follower"),
+    (lambda: At(3, task={"pheromone.levl": 3}), "`task.pheromone.levl` is not a setting; choose"),
+    (lambda: At(3, task="following"), "`at.task` is 'following'; it must be a table of settings"),
+    (lambda: At(3, epsilon=2), "`epsilon.value` is 2; it must be between 0 and 1"),
+    (lambda: Every(0, trail=0), "`every.ticks` is 0; it must be between 1 and"),
+    (lambda: Every(5, stop=2, trail=0), "`every.stop` is 2, before the first event"),
+    (lambda: When("height", above=3, trail=0), "'height'"),
+    (lambda: When("living", trail=0), "`when` needs a bound"),
+    (lambda: from_dict({"explode": 1}), "the name of an intervention is 'explode'"),
+    (lambda: from_dict(3), "an intervention is 3; it must be a table"),
+]
+WRONG_IN_A_RUN = [
+    (3, "protocol is 3; it must be a list of At, Every and When"),
+    (At(100, trail=0), "`at.tick` is 100, but episodes have 100 ticks; choose at most 99"),
+    (At(9, clear=[[99, 0, 0]]), "(99, 0, 0) is outside"),
+    (At(9, task={"observation": "paper"}), "cannot change its observation in an episode"),
+    (At(9, add_ants=5), "after 9 ticks, 5 ants cannot join 20 ants, because the capacity"),
+    (When("living", above=3, epsilon=0.3), "`when.epsilon` would change all 2 worlds"),
+    (At(9, learning_rate=0.3), "the ants do not learn"),
+    (At(9, place={"what": "queen", "cells": [[9, 0, 0]]}), "the queen cannot move to cell"),
+]
+
+
+@pytest.mark.parametrize(("make", "said"), WRONG, ids=[said for _, said in WRONG])
+def test_wrong_events_are_refused_in_one_sentence(make, said):
+    with pytest.raises(AntsError) as caught:
+        make()
+    assert said in str(caught.value)
+    assert str(caught.value).endswith(".")
+
+
+def test_wrong_protocols_are_refused_in_one_sentence():
+    colony = followers(range(2))
+    for protocol, said in WRONG_IN_A_RUN:
+        with pytest.raises(AntsError) as caught:
+            colony.run(1, 100, protocol=protocol)
+        assert said in str(caught.value)
+        assert str(caught.value).endswith(".")
+        assert colony.epsilon == 0.05
+    learns = Colony(worlds.paper(), FORAGING, TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0))
+    with pytest.raises(AntsError, match="do not follow a policy"):
+        learns.run(1, 100, protocol=At(3, policy="random"))

@@ -1,0 +1,110 @@
+"""Random protocols for small worlds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from taichi_ants import AntsError, World
+from taichi_ants.learners.policies import FOLLOWED
+from taichi_ants.protocol import EVENTS, Event
+from taichi_ants.task import Task
+from taichi_ants.task.constants import EMPTY
+
+KINDS = (
+    *("remove_ants", "add_ants", "ants", "clear", "move", "place", "place", "trail"),
+    *("task", "epsilon"),
+)
+SHARED = ("task", "epsilon", "learning_rate")  # by the worlds of a colony
+
+
+def random_protocol(
+    rng: np.random.Generator,
+    world: World,
+    task: Task,
+    capacity: int,
+    ticks: int,
+    worlds: int,
+    learns: bool,
+) -> list[Event]:
+    """Return random events that are valid by themselves; a world may still not allow them."""
+    events: list[Event] = []
+    follows = not learns and task.observation in FOLLOWED
+    kinds = [*KINDS, *(["learning_rate"] if learns else []), *(["policy"] if follows else [])]
+    while len(events) < 4:
+        kind = str(rng.choice(list(EVENTS)))
+        when: dict[str, Any] = {"tick": int(rng.integers(ticks))}
+        if kind == "every":
+            when = {"ticks": int(rng.integers(1, 6)), "start": int(rng.integers(ticks))}
+            when |= {"stop": when["start"] + 5} if rng.random() < 0.5 else {}
+        elif kind == "when":
+            bound = str(rng.choice(["above", "below"]))
+            measure = str(rng.choice(["deliveries", "living"]))
+            when = {"measure": measure, bound: float(rng.integers(-1, 7))}
+            when |= {"interval": int(rng.integers(1, 5)), "once": bool(rng.random() < 0.5)}
+        names = rng.choice(kinds, int(rng.integers(1, 3)), replace=False).tolist()
+        if kind == "when" and worlds > 1:
+            names = [name for name in names if name not in SHARED]
+        try:
+            changes = {name: _intervention(rng, name, world, task, capacity) for name in names}
+            events.append(EVENTS[kind].from_dict({**when, **changes}))
+        except AntsError:
+            continue
+    return events
+
+
+def _intervention(
+    rng: np.random.Generator, name: str, world: World, task: Task, capacity: int
+) -> Any:
+    ground, grid = world.ground(), world.grid
+    there = grid.cells(np.flatnonzero(grid.exists))
+    some = rng.permutation(there)[: rng.integers(1, 5)].tolist()
+    free = grid.cells(np.flatnonzero((ground == EMPTY) & grid.exists)).tolist()
+    full = grid.cells(np.flatnonzero((ground != EMPTY) & grid.exists)).tolist()
+    if name in ("remove_ants", "add_ants"):
+        most = 1.0 if name == "remove_ants" else 0.3
+        amounts = [int(rng.integers(0, 4)), float(rng.uniform(0, most)), {"cells": some}]
+        amount = amounts[int(rng.integers(3))]
+        if name == "add_ants" and isinstance(amount, dict) and rng.random() < 0.5:
+            amount["heading"] = int(rng.integers(6))
+        return amount
+    if name == "ants":
+        return int(rng.integers(1, capacity + 1))
+    if name == "move":
+        return [full[rng.integers(len(full))], free[rng.integers(len(free))]]
+    if name == "place":
+        what = str(rng.choice(["rock", "food", "food", "queen"]))
+        return {"what": what, "cells": [free[rng.integers(len(free))]] if what == "queen" else some}
+    if name == "trail":
+        level = int(rng.choice([0, 1, 20, 250]))
+        return level if rng.random() < 0.3 else {"level": level, "cells": some}
+    if name == "task":
+        return _change(rng, task)
+    if name == "policy":
+        return str(rng.choice(["random", "trail_follower"]))
+    return some if name == "clear" else float(rng.random())
+
+
+def _change(rng: np.random.Generator, task: Task) -> dict[str, Any]:
+    """Return new numbers of a task, with the same kernels."""
+    trail, life = task.pheromone, task.life
+    able: list[tuple[str, Any]] = [
+        ("rewards.empty", int(rng.integers(-3, 4))),
+        ("turns_at_queen", bool(rng.random() < 0.5)),
+        ("delivery", str(rng.choice(["terminates", "truncates"]))),
+        ("pheromone.deposit", "none" if trail.deposit == "none" else "set"),
+    ]
+    if trail.deposit != "none":
+        able.append(("pheromone.level", int(rng.integers(1, 100))))
+    if not trail.dense:
+        able += [("evaporation_in_training", False), ("evaporation_in_evaluation", True)]
+    if trail.diffusion:
+        able.append(("pheromone.diffusion", float(rng.uniform(0.1, 1))))
+    if trail.half_life:
+        able.append(("pheromone.half_life", float(rng.uniform(0.5, 20))))
+    if life.lifespan:
+        able.append(("life.lifespan", int(rng.integers(1, 40))))
+    if life.wander:
+        able += [("life.wander", int(rng.integers(1, 9))), ("life.regrowth", 2)]
+    return dict([able[int(rng.integers(len(able)))]])
