@@ -29,6 +29,7 @@ from taichi_ants.task.pheromone import MAX_DEPOSIT
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.interventions import Interventions
+    from taichi_ants.grid.hexgrid import AxialGrid
 
 One = TypeVar("One", bound="Record")
 _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
@@ -83,10 +84,9 @@ class Intervention(Record):
     form = "a table of settings"
     in_all_worlds: ClassVar[bool] = False  # because the worlds of a colony share what it changes
 
-    @property
-    def all_cells(self) -> Sequence:
-        """All cells in the settings."""
-        return getattr(self, "cells", None) or ()
+    def check_in(self, grid: AxialGrid, task: Task) -> None:
+        """Raise an AntsError if the change is impossible in worlds with this grid and task."""
+        indices(grid, getattr(self, "cells", None) or ())
 
     def apply(self, to: Interventions) -> None:
         """Apply the change; AntsError if a world does not allow it."""
@@ -295,6 +295,9 @@ class TaskNumbers(Intervention, path="task"):
         """Return the task with the new values."""
         return task.but(**nested(dict(self.values)))
 
+    def check_in(self, grid: AxialGrid, task: Task) -> None:
+        self.changed(task)
+
     def apply(self, to: Interventions) -> None:
         to.set_task(self.changed(to.colony.task))
 
@@ -371,6 +374,9 @@ class Policy(Intervention, path="policy"):
         table = NAMED[self.source](task.observation) if self.table is None else self.table
         return checked_values(table, task)
 
+    def check_in(self, grid: AxialGrid, task: Task) -> None:
+        self.table_for(task)
+
     def apply(self, to: Interventions) -> None:
         to.set_policy(self.table_for(to.colony.task))
 
@@ -404,6 +410,23 @@ def from_dict(facts: Any) -> Intervention:
     ((name, settings),) = facts.items()
     check_one_of("the name of an intervention", name, tuple(INTERVENTIONS))
     return INTERVENTIONS[name].from_dict(settings)
+
+
+def indices(grid: AxialGrid, cells: Sequence[Any]) -> np.ndarray:
+    """Return the flat indices of cells or of flat indices, without duplicates.
+
+    AntsError if a cell does not exist.
+    """
+    found: list[int] = []
+    for cell in cells:
+        flat = int(cell if np.ndim(cell) == 0 else grid.index(cell))
+        if not 0 <= flat < grid.size or not grid.exists[flat]:
+            raise AntsError(
+                f"the cell {cell} is outside the world; choose a cell within the ranges "
+                f"{grid.ranges}."
+            )
+        found.append(flat)
+    return np.array(list(dict.fromkeys(found)), np.int64)
 
 
 def _checked_cells(path: str, cells: Sequence) -> tuple:

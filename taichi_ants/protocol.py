@@ -66,6 +66,15 @@ class Event(Record):
         several = (getattr(self, one.name) for one in fields(Event))
         return tuple(one for one in several if one is not None)
 
+    @property
+    def in_all_worlds(self) -> bool:
+        """Whether worlds of a colony share what an intervention changes."""
+        return any(one.in_all_worlds for one in self.interventions)
+
+    def facts(self) -> dict[str, Any]:
+        """Return the kind of the event and its settings, JSON-compatible."""
+        return {self.path: self.as_dict()}
+
     def times(self, length: int) -> range:
         """Return the ticks of an episode at which the event can happen, after that many ticks.
 
@@ -173,7 +182,11 @@ def checked_protocol(protocol: Any) -> tuple[Event, ...]:
 
 
 def read(tables: Mapping[str, Sequence[Any]]) -> tuple[Event, ...]:
-    """Return the events of lists of tables by the names in `EVENTS`; those of `at` come first."""
+    """Return the events of lists of tables by the names in `EVENTS`; those of `at` come first.
+
+    Raises:
+        AntsError: A setting is not allowed; the message names the table by its number, from 1.
+    """
     return tuple(
         _event(kind, table, number)
         for name, kind in EVENTS.items()

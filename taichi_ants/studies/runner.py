@@ -20,6 +20,7 @@ import numpy as np
 from taichi_ants import __version__, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.protocol import Event, When, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.studies import blocks
 from taichi_ants.studies.blocks import Outcome, kept
@@ -39,6 +40,8 @@ _NUMBERS_OF_A_BLOCK = 1 << 26  # of four bytes, for colonies, at most, unless on
 _NUMBERS_OF_AN_ANT, _NUMBERS_OF_A_CELL = 13, 4  # upper bounds
 _RUN_ARRAYS = ("returns", "steps", "deliveries")
 _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
+
+DURING = ("evaluation", "training", "both")
 
 Progress = Callable[[float], None]
 
@@ -143,6 +146,8 @@ class ColonyPoint:
         episodes: The number of training episodes; with 0, ants follow the table of `after`.
         ticks: The length of each episode of training and evaluation.
         after: The point from whose shared table learning starts; None means the initial values.
+        protocol: Events with interventions, see `taichi_ants.protocol`.
+        during: When they happen: in each episode of the "evaluation", the "training", or "both".
 
     Raises:
         AntsError: A value is not allowed.
@@ -160,6 +165,8 @@ class ColonyPoint:
     ticks: int = 1000
     rollouts: int = 4
     after: ColonyPoint | None = None
+    protocol: tuple[Event, ...] = ()
+    during: str = "evaluation"
 
     def __post_init__(self) -> None:
         (config,) = checks.checked_configs(self.training)
@@ -171,6 +178,13 @@ class ColonyPoint:
         checked_whole("episodes", self.episodes, least=0 if self.after else 1)
         checked_whole("ticks", self.ticks, most=MAX_STEPS)
         checked_whole("rollouts", self.rollouts)
+        object.__setattr__(self, "protocol", checked_protocol(self.protocol))
+        check_one_of("during", self.during, DURING)
+        grid = (self.world[0] if isinstance(self.world, tuple) else self.world).grid
+        for event in self.protocol:
+            event.times(self.ticks)
+            for one in event.interventions:
+                one.check_in(grid, self.task)
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
             raise AntsError(
                 "`after` has no shared table; it must be a point with sharing='shared' and at "
@@ -182,6 +196,8 @@ class ColonyPoint:
     @property
     def runs_of_a_block(self) -> int:
         """The number of seeds of a block, whose colonies run together, as memory allows."""
+        if any(isinstance(one, When) and one.in_all_worlds for one in self.protocol):
+            return 1  # a condition of one world must not change what all share
         world = self.world[0] if isinstance(self.world, tuple) else self.world
         slots, states = self.capacity or self.ants, self.task.n_states
         memory = learners.get(self.training.learner).memory_for(self.training, states)
@@ -199,6 +215,10 @@ class ColonyPoint:
     def bytes_of_a_run(self) -> int:
         """The approximate upper bound on the bytes of one seed's outcome on disk."""
         return 8 * len(_COLONY_ARRAYS) * self.rollouts + 4 * self.task.n_states * N_ACTIONS
+
+    def events(self, learns: bool) -> tuple[Event, ...]:
+        """Return the events of episodes of training or, if not `learns`, of the evaluation."""
+        return self.protocol if self.during in ("both", DURING[learns]) else ()
 
     def places(self, seeds: Sequence[int]) -> list[list[World]] | None:
         """Return the world of each training episode and seed; None without a pool."""
@@ -243,10 +263,12 @@ class ColonyPoint:
             learning = point.colony(
                 places[0] if places else point.world, seeds, learned, True, **where
             )
-            learning.run(point.episodes, point.ticks, _part(progress, 0.0, share), places)
+            part, protocol = _part(progress, 0.0, share), point.events(learns=True)
+            learning.run(point.episodes, point.ticks, part, places, protocol=protocol)
             tables = learning.q_values
         colony = point.colony(point.world, seeds, tables, False, **where)
-        episodes = colony.run(point.rollouts, point.ticks, _part(progress, share, 1 - share))
+        part, protocol = _part(progress, share, 1 - share), point.events(learns=False)
+        episodes = colony.run(point.rollouts, point.ticks, part, protocol=protocol)
         outcome = {name: files.smallest(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
         if point.episodes and point.sharing == "shared":
             outcome["q_values"] = tables
@@ -432,6 +454,9 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
         found = {field.name: getattr(point, field.name) for field in fields(point)}
         found |= {name: worlds.index(found[name]) for name in ("world", "pool") if found.get(name)}
         found |= {"after": points.index(point.after)} if point.after else {}
+        protocol, during = found.pop("protocol", ()), found.pop("during", "")
+        if protocol:
+            found |= {"protocol": [event.facts() for event in protocol], "during": during}
         return flat({**found, "task": point.task.as_dict(), "training": point.training.as_dict()})
 
     rows = [facts(point) for point in points]

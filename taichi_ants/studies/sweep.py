@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants import checks, files, learners, worlds
+from taichi_ants import checks, files, learners, protocol, worlds
 from taichi_ants.analysis import sweeps
 from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
@@ -28,7 +28,14 @@ from taichi_ants.task import Task
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
 _OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
-_PARTS = ("world", "task", "training", "after", "pool")  # attributes of points, not settings
+_PARTS = (
+    "world",
+    "task",
+    "training",
+    "after",
+    "pool",
+    "protocol",
+)  # attributes of points, not settings
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
@@ -171,6 +178,17 @@ def _sweep(file: Settings) -> Sweep:
     for name in wanted:
         check_one_of("measures", name, tuple(measures))
     _check_once("measures", wanted)
+    for name in protocol.EVENTS:
+        if isinstance(file.get(name), dict):
+            raise AntsError(f"[{name}] is one table; write [[{name}]] in double brackets.")
+    numbered = {
+        name: {str(n): event for n, event in enumerate(events, start=1)}
+        for name, events in file.items()
+        if name in protocol.EVENTS and _are_tables(events)
+    }
+    if numbered and kind != "colony":
+        raise AntsError(f"[[{next(iter(numbered))}]] is for kind 'colony'; leave it out.")
+    file = {**file, **numbered}  # so that [vary] can name the settings of an event: at.1.tick
     fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
     grids = [_grid(grid, fixed) for grid in _listed(file.get("vary", []))]
     if not grids:
@@ -203,6 +221,10 @@ def _sweep(file: Settings) -> Sweep:
     ends = list(itertools.accumulate(map(len, grids), initial=0))
     parts = tuple(map(slice, ends, ends[1:]))
     return Sweep(kind, Study(points, seeds), rows, parts, tuple(wanted), against, margin)
+
+
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, dict) for one in value) and bool(value)
 
 
 def _listed(value: Any) -> list:
@@ -249,6 +271,7 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
         *(one.path for one in (*declared(TrainingConfig), *more)),
     ]
     named = "|".join(re.escape(one.path) for one in named_groups(Task)) or "-"
+    settings, events = _without_events(settings)
     for name in settings:
         # The world checks its settings, and named groups check theirs.
         if name not in known and not re.fullmatch(rf"world\.[^.]*|({named})\..*", name):
@@ -261,7 +284,19 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
     key = repr(sorted(world.items()))
     if key not in built:
         built[key] = _world(kind, world, seeds)
+    if events:
+        tree["protocol"] = protocol.read(events)
     return KINDS[kind](built[key], Task.from_dict(task), TrainingConfig(**training), **tree)
+
+
+def _without_events(settings: Settings) -> tuple[Settings, dict[str, list[Any]]]:
+    """Return the settings without those of events, and the tables of the events by kind."""
+    own = {k: v for k, v in settings.items() if re.match(r"(at|every|when)\.\d+\.", k)}
+    tables = {
+        kind: [table for _, table in sorted(events.items(), key=lambda one: int(one[0]))]
+        for kind, events in nested(own).items()
+    }
+    return {k: v for k, v in settings.items() if k not in own}, tables
 
 
 def _own(kind: str) -> list[str]:

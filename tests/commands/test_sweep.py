@@ -422,3 +422,68 @@ def test_what_observations_gain_is_asked_of_all_of_them():
     for grid in asked.grids:
         seen = {one["task.observation"] for one in asked.settings[grid]}
         assert seen == set(observations.names())
+
+
+EVENTS = """
+[[at]]
+tick = 20
+trail = 0
+
+[[every]]
+ticks = 15
+add_ants = 1
+
+[[when]]
+measure = "living"
+below = 4
+epsilon = 0.5
+"""
+PROTOCOL = COLONY.replace("[vary]", f"{EVENTS}\n[vary]\nat.1.remove_ants = [0.0, 0.5]").replace(
+    "ants = 4", 'ants = 4\ncapacity = 12\nduring = "both"'
+)
+
+
+def test_a_protocol_is_part_of_the_points_of_a_sweep(sweep, tmp_path):
+    text = PROTOCOL.replace("[5, 10, 20]", "[5]")
+    status, _, err = sweep(text, "--no-figures")
+    assert (status, err) == (0, "")
+    rows = read_csv("results/sweep-my/runs.csv")
+    assert [row["at.1.remove_ants"] for row in rows] == ["0.0", "0.0", "0.5", "0.5"]
+    point = read_sweep(Path("my.toml")).study.points[1]
+    assert point.during == "both"
+    assert point.runs_of_a_block == 1  # because epsilon belongs to all worlds of a colony
+    for seed in (0, 1):
+        learning = point.colony(point.world[seed], [seed], None, True)
+        learning.run(2, 60, protocol=point.protocol)
+        colony = point.colony(point.world[seed], [seed], learning.q_values, False)
+        found = colony.run(2, 60, protocol=point.protocol).deliveries.mean() * 1000 / 60
+        assert float(rows[2 + seed]["deliveries"]) == pytest.approx(found)
+    facts = json.loads(Path("results/sweep-my/manifest.json").read_text("utf-8"))["settings"]
+    assert facts["protocol"][1][0]["at"]["remove_ants"] == {"share": 0.5}
+
+
+WRONG_EVENTS = {
+    "tick": ("tick = 20", "tick = 60", ["`at.tick` is 60, but episodes have 60 ticks"]),
+    "name": ("trail = 0", "trial = 0", ["in [[at]] number 1, `at.trial` is not a setting"]),
+    "share": ("[0.0, 0.5]", "[0.0, 1.5]", ["`remove_ants.share` is 1.5"]),
+    "cells": ("trail = 0", "clear = [[99, 0, 0]]", ["(99, 0, 0) is outside a world"]),
+    "cell": ("trail = 0", "clear = [[9, 0]]", ["`clear.cells` has the cell [9, 0]"]),
+    "no cells": ("trail = 0", 'place.what = "rock"', ["`place.cells` is missing; add it"]),
+    "measure": ('"living"', '"height"', ["in [[when]] number 1", "'height'"]),
+    "during": ('"both"', '"day"', ["during is 'day'; it must be one of evaluation, training"]),
+    "one table": ("[[every]]", "[every]", ["write [[every]] in double brackets"]),
+    "number": ("at.1.remove", "at.2.remove", ["in [[at]] number 2, `at.tick` is missing"]),
+    "kind": ('kind = "colony"', 'kind = "runs"', ["is for kind 'colony'"]),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_EVENTS)
+def test_mistakes_in_events_end_in_one_sentence(name, sweep):
+    old, new, words = WRONG_EVENTS[name]
+    text = PROTOCOL.replace('"deliveries"', '"greedy_deliveries"') if name == "kind" else PROTOCOL
+    assert old in text
+    status, out, err = sweep(text.replace(old, new, 1))
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    for word in words:
+        assert word in err

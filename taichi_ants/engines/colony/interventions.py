@@ -35,6 +35,7 @@ from taichi_ants.grid.constants import (
 )
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
+from taichi_ants.interventions import indices
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.worlds.world import World
@@ -105,16 +106,7 @@ class Interventions:
 
         AntsError if a cell does not exist.
         """
-        grid, found = self.colony.grid, []
-        for cell in cells:
-            flat = int(cell if np.ndim(cell) == 0 else grid.index(cell))
-            if not 0 <= flat < grid.size or not grid.exists[flat]:
-                raise AntsError(
-                    f"the cell {cell} is outside the world; choose a cell within the ranges "
-                    f"{grid.ranges}."
-                )
-            found.append(flat)
-        return np.array(list(dict.fromkeys(found)), np.int64)
+        return indices(self.colony.grid, cells)
 
     def everywhere(self) -> np.ndarray:
         """Return the flat indices of all cells."""

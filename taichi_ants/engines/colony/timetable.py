@@ -54,8 +54,7 @@ class Timetable:
                     colony.check_same_kernels(one.changed(colony.task))
                 if isinstance(one, Policy):
                     interventions.check_follow()
-                    one.table_for(colony.task)
-                interventions.index(one.all_cells)
+                one.check_in(colony.grid, colony.task)
 
     def __enter__(self) -> None:
         colony = self._colony
