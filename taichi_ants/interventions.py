@@ -75,7 +75,14 @@ class Record(Settings):
         found = {one.name: getattr(self, one.name) for one in declared(type(self))}
         usual = {one.name: one.default for one in declared(type(self))}
         found = {name: value for name, value in found.items() if value != usual[name]}
-        return {k: v.as_dict() if isinstance(v, Record) else v for k, v in found.items()}
+        return {name: _plain(value) for name, value in found.items()}
+
+
+def _plain(value: Any) -> Any:
+    """Return a value of a setting in the form that JSON has for it."""
+    if isinstance(value, Record):
+        return value.as_dict()
+    return [_plain(one) for one in value] if isinstance(value, tuple) else value
 
 
 class Intervention(Record):
@@ -83,6 +90,10 @@ class Intervention(Record):
 
     form = "a table of settings"
     in_all_worlds: ClassVar[bool] = False  # because the worlds of a colony share what it changes
+
+    def facts(self) -> dict[str, Any]:
+        """Return the name and the settings, JSON-compatible; see `from_dict`."""
+        return {self.path: self.as_dict()}
 
     def check_in(self, grid: AxialGrid, task: Task) -> None:
         """Raise an AntsError if the change is impossible in worlds with this grid and task."""

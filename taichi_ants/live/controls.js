@@ -65,7 +65,7 @@ class Controls {
       event.preventDefault();
       if (!this.holds && live.open) this.anew("undo"); // the server refuses if there is nothing to undo
     });
-    on("next-episode", "click", () => live.edit({ kind: "episode" }, live.nextStroke()));
+    on("next-episode", "click", () => live.edit({ episode: {} }, live.nextStroke()));
     on("files", "click", (event) => {
       const kind = event.target.dataset.export;
       if (!kind) return;
@@ -346,7 +346,8 @@ class Controls {
     clearTimeout(this.timer);
     this.timer = null;
     const { sliding } = this, value = sliding.type === "range" ? sliding.valueAsNumber : Number(sliding.checked);
-    this.live.edit({ kind: "set", name: sliding.dataset.name, value }, this.stroke);
+    const { path, edits } = this.live.state.values[sliding.dataset.name], [name, ...rest] = path.split(".");
+    this.live.edit(edits ? edits[value] : { [name]: rest.length ? { [rest.join(".")]: value } : value }, this.stroke);
   }
 
   /* Request another session, or an undo; send pending edits first. */

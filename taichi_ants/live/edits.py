@@ -1,18 +1,8 @@
-"""Edits: interventions in a running colony, in the form in which pages send them.
+"""Edits: the interventions that pages send, and the numbers that their sliders change.
 
-Each edit is a JSON-compatible dict::
-
-    {"kind": "ground", "what": "empty", "rock" or "food", "cells": [...]}
-    {"kind": "trail", "level": number, "cells": [...]}
-    {"kind": "add_ants", "cells": [...], "heading": 0 to 5, or None for random headings}
-    {"kind": "remove_ants", "cells": [...]}
-    {"kind": "queen", "cell": cell}
-    {"kind": "set", "name": one of `values`, "value": number}
-    {"kind": "episode"}, which ends the episode and begins the next one
-
-Cells are flat indices. An edit has no effect on cells that do not allow it: the queen's cell for
-ground, rock for trails, and all but empty cells for ants. Rock and food move ants aside. See
-`taichi_ants.engines.colony.interventions` for details, and for changes that last.
+An edit is JSON, a mapping from the name of an intervention to its settings or its short form, see
+`taichi_ants.interventions`. Its cells are flat indices. Pages may send the interventions of
+`ALLOWED`; "episode" ends the episode and begins the next one.
 """
 
 from __future__ import annotations
@@ -21,68 +11,78 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-import numpy as np
-
+from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
-from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.interventions import Intervention
 from taichi_ants.task import Pheromone
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
-from taichi_ants.task.pheromone import MAX_DEPOSIT
+from taichi_ants.task.constants import EMPTY
 
 Edit = dict[str, Any]
-
-_GROUNDS = {"empty": EMPTY, "rock": OBSTACLE, "food": FOOD}
-_FIELDS = {
-    "ground": ("what", "cells"),
-    "trail": ("level", "cells"),
-    "add_ants": ("cells", "heading"),
-    "remove_ants": ("cells",),
-    "queen": ("cell",),
-    "set": ("name", "value"),
-    "episode": (),
-}
+# All but "policy", because a page must not name files.
+ALLOWED = tuple(name for name in language.INTERVENTIONS if name != "policy")
 
 
 class Value(NamedTuple):
-    """A number that the edit "set" can change."""
+    """A number that a slider shows and changes."""
 
     value: float  # at present
     least: float
     most: float
-    step: float  # of a slider; if it is an int, only whole numbers are allowed
+    step: float  # of the slider; if it is an int, all values are whole numbers
+    path: str  # the name of the intervention, for "task" followed by that of the setting
+    edits: Mapping[str, Edit] | None = None  # the edits for "0" and "1", for a switch
 
 
 def values(interventions: Interventions) -> dict[str, Value]:
-    """Return the values that "set" can change in a colony, by name, if they have an effect there.
+    """Return the values of the sliders for a colony, by name, if they have an effect there.
 
-    - ants: the number of living ants; if set, also the number at the start of later episodes.
-    - epsilon, learning_rate: if set, they no longer decay.
+    - ants: the number of living ants, and if changed, also at the start of later episodes.
+    - epsilon, learning_rate: if changed, they no longer decay.
     - deposit: the `level` of `Pheromone`; slope, cap, half_life, diffusion: as in `Pheromone`.
     - evaporation: 1 if trails evaporate, else 0.
     """
     colony, pheromone = interventions.colony, interventions.colony.pheromone
     found = {
-        "ants": Value(max(interventions.living, 1), 1, colony.capacity, 1),
-        "epsilon": Value(colony.epsilon, 0.0, 1.0, 0.01),
+        "ants": Value(max(interventions.living, 1), 1, colony.capacity, 1, "ants"),
+        "epsilon": Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon"),
     }
     if colony.sharing != "frozen":
-        found["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001)
+        found["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001, "learning_rate")
     if pheromone.deposit != "none":
-        found["deposit"] = Value(int(pheromone.level), 1, max(1000, int(pheromone.level)), 1)
+        found["deposit"] = Value(
+            int(pheromone.level), 1, max(1000, int(pheromone.level)), 1, _path("level")
+        )
     for name, usual in (("slope", 100), ("cap", 10_000)):
         if (number := getattr(pheromone, name)) is not None:
-            found[name] = Value(int(number), 1, max(usual, int(number)), 1)
+            found[name] = Value(int(number), 1, max(usual, int(number)), 1, _path(name))
     falls = pheromone.evaporation != "none"
     if _with_evaporation(interventions, not falls)[0].dense == pheromone.dense:
-        found["evaporation"] = Value(int(falls), 0, 1, 1)
+        edits = {str(n): _switch(interventions, n == 1) for n in (0, 1)}
+        found["evaporation"] = Value(int(falls), 0, 1, 1, "task", edits)
     if pheromone.half_life is not None:
         half_life = float(pheromone.half_life)
-        found["half_life"] = Value(half_life, min(1.0, half_life), max(1000.0, half_life), 0.5)
+        found["half_life"] = Value(
+            half_life, min(1.0, half_life), max(1000.0, half_life), 0.5, _path("half_life")
+        )
     if pheromone.dense:  # integer trails cannot diffuse, and dense trails cannot become integers
         least = 0.0 if pheromone.evaporation == "exponential" else min(0.01, pheromone.diffusion)
-        found["diffusion"] = Value(float(pheromone.diffusion), float(least), 1.0, 0.01)
+        found["diffusion"] = Value(
+            float(pheromone.diffusion), float(least), 1.0, 0.01, _path("diffusion")
+        )
     return found
+
+
+def _path(name: str) -> str:
+    return f"task.pheromone.{name}"
+
+
+def _switch(interventions: Interventions, falls: bool) -> Edit:
+    """Return the edit that switches evaporation on (1 per tick if the task has none) or off."""
+    learns = interventions.colony.learns
+    flag = "evaporation_in_training" if learns else "evaporation_in_evaluation"
+    none = falls and interventions.colony.task.pheromone.evaporation == "none"
+    return {"task": {flag: falls, **({"pheromone.evaporation": "linear"} if none else {})}}
 
 
 def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pheromone, Pheromone]:
@@ -93,90 +93,38 @@ def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pherom
     return (pheromone if falls else pheromone.lasting), pheromone
 
 
-def checked(edit: object, interventions: Interventions) -> Edit:
-    """Return a validated copy of an edit; `apply` checks whether the world allows it.
+def checked(edit: object, interventions: Interventions) -> Intervention:
+    """Return the intervention of an edit; the world may still not allow it.
 
     Raises:
         AntsError: The edit is not valid; the message says why.
     """
     expect("an edit", edit, Mapping)
     assert isinstance(edit, Mapping)
-    kind: Any = edit.get("kind")
-    check_one_of("the kind of an edit", kind, tuple(_FIELDS))
-    wanted, given = {"kind", *_FIELDS[kind]}, set(edit)
-    if given != wanted:
+    if len(edit) != 1:
         raise AntsError(
-            f"an edit of kind {kind!r} has {shown(sorted(map(str, given)))}; it must have "
-            f"{', '.join(sorted(wanted))}."
+            f"an edit has the names {shown(list(edit))}; it must have the name of one intervention."
         )
-    fields = {name: _checked(name, edit, interventions) for name in _FIELDS[kind]}
-    return {"kind": kind, **fields}
+    ((name, settings),) = edit.items()
+    check_one_of("the name of an edit", name, ALLOWED)
+    if isinstance(settings, list):
+        settings = {"cells": settings}
+    if isinstance(settings, Mapping) and settings.get("cells") is not None:
+        _check_cells(settings["cells"], interventions)
+    one = language.from_dict({name: settings})
+    if one.facts().get("place", {}).get("what") == "queen":
+        (cell,) = settings["cells"]
+        if interventions.colony.arrays["ground"][cell] != EMPTY:
+            where = tuple(interventions.colony.grid.cells(cell).tolist())
+            raise AntsError(
+                f"the queen cannot move to cell {where}, because it is not empty; choose an empty "
+                "cell."
+            )
+    return one
 
 
-def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
-    """Apply an edit that `checked` returned; `length` is the length of an episode that it begins.
-
-    Raises:
-        AntsError: The world does not allow the edit; nothing has changed.
-    """
-    cells = np.array(edit.get("cells"))
-    match edit["kind"]:
-        case "ground":
-            interventions.put(cells, _GROUNDS[edit["what"]])
-        case "trail":
-            interventions.lay_trail(cells, edit["level"])
-        case "add_ants":
-            interventions.add_ants(cells, edit["heading"])
-        case "remove_ants":
-            interventions.remove_ants(cells)
-        case "queen":
-            interventions.move_queen(edit["cell"])
-        case "set":
-            _set(edit["name"], edit["value"], interventions)
-        case "episode":
-            interventions.begin_episode(length)
-
-
-def _set(name: str, value: Any, interventions: Interventions) -> None:
-    if name in ("ants", "epsilon", "learning_rate"):
-        getattr(interventions, f"set_{name}")(value)
-        return
-    task = interventions.colony.task
-    pheromone = task.pheromone
-    if name == "evaporation":
-        _, pheromone = _with_evaporation(interventions, value == 1)
-        learns = interventions.colony.sharing != "frozen"
-        flag = "evaporation_in_training" if learns else "evaporation_in_evaluation"
-        flags: dict[str, Any] = {flag: value == 1}
-        task = replace(task, **flags)
-    else:
-        numbers: dict[str, Any] = {"level" if name == "deposit" else name: value}
-        pheromone = replace(pheromone, **numbers)
-    interventions.set_task(replace(task, pheromone=pheromone))
-
-
-def _checked(name: str, edit: Mapping, interventions: Interventions) -> Any:
-    given = edit[name]
-    match name:
-        case "cells":
-            return _checked_cells(given, interventions)
-        case "cell":
-            return _checked_cells([given], interventions)[0]
-        case "level":
-            return checked_whole(name, given, 0, MAX_DEPOSIT)
-        case "heading" if given is not None:
-            return checked_whole(name, given, 0, N_HEADINGS - 1, ", or None")
-        case "value":  # the name has already been checked
-            return _number(edit["name"], given, values(interventions)[edit["name"]])
-        case "what":
-            check_one_of(name, given, tuple(_GROUNDS))
-        case "name":
-            check_one_of("the name of a value", given, tuple(values(interventions)))
-    return given
-
-
-def _checked_cells(cells: Any, interventions: Interventions) -> list[int]:
-    """Return cells of the world, in the given order and without duplicates."""
+def _check_cells(cells: Any, interventions: Interventions) -> None:
+    """Raise AntsError unless these are flat indices of cells of the world, in a list."""
     most, exists = interventions.colony.grid.count, interventions.colony.grid.exists
     if not isinstance(cells, list) or not 1 <= len(cells) <= most:
         raise AntsError(f"cells is {shown(cells)}; it must be a list of 1 to {most} cells.")
@@ -185,13 +133,3 @@ def _checked_cells(cells: Any, interventions: Interventions) -> list[int]:
             raise AntsError(
                 f"cells holds {shown(cell)}; each must be the flat index of a cell of this world."
             )
-    return list(dict.fromkeys(cells))
-
-
-def _number(name: str, value: Any, allowed: Value) -> float:
-    if isinstance(allowed.step, int):
-        return checked_whole(name, value, int(allowed.least), int(allowed.most))
-    if type(value) not in (int, float) or not allowed.least <= value <= allowed.most:
-        least, most = f"{allowed.least:g}", f"{allowed.most:g}"
-        raise AntsError(f"{name} is {shown(value)}; it must be a number from {least} to {most}.")
-    return float(value)

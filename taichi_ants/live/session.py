@@ -30,7 +30,7 @@ MOST_EDITS = 10_000
 MOST_CELLS = 400_000  # cells in all edits together
 # Sessions within these limits fit into `most`, so reading a file takes little time and memory.
 _WRITER = "Session.save, or Save on its page,"
-KIND = Kind("session", 3, _WRITER, most=5_000_000, most_lists=100_000)
+KIND = Kind("session", 4, _WRITER, most=5_000_000, most_lists=100_000)
 _PIECE = 0.02  # seconds of a piece of a replay
 _BETWEEN = 0.1  # seconds of simulation between snapshots, the longest replay of an undo
 _MOST_KEPT = 1 << 28  # bytes of all snapshots
@@ -39,8 +39,9 @@ _LARGEST = 1 << 26  # bytes of a colony above which there are no snapshots
 
 def cells_of(edit: Any) -> int:
     """Return the number of cells that an edit names, 0 if it names none."""
-    cells = edit.get("cells") if isinstance(edit, dict) else None
-    return len(cells) if isinstance(cells, list) else 0
+    settings = list(edit.values()) if isinstance(edit, dict) else []
+    lists = [one.get("cells") for one in settings if isinstance(one, dict)]
+    return sum(len(cells) for cells in lists if isinstance(cells, list))
 
 
 def check_room(n_edits: int, n_cells: int) -> None:
@@ -136,7 +137,8 @@ class Session:
         self._cells = 0  # cells in all edits
         self._snapshots: list[_Snapshot] = []
         self._spent = 0.0  # seconds of simulation so far
-        self.interventions.begin_episode(self._length)
+        self.interventions.length = self._length
+        self.interventions.begin_episode()
         self.colony.observe()  # has no effect, but compiles kernels for the first edit
         # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
@@ -192,7 +194,7 @@ class Session:
         progress = self._recorder.progress
         if self.ended:
             progress.note(ended=True)
-            self.interventions.begin_episode(self._length)
+            self.interventions.begin_episode()
             self.steps += 1
             return None
         n = min(n, self._length - self.colony.ticks if self._length else n)
@@ -219,15 +221,16 @@ class Session:
         return self._recorder.snapshot()
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
-        plain = edits.checked(edit, self.interventions)
+        one = edits.checked(edit, self.interventions)
+        plain = one.facts()
         check_room(len(self.edits) + 1, self._cells + cells_of(plain))
         begins = not (goes_on and self.changes)
         if begins:
             self._take_snapshot()
         began = time.perf_counter()
-        if plain["kind"] == "episode":
+        if "episode" in plain:
             self._recorder.progress.note(ended=True)
-        edits.apply(plain, self.interventions, self._length)
+        one.apply(self.interventions)
         if begins:
             self.changes.append(len(self.edits))
         self.edits.append((self.steps, plain))
@@ -252,8 +255,8 @@ class Session:
             gaps = [later - before for before, later in zip(spent, spent[2:], strict=False)]
             del kept[gaps.index(min(gaps))]
 
-    def values(self) -> dict[str, dict[str, float]]:
-        """Return the values that the edit "set" can change, by name: value, least, most, step."""
+    def values(self) -> dict[str, dict[str, Any]]:
+        """Return the values that sliders can change, by name, see `edits.Value`."""
         return {name: value._asdict() for name, value in edits.values(self.interventions).items()}
 
     def log(self) -> Log:

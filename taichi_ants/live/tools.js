@@ -91,7 +91,7 @@ class Tools {
   }
 
   up() {
-    if (this.name === "queen" && this.last >= 0) this.edit({ kind: "queen", cell: this.last });
+    if (this.name === "queen" && this.last >= 0) this.edit("place", { what: "queen" }, [this.last]);
     this.send();
     this.last = -1;
     if (this.aside) this.live.controls.say(`${this.aside} ${this.aside > 1 ? "ants" : "ant"} moved aside.`);
@@ -125,19 +125,18 @@ class Tools {
     const free = cells.filter((cell) => ground[cell] !== QUEEN && !taken.has(cell));
     if (this.name === "rock" || this.name === "food") {
       this.aside += cells.filter((cell) => taken.has(cell)).length;
-      this.edit({ kind: "ground", what: this.name }, cells.filter((cell) => ground[cell] !== QUEEN));
+      this.edit("place", { what: this.name }, cells.filter((cell) => ground[cell] !== QUEEN));
     } else if (this.name === "trail") {
-      this.edit({ kind: "trail", level: history.header.strongest }, cells.filter((cell) => ground[cell] !== OBSTACLE));
-    } else if (this.name === "ants") this.edit({ kind: "add_ants", heading: null }, free.filter((cell) => ground[cell] === EMPTY));
+      this.edit("trail", { level: history.header.strongest }, cells.filter((cell) => ground[cell] !== OBSTACLE));
+    } else if (this.name === "ants") this.edit("add_ants", {}, free.filter((cell) => ground[cell] === EMPTY));
     else {
-      this.edit({ kind: "remove_ants" }, cells.filter((cell) => taken.has(cell)));
-      this.edit({ kind: "ground", what: "empty" }, free.filter((cell) => ground[cell] !== EMPTY));
-      this.edit({ kind: "trail", level: 0 }, cells.filter((cell) => trail[cell] > 0));
+      this.edit("remove_ants", {}, cells.filter((cell) => taken.has(cell)));
+      this.edit("clear", {}, free.filter((cell) => ground[cell] !== EMPTY));
+      this.edit("trail", { level: 0 }, cells.filter((cell) => trail[cell] > 0));
     }
   }
 
-  edit(edit, cells = null) {
-    if (cells && !cells.length) return;
-    this.live.edit(cells ? { ...edit, cells } : edit, this.number);
+  edit(name, settings, cells) {
+    if (cells.length) this.live.edit({ [name]: { ...settings, cells } }, this.number);
   }
 }

@@ -207,7 +207,7 @@ def test_each_tool_changes_the_world_of_the_engine(page, room, how):
         return done[-does:]
 
     (edit,) = use("rock", "2", here)
-    assert edit == {"kind": "ground", "what": "rock", "cells": [here]}
+    assert edit == {"place": {"what": "rock", "cells": [here]}}
     assert ground()[here] == OBSTACLE
     use("erase", "6", here)
     assert ground()[here] == EMPTY
@@ -215,16 +215,16 @@ def test_each_tool_changes_the_world_of_the_engine(page, room, how):
     assert ground()[here] == FOOD
     there = cell_of(room, 5, 4, 0)
     (edit,) = use("trail", "4", there)
-    assert edit == {"kind": "trail", "level": 500, "cells": [there]}
+    assert edit == {"trail": {"level": 500, "cells": [there]}}
     ants = len(room.session.colony.snapshot().ant_cells)
     (edit,) = use("ants", "5", there)
-    assert edit == {"kind": "add_ants", "heading": None, "cells": [there]}
+    assert edit == {"add_ants": {"cells": [there]}}
     assert len(room.session.colony.snapshot().ant_cells) == ants + 1
     done = use("erase", "6", there, 2)
-    assert [edit["kind"] for edit in done] == ["remove_ants", "trail"]
+    assert [name for edit in done for name in edit] == ["remove_ants", "trail"]
     free = cell_of(room, 3, 3, 0)
     (edit,) = use("queen", "7", free)
-    assert edit == {"kind": "queen", "cell": free}
+    assert edit == {"place": {"what": "queen", "cells": [free]}}
     assert ground()[free] == QUEEN
     page.press("1")
     page.click_cell(here)
@@ -277,12 +277,12 @@ def test_undo_undoes_what_was_done_a_moment_ago(page, room):
     epsilon = room.session.colony.epsilon
     page.read(f"(slider => ({slid}, slider.{undo}))(byId('set-epsilon'))")
     wait(page, BEGUN)
-    assert room._former.edits == [(0, {"kind": "set", "name": "epsilon", "value": 0.5})]
+    assert room._former.edits == [(0, {"epsilon": {"value": 0.5}})]
     assert room.session.colony.epsilon == epsilon
     page.press("2")
     page.read(f"live.tools.down({cell_of(room, 5, 5, 0)}), document.body.{undo}")
     wait(page, BEGUN)
-    assert [edit["kind"] for _, edit in room._former.edits] == ["ground"]
+    assert [name for _, edit in room._former.edits for name in edit] == ["place"]
     assert_same(page, room)
     page.tab.click("#play")
     wait(page, "live.running")
@@ -363,7 +363,8 @@ def test_sliders_change_the_colony(page, room):
         page.tab.fill(f"#set-{name}", str(value))
         edits(room, 1)
         wait(page, f"live.state.values['{name}'].value === {value}")
-        assert room.session.edits[-1][1] == {"kind": "set", "name": name, "value": value}
+        sent = {"ants": {"ants": {"number": 20}}, "slope": {"task": {"pheromone.slope": 30}}}
+        assert room.session.edits[-1][1] == sent.get(name, {name: {"value": value}})
     assert room.session.colony.epsilon == 0.5
     page.tab.uncheck("#set-evaporation")
     wait(page, "live.state.values.evaporation.value === 0")

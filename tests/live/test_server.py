@@ -187,7 +187,7 @@ def test_all_pages_see_the_world_of_the_engine(room):
             first.ask("step", ticks=ticks)
             for _ in range(ticks):
                 both(first, second)
-        first.edit({"kind": "ground", "what": "food", "cells": [free]})
+        first.edit({"place": {"what": "food", "cells": [free]}})
         both(first, second)
         with Guest(room) as late:
             for guest in (first, second, late):
@@ -197,7 +197,7 @@ def test_all_pages_see_the_world_of_the_engine(room):
                 guest.until("frame")
                 assert_same(guest, room.session)
         assert room.session.colony.snapshot().ground[free] == 7
-        assert room.session.edits[0][1]["what"] == "food"
+        assert room.session.edits[0][1]["place"]["what"] == "food"
 
 
 def test_a_page_that_is_slow_is_told_less_and_then_all(room):
@@ -262,7 +262,7 @@ CLOSED = [
     *('{"do":"speed","value":' + "9" * 5000 + "}", '{"do":"step","ticks":1000000}'),
     *('{"do":"seen","frames":-5}', '{"do":"seen","frames":1e400}', '{"do":"seen"}'),
     *('{"do":"edit"}', '{"do":"edit","edit":7}', deep(3), deep(100_000)),
-    *('{"do":"edit","edit":{"kind":"episode"}}', '{"do":"edit","edit":{},"stroke":"1"}'),
+    *('{"do":"edit","edit":{"episode":{}}}', '{"do":"edit","edit":{},"stroke":"1"}'),
     *('{"do":"export"}', '{"do":"export","kind":"/etc/passwd"}', '{"do":"export","kind":[]}'),
     *("\0", "\ufeff{}", "x" * (server._MOST_TEXT + 1), '{"do":"play"' + " " * 2**18 + "}"),
 ]
@@ -282,20 +282,20 @@ def test_who_sends_what_no_page_sends_is_cut_off(room):
 
 
 REFUSED = [
-    *({}, {"kind": "explode"}, {"kind": None}, {"kind": ["ground"]}, {"kind": "ground"}),
-    {"kind": "ground", "what": "lava", "cells": [1]},
-    {"kind": "ground", "what": "rock", "cells": [-1]},
-    {"kind": "ground", "what": "rock", "cells": [10**9]},
-    {"kind": "ground", "what": "rock", "cells": [1.5]},
-    {"kind": "ground", "what": "rock", "cells": "all"},
-    {"kind": "ground", "what": "rock", "cells": [[1]]},
-    {"kind": "ground", "what": "rock", "cells": list(range(30_000))},
-    {"kind": "trail", "level": 1e308, "cells": [200]},
-    {"kind": "queen", "cell": None},
-    {"kind": "set", "name": "__class__", "value": 1},
-    {"kind": "set", "name": "epsilon", "value": 7},
-    {"kind": "set", "name": "ants", "value": 10**7},
-    {"kind": "add_ants", "cells": [200], "heading": 9},
+    *({}, {"explode": 1}, {"place": None}, {"place": ["ground"]}, {"policy": "random"}),
+    {"place": {"what": "lava", "cells": [1]}},
+    {"place": {"what": "rock", "cells": [-1]}},
+    {"place": {"what": "rock", "cells": [10**9]}},
+    {"place": {"what": "rock", "cells": [1.5]}},
+    {"place": {"what": "rock", "cells": "all"}},
+    {"place": {"what": "rock", "cells": [[1]]}},
+    {"place": {"what": "rock", "cells": list(range(30_000))}},
+    {"trail": {"level": 1e308, "cells": [200]}},
+    {"place": {"what": "queen", "cells": [None]}},
+    {"__class__": 1},
+    {"epsilon": 7},
+    {"ants": 10**7},
+    {"add_ants": {"cells": [200], "heading": 9}},
 ]
 
 
@@ -441,7 +441,7 @@ def test_a_session_is_saved_and_loaded(room):
     with Guest(room) as guest, Guest(room) as other:
         guest.ask("step", ticks=20)
         free = int(room.session.colony.grid.index((5, 5, 0)))
-        guest.edit({"kind": "ground", "what": "rock", "cells": [free]})
+        guest.edit({"place": {"what": "rock", "cells": [free]}})
         guest.ask("step", ticks=20)
         guest.ask("export", kind="session")
         saved = guest.until("session.npz")
@@ -466,11 +466,11 @@ def test_a_change_is_undone_and_done_again(room):
         guest.ask("step", ticks=3)
         assert not guest.state["can_undo"]
         first, second, third = np.flatnonzero(room.session.colony.snapshot().ground == EMPTY)[:3]
-        guest.edit({"kind": "ground", "what": "rock", "cells": [int(first)]})
+        guest.edit({"place": {"what": "rock", "cells": [int(first)]}})
         guest.ask("step", ticks=2)
         before = state_after(guest, room, 5)
         for cell in (second, third):  # of one stroke
-            guest.ask("edit", edit={"kind": "trail", "level": 9, "cells": [int(cell)]}, stroke=7)
+            guest.ask("edit", edit={"trail": {"level": 9, "cells": [int(cell)]}}, stroke=7)
         guest.ask("step", ticks=4)
         drawn, whole = room.session, state_after(guest, room, 9)
         guest.ask("undo")
@@ -505,7 +505,7 @@ def test_what_several_in_a_row_have_replaced_comes_back(room):
         guest.ask("step", ticks=3)
         cell = int(np.flatnonzero(room.session.colony.snapshot().ground == EMPTY)[0])
         for level in (5, 6, 7):
-            guest.edit({"kind": "trail", "level": level, "cells": [cell]})
+            guest.edit({"trail": {"level": level, "cells": [cell]}})
         guest.until("state")
         while len(room.session.edits) < 3:
             guest.until("state")
@@ -606,7 +606,7 @@ def test_pages_are_answered_quickly_while_any_file_loads(room, tmp_path):
     chosen = {**CHOSEN, "world": "open", "size": 180, "ants": 5000}
     chosen["settings"] = {"task.observation": "six_cells"}
     setup = room.choices.setup(chosen)
-    log = Log(setup, ((5, {"kind": "episode"}),), 10**6, 10**6, "0", changes=(0,))
+    log = Log(setup, ((5, {"episode": {}}),), 10**6, 10**6, "0", changes=(0,))
     log.write(tmp_path / "large.npz")
     with Guest(room) as guest:
         guest.socket.send((tmp_path / "large.npz").read_bytes())
@@ -659,7 +659,7 @@ def test_pages_are_answered_while_a_session_is_replayed(room, endless):
         for what, more in {
             "play": {},
             "step": {"ticks": 1},
-            "edit": {"edit": {"kind": "episode"}, "stroke": 1},
+            "edit": {"edit": {"episode": {}}, "stroke": 1},
             "begin": {"chosen": CHOSEN},
             **{"restart": {}, "undo": {}, "back": {}},
         }.items():
@@ -829,5 +829,5 @@ def test_pages_are_told_that_kernels_are_prepared(room):
 def test_values_tell_how_many_ants_live(room):
     cells = room.session.colony.snapshot().ant_cells[:3].tolist()
     before = room.session.values()["ants"]["value"]
-    room.session.apply({"kind": "remove_ants", "cells": cells})
+    room.session.apply({"remove_ants": {"cells": cells}})
     assert room.session.values()["ants"]["value"] == before - 3

@@ -85,9 +85,8 @@ def edited() -> dict[str, Session]:
 def test_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     session = edited[name]
     assert session.colony.episode > 2 or not session.setup.ticks_per_episode
-    assert {edit["kind"] for _, edit in session.edits} == {
-        *("ground", "trail", "add_ants", "remove_ants", "queen", "set", "episode")
-    }
+    done = {name for _, edit in session.edits for name in edit}
+    assert done >= {"place", "clear", "trail", "add_ants", "remove_ants", "episode", "ants"}
     session.save(tmp_path / "session.npz")
     again = Session.load(tmp_path / "session.npz")
     assert again.interventions.state() == session.interventions.state()
@@ -150,20 +149,20 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
 def test_snapshots_are_bounded_by_time_and_memory(monkeypatch):
     session = Session(SETUPS["foraging"])
     for _ in range(20):
-        session.apply({"kind": "episode"})
+        session.apply({"episode": {}})
     few = len(session._snapshots)
     assert few < 1 + session._spent / session_module._BETWEEN
     monkeypatch.setattr(session_module, "_BETWEEN", 0.0)
     monkeypatch.setattr(session_module, "_MOST_KEPT", 200_000)
     for _ in range(60):
         session.advance(5)
-        session.apply({"kind": "set", "name": "epsilon", "value": 0.5})
+        session.apply({"epsilon": 0.5})
     kept = session._snapshots
     assert 2 < len(kept) < 60
     assert sum(len(one.content) for one in kept) <= 200_000
     assert kept[-1].edits == len(session.edits) - 1
     monkeypatch.setattr(session_module, "_LARGEST", 0)
-    session.apply({"kind": "episode"})
+    session.apply({"episode": {}})
     assert len(session._snapshots) == len(kept)
     for _ in range(10):
         *_, session = session.undone()
@@ -174,7 +173,7 @@ def test_a_file_knows_what_was_one_change(tmp_path):
     session = Session(SETUPS["paper"])
     (cells,) = np.nonzero(session.colony.snapshot().ground == EMPTY)
     for part, cell in enumerate(cells[:5].tolist()):
-        session.apply({"kind": "trail", "level": 9, "cells": [cell]}, goes_on=part not in (0, 2))
+        session.apply({"trail": {"level": 9, "cells": [cell]}}, goes_on=part not in (0, 2))
     session.save(tmp_path / "session.npz")
     again = Session.load(tmp_path / "session.npz")
     assert again.changes == session.changes == [0, 2]
@@ -307,15 +306,15 @@ def test_what_a_hand_has_put_stays_and_what_is_of_an_episode_goes():
     session = Session(replace(SETUPS["foraging"], ticks_per_episode=0))
     ground = session.colony.arrays["ground"]
     a, b, c, d, e = np.flatnonzero(ground == EMPTY)[:5].tolist()
-    session.apply({"kind": "ground", "what": "rock", "cells": [a]})
-    session.apply({"kind": "ground", "what": "food", "cells": [b]})
-    session.apply({"kind": "queen", "cell": c})
-    session.apply({"kind": "trail", "level": 77, "cells": [d]})
-    session.apply({"kind": "add_ants", "cells": [e], "heading": 2})
-    session.apply({"kind": "set", "name": "ants", "value": 25})
+    session.apply({"place": {"what": "rock", "cells": [a]}})
+    session.apply({"place": {"what": "food", "cells": [b]}})
+    session.apply({"place": {"what": "queen", "cells": [c]}})
+    session.apply({"trail": {"level": 77, "cells": [d]}})
+    session.apply({"add_ants": {"cells": [e], "heading": 2}})
+    session.apply({"ants": 25})
     snapshot = session.colony.snapshot()
     assert (snapshot.trail[d], len(snapshot.ant_cells)) == (77, 25)
-    session.apply({"kind": "episode"})
+    session.apply({"episode": {}})
     snapshot = session.colony.snapshot()
     assert snapshot.ground[[a, b]].tolist() == [OBSTACLE, FOOD]
     assert session.colony.worlds[0].grid.index(session.colony.worlds[0].queen) == c
@@ -325,47 +324,50 @@ def test_what_a_hand_has_put_stays_and_what_is_of_an_episode_goes():
 WRONG = [
     (None, "an edit is None"),
     ([], "an edit is"),
-    ({}, "kind"),
-    ({"kind": "explode"}, "kind of an edit is 'explode'"),
-    ({"kind": ["ground"]}, "kind of an edit"),
-    ({"kind": "ground"}, "it must have cells, kind, what"),
-    ({"kind": "episode", "now": 1}, "it must have kind"),
-    ({"kind": "ground", "what": "lava", "cells": [60]}, "what is 'lava'"),
-    ({"kind": "ground", "what": "queen", "cells": [60]}, "what is 'queen'"),
-    ({"kind": "ground", "what": 5, "cells": [60]}, "what is 5"),
-    ({"kind": "ground", "what": "rock", "cells": []}, "cells is []"),
-    ({"kind": "ground", "what": "rock", "cells": "60"}, "cells is '60'"),
-    ({"kind": "ground", "what": "rock", "cells": {"60": 1}}, "cells is"),
-    ({"kind": "ground", "what": "rock", "cells": [60] * 10**6}, "a list of 1 to"),
-    ({"kind": "ground", "what": "rock", "cells": [60, True]}, "cells holds True"),
-    ({"kind": "ground", "what": "rock", "cells": [60.0]}, "cells holds 60.0"),
-    ({"kind": "ground", "what": "rock", "cells": [math.nan]}, "cells holds nan"),
-    ({"kind": "ground", "what": "rock", "cells": [-1]}, "cells holds -1"),
-    ({"kind": "ground", "what": "rock", "cells": [0]}, "cells holds 0"),  # of the border
-    ({"kind": "ground", "what": "rock", "cells": [10**30]}, "cells holds 10000"),
-    ({"kind": "ground", "what": "rock", "cells": "all"}, "cells is 'all'"),
-    ({"kind": "trail", "level": -1, "cells": [60]}, "level is -1"),
-    ({"kind": "trail", "level": True, "cells": [60]}, "level is True"),
-    ({"kind": "trail", "level": 1.5, "cells": [60]}, "level is 1.5"),
-    ({"kind": "trail", "level": 10**7, "cells": [60]}, "level is 10000000"),
-    ({"kind": "add_ants", "cells": [60], "heading": 6}, "heading is 6"),
-    ({"kind": "add_ants", "cells": [60], "heading": "up"}, "heading is 'up'"),
-    ({"kind": "queen", "cell": None}, "cells holds None"),
-    ({"kind": "queen", "cell": [60]}, "cells holds"),
-    ({"kind": "set", "name": "gravity", "value": 1}, "'gravity'"),
-    ({"kind": "set", "name": "half_life", "value": 9}, "'half_life'"),  # trails fall by 1
-    ({"kind": "set", "name": ["epsilon"], "value": 1}, "name of a value"),
-    ({"kind": "set", "name": "epsilon", "value": math.nan}, "epsilon is nan"),
-    ({"kind": "set", "name": "epsilon", "value": math.inf}, "epsilon is inf"),
-    ({"kind": "set", "name": "epsilon", "value": 1.01}, "epsilon is 1.01"),
-    ({"kind": "set", "name": "epsilon", "value": True}, "epsilon is True"),
-    ({"kind": "set", "name": "epsilon", "value": "0.1"}, "epsilon is '0.1'"),
-    ({"kind": "set", "name": "epsilon", "value": 10**400}, "epsilon is 1000"),
-    ({"kind": "set", "name": "ants", "value": 0}, "ants is 0"),
-    ({"kind": "set", "name": "ants", "value": 2.0}, "ants is 2.0"),
-    ({"kind": "set", "name": "ants", "value": 41}, "ants is 41"),
-    ({"kind": "set", "name": "evaporation", "value": 2}, "evaporation is 2"),
-    ({"kind": "set", "name": "slope", "value": 0}, "slope is 0"),
+    ({}, "must have the name of one intervention"),
+    ({"explode": {}}, "name of an edit is 'explode'"),
+    ({"policy": "random"}, "name of an edit is 'policy'"),
+    ({"place": {}}, "`place.what` is missing"),
+    ({"episode": {"now": 1}}, "`episode.now` is not a setting"),
+    ({"episode": {}, "ants": 1}, "must have the name of one intervention"),
+    ({"remove_ants": [0]}, "cells holds 0"),
+    ({"clear": {"cells": [[1, 2, 0]]}}, "cells holds [1, 2, 0]"),
+    ({"task": {"observation": "paper"}}, "cannot change its observation"),
+    ({"place": {"what": "lava", "cells": [60]}}, "what` is 'lava'"),
+    ({"place": {"what": 5, "cells": [60]}}, "what` is 5"),
+    ({"place": {"what": "rock", "cells": []}}, "cells is []"),
+    ({"place": {"what": "rock", "cells": "60"}}, "cells is '60'"),
+    ({"place": {"what": "rock", "cells": {"60": 1}}}, "cells is"),
+    ({"place": {"what": "rock", "cells": [60] * 10**6}}, "a list of 1 to"),
+    ({"place": {"what": "rock", "cells": [60, True]}}, "cells holds True"),
+    ({"place": {"what": "rock", "cells": [60.0]}}, "cells holds 60.0"),
+    ({"place": {"what": "rock", "cells": [math.nan]}}, "cells holds nan"),
+    ({"place": {"what": "rock", "cells": [-1]}}, "cells holds -1"),
+    ({"place": {"what": "rock", "cells": [0]}}, "cells holds 0"),  # of the border
+    ({"place": {"what": "rock", "cells": [10**30]}}, "cells holds 10000"),
+    ({"place": {"what": "rock", "cells": "all"}}, "cells is 'all'"),
+    ({"trail": {"level": -1, "cells": [60]}}, "level` is -1"),
+    ({"trail": {"level": True, "cells": [60]}}, "level` is True"),
+    ({"trail": {"level": 1.5, "cells": [60]}}, "level` is 1.5"),
+    ({"trail": {"level": 10**7, "cells": [60]}}, "level` is 10000000"),
+    ({"add_ants": {"cells": [60], "heading": 6}}, "heading` is 6"),
+    ({"add_ants": {"cells": [60], "heading": "up"}}, "heading` is 'up'"),
+    ({"place": {"what": "queen", "cells": [None]}}, "cells holds None"),
+    ({"place": {"what": "queen", "cells": [[60]]}}, "cells holds"),
+    ({"gravity": 1}, "'gravity'"),
+    ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),  # trails fall by 1
+    ({"epsilon": [1]}, "`epsilon.value` is [1]"),
+    ({"epsilon": math.nan}, "`epsilon.value` is nan"),
+    ({"epsilon": math.inf}, "`epsilon.value` is inf"),
+    ({"epsilon": 1.01}, "`epsilon.value` is 1.01"),
+    ({"epsilon": True}, "`epsilon.value` is True"),
+    ({"epsilon": "0.1"}, "`epsilon.value` is '0.1'"),
+    ({"epsilon": 10**400}, "`epsilon.value` is 1000"),
+    ({"ants": 0}, "`ants.number` is 0"),
+    ({"ants": 2.0}, "`ants` is 2.0"),
+    ({"ants": 41}, "ants is 41"),
+    ({"evaporation": 2}, "'evaporation'"),
+    ({"task": {"pheromone.slope": 0}}, "slope` is 0"),
 ]
 
 
@@ -389,8 +391,7 @@ def test_wrong_edits_change_nothing():
         assert said in refused(session, edit), edit
     follows = Session(SETUPS["queueing"])
     assert follows.values().keys() == {"ants", "epsilon", "deposit", "slope", "evaporation"}
-    edit = {"kind": "set", "name": "learning_rate", "value": 0.5}
-    assert "'learning_rate'" in refused(follows, edit)
+    assert "no learning rate" in refused(follows, {"learning_rate": 0.5})
 
 
 def test_what_was_interrupted_is_counted(monkeypatch):
@@ -414,16 +415,18 @@ def test_edits_without_room_change_nothing():
     free = np.flatnonzero(session.colony.arrays["ground"] == EMPTY).tolist()
     foods = np.flatnonzero(snapshot.ground == FOOD).tolist()
     cells = np.flatnonzero(session.colony.grid.exists).tolist()
-    said = refused(session, {"kind": "add_ants", "cells": free, "heading": None})
+    said = refused(session, {"add_ants": {"cells": free, "heading": None}})
     assert "the capacity of this colony is 40" in said
     queen = int(np.flatnonzero(snapshot.ground == 13)[0])
     for cell in (queen, foods[0], int(snapshot.ant_cells[0])):
-        assert "the queen cannot move to cell" in refused(session, {"kind": "queen", "cell": cell})
+        assert "the queen cannot move to cell" in refused(
+            session, {"place": {"what": "queen", "cells": [cell]}}
+        )
     # What has been eaten is at the start of the next episode, so that only this takes all.
-    assert "the last food" in refused(session, {"kind": "ground", "what": "empty", "cells": cells})
+    assert "the last food" in refused(session, {"clear": {"cells": cells}})
     session = Session(SETUPS["queueing"])  # nobody learns
-    session.apply({"kind": "remove_ants", "cells": cells})
-    assert "would leave" in refused(session, {"kind": "ground", "what": "rock", "cells": cells})
+    session.apply({"remove_ants": {"cells": cells}})
+    assert "would leave" in refused(session, {"place": {"what": "rock", "cells": cells}})
 
 
 @pytest.mark.parametrize(
@@ -433,8 +436,8 @@ def test_edits_without_room_change_nothing():
         ({"steps": 10**12}, "steps is"),
         ({"steps": None}, "steps is None"),
         ({"edits": [], "changes": []}, "does not end as it did"),
-        ({"edits": [[0, {"kind": "explode"}]], "changes": [0]}, "explode"),
-        ({"edits": [[5, {"kind": "episode"}], [4, {"kind": "episode"}]]}, "steps is 4"),
+        ({"edits": [[0, {"explode": {}}]], "changes": [0]}, "explode"),
+        ({"edits": [[5, {"episode": {}}], [4, {"episode": {}}]]}, "steps is 4"),
         ({"edits": 7}, "damaged"),
         ({"edits": []}, "changes is "),
         ({"changes": 7}, "damaged"),
@@ -534,12 +537,12 @@ def test_a_policy_is_a_training_or_one_table(table):
 
 def test_what_a_hand_has_set_stays_in_later_episodes():
     session = Session(SETUPS["foraging"])
-    session.apply({"kind": "set", "name": "epsilon", "value": 0.25})
+    session.apply({"epsilon": 0.25})
     for _ in range(3):
-        session.apply({"kind": "episode"})
+        session.apply({"episode": {}})
     assert session.colony.epsilon == 0.25  # though it decays if nobody sets it
     assert session.colony.learning_rate < LEARNS.learning_rate  # which nobody has set
-    session.apply({"kind": "set", "name": "learning_rate", "value": 0.0})
+    session.apply({"learning_rate": 0.0})
     tables = session.colony.q_values
     session.advance(25)
     session.advance(25)
@@ -556,7 +559,7 @@ def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
         while again.steps < steps:
             counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
             again.leap(1)
-        counted += int(again.colony.outcome().deliveries[0, 0]) * (edit["kind"] == "episode")
+        counted += int(again.colony.outcome().deliveries[0, 0]) * ("episode" in edit)
         again.apply(edit)
     while again.steps < session.steps:
         counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
@@ -595,7 +598,7 @@ def test_a_late_page_is_told_of_the_whole_progress():
         session.leap(steps - 1)
         outcome = session.colony.outcome()
         ends.append([session.colony.episode, session.ticks, outcome.returns[0, 0]])
-        session.apply({"kind": "episode"})
+        session.apply({"episode": {}})
     *_, again = Session.replay(session.log())
     for one in (session, again):
         points = unpack(one.header()["types"], one.snapshot())["progress"].reshape(-1, len(POINT))
@@ -610,7 +613,7 @@ def test_a_long_progress_is_thinned(monkeypatch):
     monkeypatch.setattr(recorder, "_MOST", 8)
     session = Session(SETUPS["foraging"])
     for _ in range(60):
-        session.apply({"kind": "episode"})
+        session.apply({"episode": {}})
     ends = [point for point in session._recorder.progress.points() if point[-1]]
     assert 4 <= len(ends) <= 8
     assert len({b[0] - a[0] for a, b in pairwise(ends)}) == 1

@@ -12,7 +12,7 @@ import numpy as np
 from taichi_ants.files import archives
 from taichi_ants.live.session import Session
 
-_EDIT = [0, {"kind": "episode"}]
+_EDIT = [0, {"episode": {}}]
 
 
 def _edits(facts: dict[str, Any], n: int) -> str:
@@ -24,7 +24,7 @@ def _setup(facts: dict[str, Any], **changes: Any) -> str:
 
 
 def _cells(facts: dict[str, Any]) -> str:
-    edit = {"kind": "trail", "level": 1, "cells": list(range(100, 300))}
+    edit = {"trail": {"level": 1, "cells": list(range(100, 300))}}
     return json.dumps({**facts, "edits": [[0, edit]] * 3000, "changes": [0]})
 
 

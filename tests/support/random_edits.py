@@ -12,7 +12,10 @@ from taichi_ants.reference.geometry import Cell
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 
-KINDS = (*("ground",) * 4, "trail", "add_ants", "remove_ants", "queen", *("set",) * 3, "episode")
+KINDS = (
+    *("place", "place", "place", "clear", "trail", "add_ants", "remove_ants", "queen"),
+    *("set", "set", "set", "episode"),
+)
 
 
 def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[str, Any]:
@@ -21,27 +24,32 @@ def random_edit(rng: np.random.Generator, interventions: Interventions) -> dict[
     there = np.flatnonzero(grid.exists)
     some = rng.choice(there, rng.integers(1, min(9, len(there)) + 1)).tolist()
     kind = str(rng.choice(KINDS))
-    if kind == "ground":
-        return {"kind": kind, "what": str(rng.choice(["empty", "rock", "food"])), "cells": some}
+    if kind == "place":
+        return {kind: {"what": str(rng.choice(["rock", "food"])), "cells": some}}
     if kind == "trail":
-        return {"kind": kind, "level": int(rng.choice([0, 1, 20, 250, 9999])), "cells": some}
+        return {kind: {"level": int(rng.choice([0, 1, 20, 250, 9999])), "cells": some}}
     if kind == "add_ants":
         heading = int(rng.integers(6)) if rng.random() < 0.5 else None
-        return {"kind": kind, "cells": some, "heading": heading}
-    if kind == "remove_ants":
-        return {"kind": kind, "cells": some}
+        return {kind: {"cells": some, "heading": heading}}
+    if kind in ("clear", "remove_ants"):
+        return {kind: {"cells": some}}
     if kind == "queen":
         free = there[ground[there] == EMPTY] if rng.random() < 0.8 else there
-        return {"kind": kind, "cell": int(rng.choice(free if len(free) else there))}
+        cell = int(rng.choice(free if len(free) else there))
+        return {"place": {"what": "queen", "cells": [cell]}}
     if kind == "set":
         known = edits.values(interventions)
         name = str(rng.choice(list(known)))
-        value, least, most, step = known[name]
+        value, least, most, step, path, switch = known[name]
         drawn = float(rng.choice([value, least, most, rng.uniform(least, most)]))
         if name == "ants":
             drawn = float(rng.integers(1, interventions.ants + 4))
-        return {"kind": kind, "name": name, "value": int(drawn) if isinstance(step, int) else drawn}
-    return {"kind": kind}
+        if switch:
+            return switch[str(int(drawn))]
+        new = int(drawn) if isinstance(step, int) else drawn
+        name, _, setting = path.partition(".")
+        return {name: {setting: new} if setting else new}
+    return {kind: {}}
 
 
 def apply_to_both(
@@ -49,36 +57,35 @@ def apply_to_both(
 ) -> None:
     """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it."""
     grid = interventions.colony.grid
-    edits.apply(edits.checked(edit, interventions), interventions, None)
+    edits.checked(edit, interventions).apply(interventions)
+    ((kind, settings),) = edit.items()
     cells: list[Cell] = []
-    for cell in dict.fromkeys(edit.get("cells", ())):
+    for cell in dict.fromkeys(settings.get("cells", ()) if isinstance(settings, dict) else ()):
         x, y, z = grid.cells(cell).tolist()
         cells.append((x, y, z))
-    kind = edit["kind"]
-    if kind == "ground":
-        plain.put(cells, {"empty": EMPTY, "rock": OBSTACLE, "food": FOOD}[edit["what"]])
+    if kind == "clear":
+        plain.put(cells, EMPTY)
+    elif kind == "place" and settings["what"] == "queen":
+        plain.move_queen(*cells)
+    elif kind == "place":
+        plain.put(cells, {"rock": OBSTACLE, "food": FOOD}[settings["what"]])
     elif kind == "trail":
-        plain.lay_trail(cells, edit["level"])
+        plain.lay_trail(cells, settings["level"])
     elif kind == "add_ants":
-        plain.add_ants(cells, edit["heading"])
+        plain.add_ants(cells, settings["heading"])
     elif kind == "remove_ants":
         plain.remove_ants(cells)
-    elif kind == "queen":
-        plain.move_queen(tuple(grid.cells(edit["cell"]).tolist()))
-    elif kind == "set":
-        _set(edit["name"], edit["value"], plain)
-    else:
+    elif kind == "episode":
         plain.begin_episode()
-
-
-def _set(name: str, value: float, plain: PlainInterventions) -> None:
-    if name == "ants":
-        plain.set_ants(int(value))
-    elif name == "epsilon":
-        plain.set_epsilon(value)
-    elif name == "learning_rate":
-        plain.set_learning_rate(value)
-    elif name == "evaporation":
-        plain.set_evaporation(value == 1)
+    elif kind == "task":
+        _set_task(settings, plain)
     else:
-        plain.set_pheromone(**{"level" if name == "deposit" else name: value})
+        getattr(plain, f"set_{kind}")(settings)
+
+
+def _set_task(settings: dict[str, Any], plain: PlainInterventions) -> None:
+    for name, value in settings.items():
+        if name in ("evaporation_in_training", "evaporation_in_evaluation"):
+            plain.set_evaporation(value)
+        elif name != "pheromone.evaporation":  # set_evaporation has set it
+            plain.set_pheromone(**{name.removeprefix("pheromone."): value})

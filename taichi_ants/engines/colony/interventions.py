@@ -69,6 +69,7 @@ class Interventions:
 
     Attributes:
         ants: The number of ants at the start of later episodes.
+        length: The `length` of episodes that an intervention begins.
 
     Raises:
         AntsError: The colony does not have one of the worlds.
@@ -78,6 +79,7 @@ class Interventions:
         self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
+        self.length: int | None = None
         self.worlds = self._checked_worlds(worlds)
         self._first = colony.worlds
         self._starts = [world.ground() for world in colony.worlds] if lasting else []
@@ -271,14 +273,14 @@ class Interventions:
             first.ants[start[ants] == EMPTY],
         )
 
-    def begin_episode(self, length: int | None = None) -> None:
+    def begin_episode(self) -> None:
         """End the present episode, if any, and start the next one; see `Colony.begin_episode`."""
         colony = self.colony
         if colony.episode >= 0:
             colony.end_episode()
         colony.ants = self.ants
         worlds = [self.world(w) for w in range(len(self._first))] if self._changed else None
-        colony.begin_episode(length, worlds)
+        colony.begin_episode(self.length, worlds)
         self._changed = False
 
     def begin_with(self, w: int, start: np.ndarray) -> None:
