@@ -36,6 +36,7 @@ SERVER = "tests/live/test_server.py"
 SESSION = "tests/live/test_session.py"
 EDITS = "tests/live/test_edits.py"
 SETTINGS = "tests/test_settings.py"
+PROTOCOL = "tests/engines/colony/test_protocol.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
@@ -111,12 +112,21 @@ MUTATIONS = [
     ("engines/colony/steps.py", "c.carried[ant] = 1", "c.carried[ant] = 0", COLONY),
     (
         "engines/colony/interventions.py",
-        "(colony.episode << 32) + numbers",
-        "(colony.episode << 31) + numbers",
+        "(episode << 32) + numbers",
+        "(episode << 31) + numbers",
         EDITS,
     ),
     ("engines/colony/interventions.py", "epsilon_decay=1.0, min", "min", SESSION),
-    ("engines/colony/interventions.py", "numbers < self.colony.ants ", "numbers < 0 ", EDITS),
+    ("engines/colony/interventions.py", "numbers < colony.ants ", "numbers < 0 ", EDITS),
+    # Protocols.
+    ("engines/colony/timetable.py", "tick > colony.ticks", "tick > colony.ticks + 1", PROTOCOL),
+    ("engines/colony/timetable.py", "~(done & event.once)", "~done", PROTOCOL),
+    ("engines/colony/timetable.py", "        done |= worlds", "        done &= worlds", PROTOCOL),
+    ("engines/colony/interventions.py", "LIVING]) + 0.5)", "LIVING]))", PROTOCOL),
+    ("engines/colony/interventions.py", "max(episode, 0))", "0)", PROTOCOL),
+    ("engines/colony/state.py", "        self._undo_interventions(which)\n", "", PROTOCOL),
+    ("protocol.py", "range(self.interval, length", "range(0, length", PROTOCOL),
+    ("protocol.py", "value > self.above", "value >= self.above", PROTOCOL),
     # Learners.
     ("learners/expected_sarsa.py", "ti.f32(0.2)", "ti.f32(0.25)", RUNS),
     ("learners/double_q.py", "next_values[a] > largest", "next_values[a] >= largest", RUNS),

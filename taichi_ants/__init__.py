@@ -12,6 +12,7 @@ from taichi_ants.environment import prepare_for_taichi
 if TYPE_CHECKING:
     from taichi_ants import analysis, learners, offline, reference, rendering, task, worlds
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
+    from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from taichi_ants.learners.policies import load_policy, save_policy
     from taichi_ants.offline.dataset import Dataset
     from taichi_ants.offline.recording import record, record_colony
+    from taichi_ants.protocol import At, Every, When
     from taichi_ants.task import Life, Observation, Pheromone, Rewards, Task, states
     from taichi_ants.worlds import World
 
@@ -29,6 +31,7 @@ __version__ = "0.1.0"
 
 _NAMES_IN = {
     "engines.colony.colony": ("Colony", "ColonyEpisodes"),
+    "engines.colony.interventions": ("Interventions",),
     "engines.runs.results": ("Rollouts", "TrainingResult"),
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
     "engines.runs.training": ("continue_training", "evaluate", "train"),
@@ -39,6 +42,7 @@ _NAMES_IN = {
     "learners.policies": ("load_policy", "save_policy"),
     "offline.dataset": ("Dataset",),
     "offline.recording": ("record", "record_colony"),
+    "protocol": ("At", "Every", "When"),
     "task": ("Life", "Observation", "Pheromone", "Rewards", "Task"),
     "worlds": ("World",),
 }
@@ -48,9 +52,12 @@ _MODULES = (
 
 __all__ = [
     "AntsError",
+    "At",
     "Colony",
     "ColonyEpisodes",
     "Dataset",
+    "Every",
+    "Interventions",
     "Life",
     "Observation",
     "Pheromone",
@@ -60,6 +67,7 @@ __all__ = [
     "Trace",
     "TrainingConfig",
     "TrainingResult",
+    "When",
     "World",
     "__version__",
     "analysis",

@@ -104,7 +104,7 @@ class Intervention(Record):
         raise NotImplementedError
 
 
-class _OfCells(Intervention):
+class OfCells(Intervention):
     """An intervention on some cells, of which a list is the short form."""
 
     form = "a list of cells, or a table of settings"
@@ -120,7 +120,7 @@ class _OfCells(Intervention):
         return None if cells is None else {"cells": cells}
 
 
-class _OfAnts(_OfCells):
+class OfAnts(OfCells):
     """An intervention on a number of ants, a share of the living ants, or the ants on cells."""
 
     form = "a number of ants, a share below 1, a list of cells, or a table of settings"
@@ -145,7 +145,7 @@ class _OfAnts(_OfCells):
 
 
 @dataclass(frozen=True)
-class RemoveAnts(_OfAnts, path="remove_ants"):
+class RemoveAnts(OfAnts, path="remove_ants"):
     """Remove ants with the food that they carry: random ants, or those on cells.
 
     A share is rounded to a number of ants, halves up.
@@ -163,7 +163,7 @@ class RemoveAnts(_OfAnts, path="remove_ants"):
 
 
 @dataclass(frozen=True)
-class AddAnts(_OfAnts, path="add_ants"):
+class AddAnts(OfAnts, path="add_ants"):
     """Add ants on the cells on which further ants would start, or on those of the cells given
     that are empty.
 
@@ -185,7 +185,7 @@ class AddAnts(_OfAnts, path="add_ants"):
 
 
 @dataclass(frozen=True)
-class Place(_OfCells, path="place"):
+class Place(OfCells, path="place"):
     """Place rock or food on cells, or the queen on one cell; ants there move aside.
 
     Rock and food leave out the queen's cell, and cells whose ant has no room nearby.
@@ -210,7 +210,7 @@ class Place(_OfCells, path="place"):
 
 
 @dataclass(frozen=True)
-class Move(_OfCells, path="move"):
+class Move(OfCells, path="move"):
     """Move rock, food or the queen to an empty cell; an ant there moves aside.
 
     Has no effect if there is nothing to move, or the new cell is not free.
@@ -232,7 +232,7 @@ class Move(_OfCells, path="move"):
 
 
 @dataclass(frozen=True)
-class Clear(_OfCells, path="clear"):
+class Clear(OfCells, path="clear"):
     """Remove rock and food from cells."""
 
     cells: Annotated[Sequence, _CELLS]
@@ -242,7 +242,7 @@ class Clear(_OfCells, path="clear"):
 
 
 @dataclass(frozen=True)
-class Trail(_OfCells, path="trail"):
+class Trail(OfCells, path="trail"):
     """Set the trail of cells without rock; level 0 clears it."""
 
     level: Annotated[int, Is("trail level", least=0, most=MAX_DEPOSIT)]

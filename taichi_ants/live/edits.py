@@ -16,7 +16,6 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, check_one_of, expect, shown
 from taichi_ants.interventions import Intervention
 from taichi_ants.task import Pheromone
-from taichi_ants.task.constants import EMPTY
 
 Edit = dict[str, Any]
 # All but "policy", because a page must not name files.
@@ -107,14 +106,14 @@ def checked(edit: object, interventions: Interventions) -> Intervention:
         )
     ((name, settings),) = edit.items()
     check_one_of("the name of an edit", name, ALLOWED)
-    if isinstance(settings, list):
+    if isinstance(settings, list) and issubclass(language.INTERVENTIONS[name], language.OfCells):
         settings = {"cells": settings}
     if isinstance(settings, Mapping) and settings.get("cells") is not None:
         _check_cells(settings["cells"], interventions)
     one = language.from_dict({name: settings})
     if one.facts().get("place", {}).get("what") == "queen":
         (cell,) = settings["cells"]
-        if interventions.colony.arrays["ground"][cell] != EMPTY:
+        if not interventions.is_empty(cell):
             where = tuple(interventions.colony.grid.cells(cell).tolist())
             raise AntsError(
                 f"the queen cannot move to cell {where}, because it is not empty; choose an empty "

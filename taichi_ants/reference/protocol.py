@@ -32,7 +32,7 @@ class Protocol:
         self._colony, self._events = colony, events
 
     def run(self, episodes: int, ticks: int) -> list[EpisodeRecord]:
-        """Run whole episodes, and return their records."""
+        """Return the records of whole episodes."""
         for _ in range(episodes):
             self.begin_episode()
             while self._colony.record.ticks < ticks and not self._colony.over:

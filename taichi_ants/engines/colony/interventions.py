@@ -110,6 +110,10 @@ class Interventions:
         """
         return indices(self.colony.grid, cells)
 
+    def is_empty(self, cell: int) -> bool:
+        """Return whether a cell is empty and has no ant, in all of the worlds."""
+        return all(one.view("ground")[cell] == EMPTY for one in self._each())
+
     def everywhere(self) -> np.ndarray:
         """Return the flat indices of all cells."""
         return np.flatnonzero(self.colony.grid.exists)
