@@ -116,7 +116,7 @@ class Colony(ColonyState):
         self._stepper.launch(self, "intervention_phases")
 
     def check_same_kernels(self, task: Task) -> None:
-        """Raise an AntsError if kernels would have to be compiled anew for another task."""
+        """Raise an AntsError if a task needs other kernels than the present one."""
         other = copy.copy(self)
         other.take_task(task)
         present, needed = features_of(self), features_of(other)

@@ -67,9 +67,9 @@ _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 class ColonyEpisodes(Record):
     """Results of episodes, arrays of shape (episodes, worlds).
 
-    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks with
-    food of all delivered loads, `living` ants at the end. Returns, moves, blocked and carried are
-    int64, all others int32.
+    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
+    with food of all delivered loads, `living` ants at the end. Returns, moves, blocked and carried
+    are int64, all others int32.
     """
 
     returns: np.ndarray

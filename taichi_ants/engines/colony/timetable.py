@@ -75,7 +75,7 @@ class Timetable:
             colony.arrays["q"][:] = self._q
 
     def pieces(self, stepper: Stepper, n: int) -> Iterator[None]:
-        """Advance by n ticks with all events on the way; yield as `Stepper.pieces` does."""
+        """Yield after each short launch until n ticks are done, with all events on the way."""
         colony = self._colony
         end = colony.ticks + n
         while colony.ticks < end:
