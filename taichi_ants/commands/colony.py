@@ -74,13 +74,22 @@ def _check_live(
             error(f"{flag} cannot change a resumed colony; leave it out")
         learns = name.startswith("training.") and name != "training.epsilon"
         if settings.sharing == "frozen" and learns:
-            error(f"{flag} has no effect with --sharing frozen (no learning); remove one of them")
+            error(
+                f"{flag} has no effect with --sharing frozen (no learning); leave one of them out"
+            )
     if settings.policy and "task.observation" in given:
-        error("the policy determines --task.observation; leave it out")
+        error(
+            "--task.observation has no effect with --policy, because the file determines the "
+            "observation; leave one of them out"
+        )
     if "frame_interval" in given and (
         not settings.render or settings.render.lower().endswith(".png")
     ):
-        error("--frame-interval requires an animation; give --render a .gif, .mp4 or folder")
+        picture = settings.render or "missing"
+        error(
+            f"--frame-interval requires an animation, but --render is {picture}; name a .gif or "
+            ".mp4 file or a folder"
+        )
 
 
 def _add_study(parser: command_line.Parser) -> None:

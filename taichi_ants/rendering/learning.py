@@ -168,9 +168,12 @@ def learning_frames(
     expect("checkpoints", checkpoints, list, tuple)
     for checkpoint in checkpoints:
         expect("a checkpoint", checkpoint, Checkpoint)
-    if len({checkpoint.episode.made.world for checkpoint in checkpoints}) != 1:
+    if not checkpoints:
+        raise AntsError("checkpoints is empty; give at least one checkpoint.")
+    worlds = len({checkpoint.episode.made.world for checkpoint in checkpoints})
+    if worlds > 1:
         raise AntsError(
-            "checkpoints is empty or mixes several worlds; give checkpoints of one world."
+            f"checkpoints has episodes in {worlds} worlds; give checkpoints of one world."
         )
     width, height = check_size(size)
     expect("title", title, str)

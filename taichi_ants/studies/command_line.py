@@ -67,7 +67,9 @@ class Parser(argparse.ArgumentParser):
         words = sys.argv[1:] if args is None else list(args)
         for before, word in zip(["", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
-                self.error(f"{word or before or 'the first argument'} is empty; leave it out")
+                after = f"the argument after {before!r}" if before else "the first argument"
+                name = word[:-1] or (before if before.startswith("--") else after)
+                self.error(f"{name} is empty; give a value or leave it out")
             self._add_setting(word.partition("=")[0])
         return super().parse_known_args(words, namespace)
 

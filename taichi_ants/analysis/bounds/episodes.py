@@ -57,7 +57,10 @@ class EpisodeBounds:
     def __init__(self, world: World, task: Task) -> None:
         changes = task.evaporation_in_training and task.pheromone.evaporation != "none"
         if changes or task.pheromone.diffusion:
-            raise AntsError("exact bounds require training without evaporation and diffusion.")
+            raise AntsError(
+                "trails evaporate or spread in training, but exact bounds require constant trails; "
+                "set `task.evaporation_in_training` to False and `task.pheromone.diffusion` to 0."
+            )
         around = look_around(world)
         cells, headings = world.start(seed=0)
         cell = int(np.searchsorted(around.cells, cells[0]))
