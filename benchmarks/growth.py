@@ -1,9 +1,10 @@
 """Measure how speed and memory depend on the number of runs, ants, cells, states and threads.
 
-Runs learn by Q-learning in the paper's world, for 500 episodes. Ants forage in open worlds and
-learn into one table. The command measures all sizes in turn, with 1 thread and with all threads,
-several times, by the wall clock; the tables contain medians. For memory, it doubles the size, and
-reports the growth of stored arrays and of the peak memory of the process, per run, ant or cell.
+Runs learn by Q-learning in the paper's world, for 500 episodes. Ants of colonies forage in open
+worlds and learn into one table. The command measures all sizes in turn, with 1 thread and with all
+threads, several times, by the wall clock; the tables contain medians. For memory, it doubles the
+size, and reports by how much the arrays and the peak memory of the process grow per run, ant or
+cell.
 """
 
 from __future__ import annotations

@@ -16,7 +16,9 @@ from taichi_ants.task.constants import ROW
 class Steps(Hyperparameters):
     """The hyperparameter of n-step SARSA; targets end with the episode."""
 
-    n_steps: Annotated[int, Is("number of rewards in a target", least=1, most=64)] = 4
+    n_steps: Annotated[
+        int, Is("number of rewards in the target of an update", least=1, most=64)
+    ] = 4
 
 
 @ti.func
