@@ -52,7 +52,7 @@ def print_table(settings: argparse.Namespace) -> None:
     n, colonies = settings.choices, settings.colonies
     if n % 2:
         raise AntsError(
-            f"--choices is {n}; it must be even, because as many ants leave the nest as the food."
+            f"--choices is {n}; it must be even, because half of the ants choose at each end."
         )
     if 2 * n * colonies > MOST_CHOICES:
         raise AntsError(

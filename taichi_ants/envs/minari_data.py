@@ -142,7 +142,9 @@ def from_minari(
         if facts is not None:
             known = Dataset.described(json.loads(facts))
     if known["world"] is None:
-        raise AntsError("the data set does not contain a world and a task; give world and task.")
+        raise AntsError(
+            "the data set does not contain a world and a task; give the arguments world and task."
+        )
     form = Shown(known["task"].sees, _FORMATS.get(type(source.observation_space), "cells"))
     if (source.observation_space, source.action_space) != (form.space, spaces.Discrete(N_ACTIONS)):
         raise AntsError(

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, array_of
+from taichi_ants.errors import AntsError, array_of, shown
 from taichi_ants.grid.constants import HEADING_STEPS
 
 # Arrays cover the whole grid; at four bytes a cell, this many cells take one gibibyte.
@@ -149,7 +149,9 @@ class AxialGrid:
         """Return the normal forms, int32 (..., 3), of flat indices (...)."""
         flat = array_of("index", index)
         if flat.dtype.kind not in "iu" or ((flat < 0) | (flat >= self.size)).any():
-            raise AntsError(f"flat indices must be whole numbers from 0 to {self.size - 1}.")
+            raise AntsError(
+                f"index is {shown(index)}; it must be whole numbers from 0 to {self.size - 1}."
+            )
         # int32 throughout saves memory: worlds often have millions of cells.
         r, q = np.divmod(flat.astype(np.int32), np.int32(self.width))
         r -= self.ranges[2]

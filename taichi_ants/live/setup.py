@@ -69,7 +69,8 @@ class Setup:
             settings = json.loads(files.to_json(dict(self.world_settings)))
         except (TypeError, ValueError, RecursionError):
             raise AntsError(
-                f"world_settings is {shown(self.world_settings)}; it must be JSON-compatible."
+                f"world_settings is {shown(self.world_settings)}; use only numbers, text, lists, "
+                "mappings, True, False and None."
             ) from None
         object.__setattr__(self, "world_settings", settings)
 

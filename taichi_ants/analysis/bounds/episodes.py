@@ -142,8 +142,8 @@ class EpisodeBounds:
         """
         if not 0 <= discount < 1:
             raise AntsError(
-                f"the discount is {shown(discount)}, but must be at least 0 and below 1: with "
-                "others, the return without step limit may be unbounded and no policy optimal."
+                f"the discount is {shown(discount)}; it must be at least 0 and below 1, because "
+                "otherwise the return without a step limit may be unbounded."
             )
         from scipy.sparse import eye_array
         from scipy.sparse.linalg import spsolve

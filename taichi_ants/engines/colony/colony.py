@@ -12,7 +12,7 @@ from taichi_ants import checks
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState, checked_worlds
 from taichi_ants.engines.colony.stepping import Stepper
-from taichi_ants.errors import AntsError, array_of, checked_whole, entries_of, shown
+from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -91,7 +91,9 @@ class Colony(ColonyState):
         """
         which = array_of("which", which)
         if which.dtype != bool or which.shape != (len(self.seeds),):
-            raise AntsError(f"which is {shown(which)}; give a bool for each of the worlds.")
+            raise AntsError(
+                f"which is {shown(which)}; give a bool for each of the {len(self.seeds)} worlds."
+            )
         if seeds is None:
             self.keep_streams(which)
         else:
@@ -100,8 +102,11 @@ class Colony(ColonyState):
                 raise AntsError(f"seeds is {shown(seeds)}; give a seed for each of these worlds.")
             checked = [seed for one in listed for seed in checks.checked_seeds(one)]
             if len(checked) != np.count_nonzero(which):
-                n = np.count_nonzero(which)
-                raise AntsError(f"there are {len(checked)} seeds for {n} worlds; give {n}.")
+                n = int(np.count_nonzero(which))
+                raise AntsError(
+                    f"there are {count(len(checked), 'seed')} for {count(n, 'world')}; give "
+                    f"{count(n, 'seed')}."
+                )
             self.reseed(which, checked)
         self.begin(which)
         self._stepper.launch(self, "begin_phases")
@@ -132,8 +137,8 @@ class Colony(ColonyState):
         self.check_begun()
         if not self.is_given_actions:
             raise AntsError(
-                "the ants of this colony choose actions by its training; call tick instead, or "
-                'make a colony with training=None and sharing="frozen".'
+                "the ants of this colony choose their own actions; call tick instead, or make a "
+                'colony with training=None and sharing="frozen".'
             )
         given, shape = array_of("actions", actions), (len(self.seeds), self.capacity)
         if given.dtype.kind not in "iu" or given.shape != shape:

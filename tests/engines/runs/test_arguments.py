@@ -81,7 +81,7 @@ BAD_SEEDS = [
     (2**64, f"seeds contains {2**64}; a seed must fit into 64 bits"),
     ([-(2**63) - 1], f"seeds contains {-(2**63) - 1}"),
     ([4, 5, 4], "seeds contains 4 more than once"),
-    ([-1, 2**64 - 1], f"seeds contains {2**64 - 1} more than once; they must differ"),
+    ([-1, 2**64 - 1], f"seeds contains {2**64 - 1} more than once; give seeds that differ"),
 ]
 
 
@@ -114,7 +114,7 @@ def test_seeds_of_tables():
     assert checked_seeds_for([1, 2, 3], (2, 3)).tolist() == [1, 2, 3, 1, 2, 3]
     for shape in ((), (2,), (3, 2)):
         says(
-            f"there are 3 seeds for tables of leading shape {shape}",
+            f"there are 3 seeds for tables of shape {shape}",
             checked_seeds_for,
             [1, 2, 3],
             shape,
