@@ -133,7 +133,7 @@ def check_same(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) -
 def measured(
     library: ctypes.CDLL, sizes: Sequence[int], rounds: int, threads: int, seconds: float
 ) -> dict[tuple[str, int], np.ndarray]:
-    """Return million ant steps/s of ours and of C, (rounds, 2), by rules and number of ants."""
+    """Return million ant steps/s of the package and of C, (rounds, 2), by rules and ants."""
     found: dict[tuple[str, int], np.ndarray] = {}
     with progress_bar("Measuring") as progress:
         for rules, task in TASKS.items():

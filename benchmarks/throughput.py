@@ -168,7 +168,7 @@ def grid(learner: str, planning_steps: int) -> list[TrainingConfig]:
 
 
 def check_same(trained: Trained, result: TrainingResult) -> None:
-    """Check that the results of C are the same as ours.
+    """Check that the results of C are the same as those of the package.
 
     Raises:
         AntsError: They differ, so the paces cannot be compared.
@@ -181,7 +181,7 @@ def check_same(trained: Trained, result: TrainingResult) -> None:
 def measured(
     yardsticks: dict[str, Yardstick], seeds: Sequence[int], rounds: int, threads: int
 ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
-    """Return steps by learner, and seconds of ours and of n functions in C, (rounds, 1 + n)."""
+    """Return steps by learner, and seconds in the package and in n C functions, (rounds, 1 + n)."""
     steps, seconds = {}, {}
     world, task = worlds.paper(), Task(delivery="truncates")
     with progress_bar("Measuring") as progress:

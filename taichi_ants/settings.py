@@ -6,7 +6,7 @@ options, controls of pages, and the tables of the documentation.
 
     @dataclass(frozen=True)
     class Pheromone(Settings, path="task.pheromone"):
-        evaporation: Annotated[Literal["linear", "exponential"], Is("how ...")] = "linear"
+        evaporation: Annotated[Literal["linear", "exponential"], Is("...")] = "linear"
         half_life: Annotated[
             float | None,
             Is("time in which a trail halves", unit="ticks", above=0, usual=50.0,

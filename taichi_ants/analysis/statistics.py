@@ -108,7 +108,7 @@ def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray
 
 
 def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return numbers (rows,) that were computed from values (rows, seeds), rounding errors as 0."""
+    """Return numbers (rows,) computed from values (rows, seeds), with rounding errors set to 0."""
     tiny = TIE_TOLERANCE * np.abs(values).max(axis=1)
     return np.where(np.abs(numbers) <= tiny, 0.0, numbers)
 

@@ -1,7 +1,7 @@
 """Geometry of the hexagonal grid, in NumPy alone.
 
-A cell is the class of cube coordinates (x, y, z) equal up to adding (c, c, c). Its normal form has
-minimum 0; its axial form is q = x - z, r = y - z. Arrays of cells have shape (..., 3). The six
+Cube coordinates (x, y, z) and (x + c, y + c, z + c) are the same cell. Its normal form is the one
+with minimum 0; its axial form is q = x - z, r = y - z. Arrays of cells have shape (..., 3). The six
 headings run clockwise, heading 0 points up.
 """
 

@@ -121,7 +121,7 @@ class Setup:
         return Colony(self.build_world(), self.task, training, self.seed, **options)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the setup, JSON-compatible; a policy of action values is only "table"."""
+        """Return the setup, JSON-compatible; a table of action values becomes the word "table"."""
         facts = {one.name: getattr(self, one.name) for one in fields(self)}
         policy = self.policy.as_dict() if isinstance(self.policy, TrainingConfig) else "table"
         settings = dict(self.world_settings)

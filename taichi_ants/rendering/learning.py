@@ -53,7 +53,7 @@ class Checkpoint:
         return f"after {count(self.episodes, 'episode')}" if self.episodes else "before learning"
 
     def account(self) -> np.ndarray:
-        """Return the reward earned up to each snapshot by source, int (len(episode), 5)."""
+        """Return the reward earned up to each snapshot, by `_SOURCES`, int (len(episode), 5)."""
         trace, events = self.episode.trace, self.episode.trace.events
         gave, took = events == Event.DELIVERED, events == Event.PICKED_UP
         failed = (events == Event.FAILED) | (events == Event.BLOCKED)

@@ -182,9 +182,10 @@ Judged = dict[tuple[str, Series], dict[Sizes, Finding]]
 
 
 def judge_all(measured: Measured) -> Judged:
-    """Return the findings on all contrasts; those of a question and kind of world hold at once.
+    """Return the findings on all contrasts.
 
-    With fewer than `LEAST_SEEDS` seeds, the verdict is "too few seeds".
+    All intervals of a question and a kind of world hold at the same time. With fewer than
+    `LEAST_SEEDS` seeds, the verdict is "too few seeds".
     """
     judged: Judged = {}
     for world_kind in dict.fromkeys(one.world_kind for one in measured):

@@ -186,7 +186,10 @@ def _quantity(
 
 
 def share_above(measure: str, first: Variant, second: Variant, sign: int = 1) -> Quantity:
-    """Return the share of configurations with the first above (-1: below); ties count by half."""
+    """Return the share of configurations in which the first learner is above the second.
+
+    With `sign` -1, it is the share in which it is below. Ties count by half.
+    """
 
     def share(grids: Grids) -> np.ndarray:
         signs = np.sign(grids(measure, first) - grids(measure, second))

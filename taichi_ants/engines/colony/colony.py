@@ -41,9 +41,9 @@ class Colony(ColonyState):
             alone. Requires one ant and no births.
         sharing: "shared" for one table per world, for learners with a TD error; "independent" for
             one table and memory per slot; "frozen" for no learning.
-        q_values: Initial action values, float (n_states, 5), (W, n_states, 5) or, without sharing,
-            (W, slots, n_states, 5). None: the initial value of `training`. Required for sharing
-            "frozen" with a `training`.
+        q_values: Initial action values, float (n_states, 5), (W, n_states, 5) or, if sharing is
+            "independent", (W, slots, n_states, 5). None: the initial value of `training`. Required
+            for sharing "frozen" with a `training`.
         threads, arch: As in `train`.
         schedule: "by_world" distributes worlds to threads, "by_chunk" groups of ants; None chooses
             by size. Both give the same numbers, with ants stored in different orders.
