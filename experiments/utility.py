@@ -62,7 +62,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """Print a row for each kind of world and room of a cell, after building all worlds."""
+    """Print a row for each kind of world and each --room, after building all worlds."""
     places = {kind: [build(n) for n in range(settings.seeds)] for kind, build in WORLDS.items()}
     rows: list[str] = []
     with progress_bar("Ants that back up utilities") as progress:

@@ -139,7 +139,7 @@ def array_of(name: str, values: object) -> np.ndarray:
         return np.asarray(values)
     except ValueError:
         raise AntsError(
-            f"{name} is {shown(values)}; it must be an array, whose rows have equal lengths."
+            f"{name} is {shown(values)}; it must be an array whose rows have equal lengths."
         ) from None
 
 

@@ -176,8 +176,8 @@ def _running(ti: ModuleType) -> Runtime | None:
         how = "with fast_math=True, which changes results in the last bit"
         how = how if arch else f"on {config.arch}, on which the kernels are not tested"
         raise AntsError(
-            f"Taichi is running {how}; call ti.init(arch=ti.cpu, fast_math=False), or ti.reset() "
-            "before taichi_ants starts Taichi; both destroy all fields and arrays."
+            f"Taichi is running {how}; call ti.init(arch=ti.cpu, fast_math=False), or call "
+            "ti.reset() and let taichi_ants start Taichi; both destroy all fields and arrays."
         )
     return Runtime(arch, int(config.cpu_max_num_threads))
 

@@ -165,8 +165,9 @@ def cautious_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the hull of the bootstrap and the t interval, which verdicts use.
 
-    If half of all seeds differed from the others, n seeds would agree by chance with probability
-    2^(1-n) (the sign test). If they agree and this is above 1 - level, the interval is unbounded.
+    If all n seeds agree, but could do so by chance, the interval is unbounded. By the sign test,
+    this is so if 2^(1-n) is above 1 - level: the probability that n seeds agree if half of all
+    seeds differ from the others.
     """
     values = np.asarray(values, float)
     n = values.shape[1]

@@ -142,7 +142,7 @@ class Kind:
     def reading(
         self, path: files.PathLike, content: bytes | None = None
     ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
-        """Yield the arrays and facts of a file; errors, also in the block, are those of `building`."""
+        """Yield the arrays and facts of a file; the block raises as that of `building` does."""
         arrays = read(path, content, self.most, self.foreign)
         try:
             text = arrays.pop("facts").item()

@@ -142,7 +142,9 @@ class AxialGrid:
         beyond = ((qr < 0) | (qr >= (self.width, self.height))).any(axis=-1)
         if beyond.any():
             cell = tuple(np.asarray(cells)[beyond][0].tolist())
-            raise AntsError(f"the cell {cell} is outside a world of ranges {self.ranges}.")
+            raise AntsError(
+                f"the cell {cell} is outside the world; give a cell within the ranges {self.ranges}."
+            )
         return (qr[..., 1] * self.width + qr[..., 0]).astype(np.int32)
 
     def cells(self, index: object) -> np.ndarray:

@@ -14,7 +14,7 @@ from taichi_ants.task.constants import ROW
 
 @dataclass(frozen=True)
 class Steps(Hyperparameters):
-    """The hyperparameter of n-step SARSA; targets end with the episode."""
+    """The hyperparameter of n-step SARSA; targets near the end of an episode have fewer rewards."""
 
     n_steps: Annotated[
         int, Is("number of rewards in the target of an update", least=1, most=64)

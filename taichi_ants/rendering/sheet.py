@@ -72,7 +72,7 @@ def clarity(values: np.ndarray, spread: float) -> float:
 def learned(values: np.ndarray, spread: float) -> bool:
     """Return whether action values (5,) differ by 1 % of the table's `usual_spread` or more.
 
-    Below, the best action may just be the one that was tried least.
+    If they differ by less, the best action may just be the one that was tried least.
     """
     gap = float(np.ptp(values.astype(np.float64)))
     return gap > 0 and gap >= _HARDLY * spread

@@ -205,7 +205,7 @@ KINDS = (
 
 
 class Statements(NamedTuple):
-    """A table of statements with a header for each column; `noun` is the word for them in the text."""
+    """A table of statements with a header for each column; `noun` is the word for them."""
 
     headers: Sequence[str]
     lines: Sequence[Statement]

@@ -60,7 +60,7 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
 
 @contextmanager
 def held() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns whether a signal came; up to two take effect after the block."""
+    """Yield a function that returns whether a signal came; two signals wait for the block's end."""
     global _holds
     _holds = True
     try:

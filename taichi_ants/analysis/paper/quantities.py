@@ -57,7 +57,7 @@ def pairs(grid: np.ndarray, factor: str) -> np.ndarray:
 
 
 class Read(NamedTuple):
-    """A way to read a value per seed: `values(grids, measure, learner)`, and its name in tables."""
+    """A function `values(grids, measure, learner)` of a value per seed, and its name in tables."""
 
     words: str
     values: Callable[[Grids, str, Variant], np.ndarray]

@@ -59,7 +59,7 @@ def summarise(comparison: Comparison) -> list[Summary]:
 
 
 class BehaviourMeans(NamedTuple):
-    """A row of behaviours.csv: the runs of a configuration with one behaviour."""
+    """A row of behaviours.csv: means over the runs of a configuration that show one behaviour."""
 
     row: Row
     behaviour: int
