@@ -129,10 +129,9 @@ def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.
     """Return a seed for each table of the given leading shape, as a flat object array."""
     several = checked_seeds(seeds)
     if len(several) != 1 and (not shape or shape[-1] != len(several)):
-        raise AntsError(
-            f"there are {len(several)} seeds for tables of shape {shape} + (states, actions); give "
-            "one seed, or one for each entry of the last axis before these two."
-        )
+        tables = f"{' x '.join(map(str, shape))} tables" if shape else "one table"
+        allowed = f"1 seed or {shape[-1]} seeds" if shape else "1 seed"
+        raise AntsError(f"there are {len(several)} seeds for {tables}; give {allowed}.")
     return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
 
 

@@ -98,8 +98,8 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
             why = "has fields or arrays" if ours else "was not started by taichi_ants"
             raise AntsError(
                 f"arch={wanted.arch!r}, threads={wanted.threads} requires a restart of Taichi, but "
-                f"it runs with {running.arch!r}, {running.threads}, and {why}; leave out threads "
-                "and arch, or call ti.reset() first, which destroys all fields and arrays."
+                f"it runs with {running.arch!r}, {running.threads} threads, and {why}; leave out "
+                "threads and arch, or call ti.reset() first, which destroys all fields and arrays."
             )
     _init(ti, wanted)
     return wanted

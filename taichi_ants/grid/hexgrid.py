@@ -143,7 +143,8 @@ class AxialGrid:
         if beyond.any():
             cell = tuple(np.asarray(cells)[beyond][0].tolist())
             raise AntsError(
-                f"the cell {cell} is outside the world; give a cell within the ranges {self.ranges}."
+                f"the cell {cell} is outside the world; give a cell within its ranges, "
+                f"{self.ranges}."
             )
         return (qr[..., 1] * self.width + qr[..., 0]).astype(np.int32)
 

@@ -115,7 +115,7 @@ class Page:
             self.tell(frame)
 
     def has_seen(self, frames: int) -> bool:
-        """Return whether the page was behind and, with these frames, has drawn all that was sent."""
+        """Return whether the page was behind and, with these frames, has drawn everything."""
         self.unseen = max(0, self.unseen - frames)
         return self.behind and self.unseen == 0
 

@@ -99,7 +99,7 @@ class Colony(ColonyState):
         else:
             listed = entries_of(seeds)
             if listed is None:
-                raise AntsError(f"seeds is {shown(seeds)}; give a seed for each of these worlds.")
+                raise AntsError(f"seeds is {shown(seeds)}; give a list of one seed per world.")
             checked = [seed for one in listed for seed in checks.checked_seeds(one)]
             if len(checked) != np.count_nonzero(which):
                 n = int(np.count_nonzero(which))

@@ -112,13 +112,12 @@ def test_seeds_of_tables():
     assert checked_seeds_for(4, ()).tolist() == [4]
     assert checked_seeds_for(4, (2, 3)).tolist() == [4] * 6
     assert checked_seeds_for([1, 2, 3], (2, 3)).tolist() == [1, 2, 3, 1, 2, 3]
-    for shape in ((), (2,), (3, 2)):
-        says(
-            f"there are 3 seeds for tables of shape {shape}",
-            checked_seeds_for,
-            [1, 2, 3],
-            shape,
-        )
+    for shape, words in {
+        (): "one table; give 1 seed.",
+        (2,): "2 tables; give 1 seed or 2 seeds.",
+        (3, 2): "3 x 2 tables; give 1 seed or 2 seeds.",
+    }.items():
+        says(f"there are 3 seeds for {words}", checked_seeds_for, [1, 2, 3], shape)
 
 
 NO_COUNTS = [(0, "0"), (-1, "-1"), (1.0, "1.0"), ("1", "'1'"), (None, "None"), (True, "True")]
