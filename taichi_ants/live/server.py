@@ -339,7 +339,9 @@ class Room:
                 self._works[LOAD] = Undoing(self.session)
             case "back":  # return to the session before the present one
                 if self._former is None:
-                    raise AntsError("there is no session before this one.")
+                    raise AntsError(
+                        "there is no session before this one to return to; continue with this one."
+                    )
                 self._begin(self._former, comes_back=True)
             case "begin":  # {"chosen": see `Choices.setup`}
                 self._begin(Session(self.choices.setup(request.get("chosen"))))

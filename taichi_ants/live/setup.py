@@ -137,7 +137,9 @@ class Setup:
         assert isinstance(facts, Mapping)
         known = [one.name for one in fields(cls)]
         for name in facts.keys() - known:
-            raise AntsError(f"a setup has no {shown(name)}; it has only {', '.join(known)}.")
+            raise AntsError(
+                f"{shown(name)} is not a field of a setup; choose one of {', '.join(known)}."
+            )
         policy: Any = facts.get("policy")
         try:
             policy = TrainingConfig(**policy) if policy != "table" or table is None else table

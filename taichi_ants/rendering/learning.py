@@ -139,7 +139,9 @@ def _checked(
     task = checks.checked_task(Task() if task is None else task)
     listed = entries_of(checkpoints)
     if listed is None:
-        raise AntsError(f"checkpoints is {shown(checkpoints)}; it must be numbers of episodes.")
+        raise AntsError(
+            f"checkpoints is {shown(checkpoints)}; it must be a list of numbers of episodes."
+        )
     checkpoints = [whole("a checkpoint", checkpoint) for checkpoint in listed]
     if not checkpoints or checkpoints != sorted(set(checkpoints)) or checkpoints[0] < 0:
         raise AntsError(

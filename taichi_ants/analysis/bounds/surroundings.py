@@ -1,6 +1,6 @@
 """The surroundings of a lone ant in each of its possible states.
 
-A cell here is an index in 0..n-1 into the n cells that an ant can ever enter, and the index of a
+Cells are numbered from 0 to n - 1; they are the n cells that an ant can ever enter. The index of a
 state is heading * n + cell.
 """
 

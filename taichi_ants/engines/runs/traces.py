@@ -174,7 +174,7 @@ def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int =
     if capacity > most:
         raise AntsError(
             f"episodes * max_steps is {capacity}; a trace has at most {most} steps, so reduce one "
-            "of both."
+            "of them."
         )
     checks.checked_world(world)
     runtime.start()
