@@ -546,7 +546,9 @@ def state_after(guest: Guest, room, ticks: int) -> object:
 def test_the_first_session_has_none_before_it(shared):
     with running(shared.choices) as one, Guest(one) as guest:
         guest.ask("back")
-        assert guest.until("error")["words"] == "there is no session before this one."
+        assert guest.until("error")["words"] == (
+            "there is no session before this one to return to; continue with this one."
+        )
 
 
 def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
