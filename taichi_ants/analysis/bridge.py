@@ -174,7 +174,7 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
     titles = {
         SHORT_RIGHT: "Short branch to the right",
         SHORT_LEFT: "Short branch to the left",
-        EQUAL: "Equal branches: share of the right one",
+        EQUAL: "Equal branches: right branch",
     }
     with style.styled():
         figure = style.new_figure(5.6)
@@ -191,8 +191,8 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
             if name != "evaporation":
                 axes.set_xticks(values)
         caption = (
-            f"{sentence(_means(found))}. Above: {Design().ants} ants.\n"
-            "Below, food aside: one setting varies; second half of the time, mean of both mirror "
+            f"{sentence(_means(found))}. Upper row: {Design().ants} ants.\n"
+            "Lower row: food aside, one setting varies; second half of the time, mean of both mirror "
             "images.\nEvaporation: none, 1 per tick (linear), or a half-life in ticks."
         )
         for axes in (above[0], below[0]):

@@ -188,7 +188,7 @@ class Controls {
           : `<input type="number" ${about} step="${step}" min="${one.least ?? one.above ?? ""}" max="${one.most ?? ""}" ${one.optional ? 'placeholder="none"' : "required"}>`;
       html[group] = (html[group] ?? "") + `<label class="setting" title="${safe(one.help + (one.unit ? `, in ${one.unit}` : ""))}">${input} ${words}</label>`;
     });
-    return Object.entries(html).map(([group, inner]) => `<fieldset><legend>${safe(group.replaceAll("_", " "))}</legend>${inner}</fieldset>`).join("");
+    return Object.entries(html).map(([group, inner]) => `<fieldset><legend>${safe(group.split(".").at(-1).replace(/^./, (letter) => letter.toUpperCase()))}</legend>${inner}</fieldset>`).join("");
   }
 
   /* The values of the form by path, without hidden and empty fields. */

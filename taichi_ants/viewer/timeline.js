@@ -4,7 +4,7 @@
 const CURVES = [
   ["delivered", "delivered in total", "delivered", 0],
   ["return", "return per episode", "returns", 0],
-  ["exploration rate (epsilon)", "exploration rate (epsilon)", "epsilon", 3],
+  ["epsilon", "epsilon", "epsilon", 3],
 ];
 const SLOWEST = 0.5, FASTEST = 200; // ticks/s
 const SMOOTH_BELOW = 24; // ticks/s up to which ants glide from cell to cell
@@ -89,7 +89,7 @@ class Timeline {
     this.curves = [...document.querySelectorAll(".curve")];
     // There is no curve of epsilon if it is always 0.
     const explores = history.live || history.frames.some((frame) => frame.epsilon > 0);
-    this.curves.forEach((curve, number) => (curve.hidden = CURVES[number][2] === "epsilon" && !explores));
+    this.curves.forEach((curve, number) => (curve.hidden = CURVES[number][0] === "epsilon" && !explores));
     for (const curve of this.curves) {
       const svg = curve.querySelector("svg");
       const seek = (event) => {

@@ -836,7 +836,7 @@ def test_curves_are_over_time_and_a_late_page_has_them(page, browser, room):
         assert one.tab.get_attribute("#time", "max") == str(session.ticks)
         assert one.tab.get_attribute("#time", "min") == "0"
         names = one.tab.locator(".curve .label span").all_inner_texts()
-        assert names == ["delivered in total", "return per episode", "exploration rate (epsilon)"]
+        assert names == ["delivered in total", "return per episode", "epsilon"]
         assert "delivered this episode" in one.text("#now")
         lines = [
             [float(point.split()[0]) for point in line.removesuffix("h0").lstrip("M").split("L")]
