@@ -192,8 +192,8 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
                 axes.set_xticks(values)
         caption = (
             f"{sentence(_means(found))}. Upper row: {Design().ants} ants.\n"
-            "Lower row: food aside, one setting varies; second half of the time, mean of both mirror "
-            "images.\nEvaporation: none, 1 per tick (linear), or a half-life in ticks."
+            "Lower row: food aside, one setting varies; second half of the time, mean of both "
+            "mirror images.\nEvaporation: none, 1 per tick (linear), or a half-life in ticks."
         )
         for axes in (above[0], below[0]):
             axes.set(ylabel="Crossings (%)", ylim=(0, 103))
