@@ -103,7 +103,7 @@ GROUPS: Groups = {
             ("ours", "colony", "?ants"),
         ),
         System(
-            "Taichi Ants, many",
+            "Taichi Ants, large colony",
             f"{_COLONY} {{many_ants}} ants, the same",
             ("ours", "colony", "?many_ants"),
         ),

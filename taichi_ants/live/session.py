@@ -29,7 +29,7 @@ MOST_TICKS = 1_000_000_000
 MOST_EDITS = 10_000
 MOST_CELLS = 400_000  # cells in all edits together
 # Sessions within these limits fit into `most`, so reading a file takes little time and memory.
-_WRITER = "Session.save, or Save on its page,"
+_WRITER = "Session.save, or Save session on its page,"
 KIND = Kind("session", 3, _WRITER, most=5_000_000, most_lists=100_000)
 _PIECE = 0.02  # seconds of a piece of a replay
 _BETWEEN = 0.1  # seconds of simulation between snapshots, the longest replay of an undo

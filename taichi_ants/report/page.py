@@ -113,7 +113,7 @@ class Shown(NamedTuple):
         words, by_mean = _measured(self.finding, self.label, self.unit), self.finding.by_mean
         if by_mean and by_mean.verdict is not self.finding.verdict:
             told = _measured(by_mean, by_mean.contrast.label, self.unit)  # its contrast may differ
-            words += f"; by the mean {by_mean.verdict.value}: {told}"
+            words += f". With the mean instead of the IQM, {by_mean.verdict.value}: {told}"
         return words
 
     @property

@@ -89,7 +89,7 @@ def test_all_files_are_there(finished):
     assert len(out.splitlines()) <= 42
     assert out.splitlines()[-1] == "out/report.html"
     assert "Deliveries per 1000 ticks of 3 ants" in report
-    assert "2 seeds, too few for a verdict, exploration rate 0.01; in brackets: 0." in report
+    assert "2 seeds, too few for a verdict, exploration rate 0.01; in brackets: without" in report
     assert "What does each rule add?" in report
     page = (folder / "report.html").read_text("utf-8")
     assert (

@@ -457,7 +457,7 @@ def test_a_session_is_saved_and_loaded(room):
         guest.socket.send(saved[:-200] + b"\0" * 200)
         words = guest.until("error")["words"]
         assert words.startswith("the loaded file is damaged")
-        assert words.endswith("; load a session that Save has made.")
+        assert words.endswith("; load a file that Save session has written.")
         assert state_of(room) == before
 
 
@@ -596,7 +596,7 @@ def test_a_file_that_would_hold_the_server_is_refused_at_once(room, name, tmp_pa
         words = guest.until("error")["words"]
         assert time.monotonic() - began < 1.0 * crowding()
     assert ATTACKS[name][1] in words
-    assert words.endswith("; load a session that Save has made.")
+    assert words.endswith("; load a file that Save session has written.")
     assert "\n" not in words
     assert state_of(room) == before
     with pytest.raises(AntsError, match=ATTACKS[name][1]):  # as --session does

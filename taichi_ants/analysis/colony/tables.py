@@ -176,7 +176,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             line.append(figure(best.estimates["bound"].mean) + range_)
         cells.append(["Mean bound, right of way [range]", *line])
     title = f"{sentence(study.MEASURES['deliveries'])} of {count(largest, 'ant')}"
-    note = f"{_basis(rows)}; in brackets: 0. %: share of each world's bound."
+    note = f"{_basis(rows)}; in brackets: without exploration; %: share of the world's bound."
     return Table(title, ("", *_headers(shown)), cells, [note] if cells else [])
 
 
