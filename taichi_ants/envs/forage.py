@@ -18,14 +18,7 @@ from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, StepLimit, Worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
 from taichi_ants.task import Task
-from taichi_ants.task.constants import (
-    EMPTY,
-    EPISODE_STEPS,
-    FOOD,
-    N_ACTIONS,
-    OBSTACLE,
-    QUEEN,
-)
+from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
 from taichi_ants.worlds import World, text_map
 
 DELIVERIES = ("terminates", "truncates", "continues")

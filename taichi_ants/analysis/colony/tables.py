@@ -11,7 +11,8 @@ import numpy as np
 from taichi_ants.analysis.colony import study
 from taichi_ants.analysis.colony.study import Condition, Design, Judged, Measured, Series, Sizes
 from taichi_ants.analysis.findings import Finding, Verdict, seeds_in_words, weakest
-from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of, seed_rows
+from taichi_ants.analysis.statistics import Estimator
+from taichi_ants.analysis.sweeps import centre_columns, centres_of, seed_rows
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
