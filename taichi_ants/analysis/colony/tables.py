@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -22,6 +21,7 @@ from taichi_ants.analysis.tables import (
     number,
     percent,
     sentence,
+    tally,
 )
 from taichi_ants.errors import count
 
@@ -226,14 +226,12 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
     lines = ["Statements about the largest colonies"]
     for question in study.QUESTIONS:
-        verdicts = Counter(
+        verdicts = tally(
             of_largest(findings).verdict.value
             for (_, series), findings in judged.items()
             if series.question == question
         )
-        if verdicts:
-            words = ", ".join(f"{n} {verdict}" for verdict, n in verdicts.most_common())
-            lines.append(f"  {question} {words}")
+        lines += [f"  {question} {verdicts}"] if verdicts else []
     return [
         f"{conditions}, {seeds_in_words(rows[0].seeds)}.",
         *([seen] if seen.rows else means(rows)),
