@@ -508,7 +508,7 @@ def test_no_session_at_all(content):
         ({"seed": 1.5}, "a seed"),
         ({"ticks_per_episode": -1}, "ticks_per_episode is -1"),
         ({"sharing": "frozen"}, "sharing is 'frozen'"),
-        ({"colour": "red"}, "no 'colour'"),
+        ({"colour": "red"}, "'colour' is not a field of a setup"),
         ({"epsilon": math.nan}, "epsilon is nan"),
     ],
 )
