@@ -108,7 +108,7 @@ def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray
 
 
 def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return numbers (rows,) that were computed from values (rows, seeds), rounding errors as 0."""
+    """Return numbers (rows,) computed from values (rows, seeds), with rounding errors set to 0."""
     tiny = TIE_TOLERANCE * np.abs(values).max(axis=1)
     return np.where(np.abs(numbers) <= tiny, 0.0, numbers)
 
@@ -165,8 +165,9 @@ def cautious_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the hull of the bootstrap and the t interval, which verdicts use.
 
-    If half of all seeds differed from the others, n seeds would agree by chance with probability
-    2^(1-n) (the sign test). If they agree and this is above 1 - level, the interval is unbounded.
+    If all n seeds agree, but could do so by chance, the interval is unbounded. By the sign test,
+    this is so if 2^(1-n) is above 1 - level: the probability that n seeds agree if half of all
+    seeds differ from the others.
     """
     values = np.asarray(values, float)
     n = values.shape[1]

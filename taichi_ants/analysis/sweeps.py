@@ -85,7 +85,8 @@ def report(
 ) -> str:
     """Return the means with their intervals as a table for a terminal.
 
-    `notes` has the verdict of each point: its first measure, compared with the value `against`.
+    With `against`, a setting and its value, the last column compares the first measure of each
+    point with that value; `notes` has its text.
     """
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}

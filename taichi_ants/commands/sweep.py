@@ -1,7 +1,8 @@
 """Sweep any settings of the world, the task, the learner or the colony, from a TOML file.
 
-FILE has fixed settings, settings that vary with their values, seeds, and measures. The command runs
-every combination with every seed, and writes tables and a figure to a folder. See docs/sweeps.md.
+FILE lists fixed settings, the values of settings to vary, seeds, and measures. The command runs
+every combination of values with every seed, and writes tables and a figure to a folder. See
+docs/sweeps.md.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ def parse_arguments(
         parser.add_argument("file", type=Path, metavar="FILE", help="sweep to run (.toml)")
     parser.set_defaults(**({"file": file} if file else {}))
     command_line.add_common(parser)
-    name = f"sweep-{file.stem}" if file else "sweep-NAME, by the name of FILE"
+    name = f"sweep-{file.stem}" if file else "sweep-NAME for the file NAME.toml"
     command_line.add_results(parser, name, quick=False)
     settings = parser.parse_args(arguments)
     settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")

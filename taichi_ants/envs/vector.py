@@ -89,7 +89,7 @@ class Ants(ABC):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return rewards, float64 (n,), terminations and truncations, bool (n,), as copies.
 
-        `actions` are those of all ants, (n,); `waiting`, bool (W,), are worlds at an episode's end.
+        `actions` are those of all ants, (n,); `waiting`, bool (W,), marks worlds that had ended.
         """
 
     @abstractmethod

@@ -97,7 +97,7 @@ def do_comparison(
 
 
 def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
-    """Compile and import all that a worker process needs to record and draw, before it has to."""
+    """Compile and import all that a worker process needs to record and draw, in advance."""
     load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)

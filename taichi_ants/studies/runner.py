@@ -128,7 +128,7 @@ class RunPoint:
 
 @dataclass(frozen=True)
 class ColonyPoint:
-    """A colony that learns, and is then evaluated without learning, with the minimum of epsilon.
+    """A colony that learns, and is then evaluated without learning, with its lowest epsilon.
 
     Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
     integer (seeds, rollouts), as in `ColonyEpisodes`; `q_values`, float32 (seeds, n_states, 5), if

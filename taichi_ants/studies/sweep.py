@@ -97,10 +97,10 @@ class Sweep:
         return self.study.reduced(blocks, reduce, threads, arch, progress)
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
-        """Return the difference of each point to the one that differs only in `against`, by point.
+        """Return by point the finding on its difference from the point with the value `against`.
 
-        `values` is the first measure, float64 (points, seeds). Intervals hold at once within a
-        [vary].
+        `values` is the first measure, float64 (points, seeds). All intervals of a [vary] table hold
+        at the same time.
         """
         if self.against is None:
             return {}
@@ -118,7 +118,7 @@ class Sweep:
         return found
 
     def write(self, values: dict[str, np.ndarray], folder: Path, draws: bool) -> None:
-        """Write all results of `values`, from `measured`."""
+        """Write all results; `values` are those that `measured` returned."""
         first, columns = self.measures[0], sweeps.columns_of(self.settings)
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
@@ -286,7 +286,7 @@ def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
     preset, drawn = given.pop("preset", "paper"), "seed" in given
     first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
     if checked_flag("world.per_seed", per_seed) and kind == "runs":
-        raise AntsError("world.per_seed is for colonies only; leave it out.")
+        raise AntsError('world.per_seed is true, but kind is "runs"; leave it out.')
     if per_seed or drawn:
         worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
     if not per_seed:

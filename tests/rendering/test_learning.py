@@ -113,7 +113,7 @@ def test_stages_of_several_worlds_are_refused() -> None:
     checkpoints = [
         Checkpoint(1, Episode.play(world, trail_follower())) for world in (paper(), open_world(3))
     ]
-    with pytest.raises(AntsError, match="several worlds"):
+    with pytest.raises(AntsError, match="in 2 worlds; give checkpoints of one"):
         next(learning_frames(checkpoints))
 
 

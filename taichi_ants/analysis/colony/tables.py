@@ -79,7 +79,7 @@ def condition_rows(measured: Measured) -> list[ConditionRow]:
 
 
 def difference_rows(judged: Judged) -> list[dict[str, Any]]:
-    """Return the rows of differences.csv; intervals of a question and a world hold at once."""
+    """Return the rows of differences.csv, with the intervals of `study.judge_all`."""
     return [
         {
             "world_kind": world_kind,
@@ -176,7 +176,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             line.append(figure(best.estimates["bound"].mean) + range_)
         cells.append(["Mean bound, right of way [range]", *line])
     title = f"{sentence(study.MEASURES['deliveries'])} of {count(largest, 'ant')}"
-    note = f"{_basis(rows)}; in brackets: 0. %: share of each world's bound."
+    note = f"{_basis(rows)}; in brackets: without exploration; %: share of the world's bound."
     return Table(title, ("", *_headers(shown)), cells, [note] if cells else [])
 
 
@@ -219,7 +219,7 @@ def _compared(
 
 
 def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
-    """Return deliveries at a glance, the main findings, and the number of statements that hold."""
+    """Return tables of deliveries and of the main findings, and the number of true statements."""
     seen = glance(rows)
     world_kinds = {one.condition.world_kind for one in rows}
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
@@ -242,7 +242,7 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 
 
 def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
-    """Return the finding on the largest colony; of several, the strongest objection."""
+    """Return the finding on the largest colony; of several, the one that objects most."""
     return _of_size(findings, max(ants for ants, _ in findings))
 
 
