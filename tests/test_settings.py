@@ -177,7 +177,7 @@ def test_named_settings_are_checked_changed_and_compared_by_name_and_order():
 
 
 def test_messages_of_named_settings_name_the_entry():
-    says = "`kitchen.soups.first.salt` is -1; it must be between 0 and 50 000."
+    says = "`kitchen.soups.first.salt` is -1; it must be between 0 and 50000."
     assert refused(lambda: Kitchen({"first": {"salt": -1}})) == says
     says = "`kitchen.soups` is 3; it must be a table of names, each with a NamedSoup."
     assert refused(lambda: Kitchen(3)) == says
