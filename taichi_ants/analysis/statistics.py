@@ -18,8 +18,10 @@ that results are reproducible.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,19 +94,30 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
     return interquartile_mean(values)[:, None] + moved
 
 
-def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray]:
-    """Return estimates of values (rows, seeds) with intervals, float64 (rows,) by column name.
+class Estimator(NamedTuple):
+    """Estimates of a measure over seeds: mean, IQM or None, 95 % intervals (nan for one seed)."""
 
-    The columns are "mean", "ci_low", "ci_high"; with `uses_iqm` also "iqm", "iqm_ci_low" and
-    "iqm_ci_high".
-    """
+    mean: float
+    ci_low: float
+    ci_high: float
+    iqm: float | None = None
+    iqm_ci_low: float = math.nan
+    iqm_ci_high: float = math.nan
+
+    @property
+    def apart(self) -> bool:
+        """Whether the mean lies outside of the interval of the IQM."""
+        return self.mean < self.iqm_ci_low or self.mean > self.iqm_ci_high
+
+
+def estimates(values: np.ndarray, uses_iqm: bool = True) -> list[Estimator]:
+    """Return the estimates of each row of values (rows, seeds), without IQM unless `uses_iqm`."""
     values = np.asarray(values, float)
-    columns = {"mean": values.mean(axis=1)}
-    columns["ci_low"], columns["ci_high"] = bootstrap_interval(values)
+    columns = [values.mean(axis=1), *bootstrap_interval(values)]
     if uses_iqm:
-        columns["iqm"] = interquartile_mean(values)
-        columns["iqm_ci_low"], columns["iqm_ci_high"] = bootstrap_interval(values, iqm=True)
-    return {name: without_noise(column, values) for name, column in columns.items()}
+        columns += [interquartile_mean(values), *bootstrap_interval(values, iqm=True)]
+    exact = (without_noise(column, values).tolist() for column in columns)
+    return [Estimator(*row) for row in zip(*exact, strict=True)]
 
 
 def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -54,7 +54,7 @@ def bridge(settings: argparse.Namespace) -> None:
     def work(blocks: Path, ready: Path) -> None:
         found = {}
         with command_line.progress_bar("bridge") as progress:
-            outcomes = study.run(blocks, **where, progress=lambda share: progress(0.6 * share))
+            outcomes = study.run(blocks, lambda share: progress(0.6 * share), **where)
             for number, (design, one) in enumerate(points.items()):
                 path, tables = blocks / f"followed-{number:06d}.npz", outcomes[one]["q_values"]
                 found[design] = followed(path, design, one, seeds, tables, ticks, where)

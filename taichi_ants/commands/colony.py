@@ -193,7 +193,8 @@ def study(settings: argparse.Namespace) -> None:
 
     def work(blocks: Path, ready: Path) -> Results:
         with command_line.progress_bar("study") as progress:
-            outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
+            where = {"threads": settings.threads, "arch": settings.arch}
+            outcomes = asked.run(blocks, progress, **where)
         return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
 
     words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}

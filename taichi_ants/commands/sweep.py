@@ -39,7 +39,8 @@ def sweep(settings: argparse.Namespace) -> None:
 
     def work(blocks: Path, ready: Path) -> None:
         with command_line.progress_bar("sweep") as progress:
-            values = asked.measured(blocks, settings.threads, settings.arch, progress)
+            where = {"threads": settings.threads, "arch": settings.arch}
+            values = asked.measured(blocks, progress, **where)
         asked.write(values, ready, draws=not settings.no_figures)
 
     work_or_show(settings, asked.facts(), work)

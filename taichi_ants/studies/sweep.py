@@ -81,10 +81,8 @@ class Sweep:
         own = {"measures": self.measures, "against": self.against, "margin": self.margin}
         return {**self.study.settings(), **own, "vary": self.settings}
 
-    def measured(
-        self, blocks: Path, threads: int | None, arch: str | None, progress: Progress
-    ) -> dict[str, np.ndarray]:
-        """Return each measure of each point and seed, float64 (points, seeds)."""
+    def measured(self, blocks: Path, progress: Progress, **where: Any) -> dict[str, np.ndarray]:
+        """Return each measure, float64 (points, seeds); arguments as of `Study.in_blocks`."""
 
         def reduce(points: Sequence[Any], seeds: Sequence[int], outcome: Outcome) -> Outcome:
             if self.kind == "runs":
@@ -94,7 +92,7 @@ class Sweep:
             found = of_colonies.measures_of(arrays, point.ants, point.ticks)
             return {name: found[name][None] for name in self.measures}
 
-        return self.study.reduced(blocks, reduce, threads, arch, progress)
+        return self.study.reduced(blocks, reduce, progress, **where)
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
         """Return by point the finding on its difference from the point with the value `against`.

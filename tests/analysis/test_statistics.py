@@ -177,11 +177,16 @@ def test_ties_in_the_middle_half_leave_an_interval_where_the_tails_are_near() ->
 def test_columns_of_a_table_are_free_of_rounding_noise() -> None:
     values = np.array([[0.1, 0.2, -0.3, 0.1, 0.2, -0.3], [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]])
     assert 0 < abs(values[0].mean()) < 1e-16
-    columns = estimates(values)
-    assert columns["mean"].tolist() == [0.0, 3.5]
-    assert columns["iqm"].tolist() == [without_noise(interquartile_mean(values), values)[0], 3.5]
-    assert list(columns) == ["mean", "ci_low", "ci_high", "iqm", "iqm_ci_low", "iqm_ci_high"]
-    assert list(estimates(values, uses_iqm=False)) == ["mean", "ci_low", "ci_high"]
+    first, second = estimates(values)
+    assert (first.mean, second.mean) == (0.0, 3.5)
+    assert first.iqm == without_noise(interquartile_mean(values), values)[0]
+    assert second.iqm == 3.5
+    fields = ("mean", "ci_low", "ci_high", "iqm", "iqm_ci_low", "iqm_ci_high")
+    assert first._fields == fields
+    assert [one[:4] for one in estimates(values, uses_iqm=False)] == [
+        (*first[:3], None),
+        (*second[:3], None),
+    ]
 
 
 def test_student_interval_by_hand() -> None:

@@ -201,7 +201,7 @@ def test_quick_has_a_folder_of_its_own():
 def test_other_arenas_are_the_only_difference_and_their_order_is_none(
     capsys, tmp_path, monkeypatch
 ):
-    def stop(study, blocks, *more):
+    def stop(study, blocks, *more, **where):
         (blocks / "0.npz").touch()
         raise KeyboardInterrupt
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -11,7 +10,8 @@ import numpy as np
 from taichi_ants.analysis.colony import study
 from taichi_ants.analysis.colony.study import Condition, Design, Judged, Measured, Series, Sizes
 from taichi_ants.analysis.findings import Finding, Verdict, seeds_in_words, weakest
-from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of, seed_rows
+from taichi_ants.analysis.statistics import Estimator
+from taichi_ants.analysis.sweeps import centre_columns, centres_of, seed_rows
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
@@ -21,6 +21,7 @@ from taichi_ants.analysis.tables import (
     number,
     percent,
     sentence,
+    tally,
 )
 from taichi_ants.errors import count
 
@@ -225,14 +226,12 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
     lines = ["Statements about the largest colonies"]
     for question in study.QUESTIONS:
-        verdicts = Counter(
+        verdicts = tally(
             of_largest(findings).verdict.value
             for (_, series), findings in judged.items()
             if series.question == question
         )
-        if verdicts:
-            words = ", ".join(f"{n} {verdict}" for verdict, n in verdicts.most_common())
-            lines.append(f"  {question} {words}")
+        lines += [f"  {question} {verdicts}"] if verdicts else []
     return [
         f"{conditions}, {seeds_in_words(rows[0].seeds)}.",
         *([seen] if seen.rows else means(rows)),

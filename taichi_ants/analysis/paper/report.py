@@ -21,7 +21,7 @@ from taichi_ants.analysis.paper.table2 import (
     summarise_behaviours,
     table2,
 )
-from taichi_ants.analysis.sweeps import Estimator
+from taichi_ants.analysis.statistics import Estimator
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,

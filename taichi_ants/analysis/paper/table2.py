@@ -16,8 +16,8 @@ from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
 from taichi_ants.analysis.paper.comparison import Comparison, Row, Variant
 from taichi_ants.analysis.paper.measures import MEASURES
 from taichi_ants.analysis.paper.published import TABLE_2, PaperRow
-from taichi_ants.analysis.statistics import RANDOM_SEED, interquartile_mean
-from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of
+from taichi_ants.analysis.statistics import RANDOM_SEED, Estimator, interquartile_mean
+from taichi_ants.analysis.sweeps import centre_columns, centres_of
 
 DRAWS = 20_000
 # Measures in table 2. The paper has one number of steps, which can be read in two ways.
