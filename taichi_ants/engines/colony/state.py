@@ -57,7 +57,7 @@ _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 # Unused settings for colonies with given actions, in which ants neither choose nor learn.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
-_KIND = Kind("colony", 11, "Colony.save")
+_KIND = Kind("colony", 12, "Colony.save")
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
@@ -67,8 +67,9 @@ _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 class ColonyEpisodes(Record):
     """Results of episodes, arrays of shape (episodes, worlds).
 
-    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `living` ants at the
-    end. Returns, moves and blocked are int64, all others int32.
+    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks with
+    food of all delivered loads, `living` ants at the end. Returns, moves, blocked and carried are
+    int64, all others int32.
     """
 
     returns: np.ndarray
@@ -77,6 +78,7 @@ class ColonyEpisodes(Record):
     first_delivery: np.ndarray
     moves: np.ndarray
     blocked: np.ndarray
+    carried: np.ndarray
     births: np.ndarray
     deaths: np.ndarray
     regrown: np.ndarray
@@ -261,10 +263,13 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
+        return ColonyEpisodes(**{name: one[None].copy() for name, one in self._counts().items()})
+
+    def _counts(self) -> Arrays:
+        """Return views of the counts of the episode (W,), by their names in `ColonyEpisodes`."""
         totals, worlds = self.arrays["totals"], self.arrays["worlds"]
-        counts = {row.name: totals[row] for row in TOTALS}
-        counts |= {row.name: worlds[row] for row in WorldRow if row >= WorldRow.TICKS}
-        return ColonyEpisodes(**{name.lower(): one[None].copy() for name, one in counts.items()})
+        counts = {row.name.lower(): totals[row] for row in TOTALS}
+        return counts | {row.name.lower(): worlds[row] for row in WorldRow if row >= WorldRow.TICKS}
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return the present state of world number `world`; arrays are copies."""
@@ -277,13 +282,22 @@ class ColonyState:
         ground[ant_cells] = EMPTY
         stored, clock = self.stored_trail(world)
         trail = np.maximum(stored - stored.dtype.type(clock), 0)
+        carries = self.carrying[world, living]
+        carried = self.arrays["carried"].reshape(self.cells.shape)[world, living]
         return Snapshot(
             self.grid,
             ground,
             trail,
             ant_cells,
             self.headings[world, living].astype(np.int32),
-            self.carrying[world, living],
+            carries,
+            ant_carried=np.where(carries, carried, np.int32(0)),
+            ant_numbers=self.numbers[world, living],
+            ant_actions=self.actions[world, living].astype(np.int32),
+            ant_events=self.events[world, living].astype(np.int32),
+            fields={"trail": trail},
+            counts={name: int(array[world]) for name, array in self._counts().items()},
+            world=self.worlds[world],
         )
 
     def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:
