@@ -7,7 +7,7 @@ The state is in NumPy arrays, which kernels change in place. Only this package r
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
@@ -42,6 +42,8 @@ from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
+from taichi_ants.measures.series import Series
+from taichi_ants.measures.tidy import Measured, Tidy, seed_array
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.worlds.world import Start, World
@@ -64,12 +66,13 @@ _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ColonyEpisodes(Record):
+class ColonyEpisodes(Record, Tidy):
     """Results of episodes, arrays of shape (episodes, worlds).
 
-    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks with
-    food of all delivered loads, `living` ants at the end. Returns, moves, blocked and carried are
-    int64, all others int32.
+    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
+    with food of all delivered loads, `living` ants at the end. Returns, moves, blocked and carried
+    are int64, all others int32. `seeds` has the seed of each world. `series` has the values of the
+    measures that you asked `Colony.run` for, else None.
     """
 
     returns: np.ndarray
@@ -83,6 +86,35 @@ class ColonyEpisodes(Record):
     deaths: np.ndarray
     regrown: np.ndarray
     living: np.ndarray
+    seeds: tuple[int, ...] = ()
+    series: Series | None = field(default=None, repr=False)
+
+    def counts(self) -> Arrays:
+        """Return the arrays of all counts by name."""
+        return {name: array for name, array in vars(self).items() if isinstance(array, np.ndarray)}
+
+    def measured(self) -> Measured:
+        """Return the values of the measures, or all counts if `Colony.run` was asked for none."""
+        shape, series = self.returns.shape, self.series
+        if series is None:
+            episodes, worlds = (one.ravel().astype(np.int32) for one in np.indices(shape))
+            ticks = self.ticks.ravel()
+            values = {name: array.ravel() for name, array in self.counts().items()}
+            usual: tuple[str, ...] = ("deliveries",)
+        else:
+            worlds, episodes, ticks = series.worlds, series.episodes, series.ticks
+            values, usual = dict(series.values), tuple(series.values)
+        seeds = seed_array(self.seeds)[worlds]
+        index = {"world": worlds, "seed": seeds, "episode": episodes, "tick": ticks}
+        return Measured(
+            index=index,
+            values=values,
+            of_seed=worlds,
+            of_group=np.zeros(len(worlds), np.int32),
+            seeds=self.seeds,
+            usual=usual,
+            units={} if series is None else dict(series.units),
+        )
 
 
 def column(name: str) -> property:
@@ -263,7 +295,8 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
-        return ColonyEpisodes(**{name: one[None].copy() for name, one in self._counts().items()})
+        counts: dict[str, Any] = {n: one[None].copy() for n, one in self._counts().items()}
+        return ColonyEpisodes(**counts, seeds=self.seeds)
 
     def _counts(self) -> Arrays:
         """Return views of the counts of the episode (W,), by their names in `ColonyEpisodes`."""
