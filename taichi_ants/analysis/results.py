@@ -113,7 +113,10 @@ def compare(
             seed has a value in both results.
     """
     for name, result in (("a", a), ("b", b)):
-        expect(name, result, Tidy)
+        if not isinstance(result, Tidy):
+            raise AntsError(
+                f"{name} is {shown(result)}; give a result of Colony.run, train or evaluate."
+            )
     if not isinstance(level, (int, float)) or not 0 < level < 1:
         raise AntsError(f"level is {shown(level)}; it must be a number between 0 and 1.")
     tables = a.measured(), b.measured()
