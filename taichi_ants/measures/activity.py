@@ -31,9 +31,9 @@ def activity(snapshot: Snapshot) -> float:
 def synchrony(values: np.ndarray, snapshot: Snapshot) -> float:
     """Return how much more the `activity` varies over time than that of independent ants.
 
-    With the mean m and the variance v (division by the number of rows) of the activity in the rows
-    of the episode so far, and n living ants, it is n v / (m (1 - m)), the binomial index of
-    dispersion. Independent ants with equal, constant activity give about 1; ants that all move or
+    It is n v / (m (1 - m)), the binomial index of dispersion, for n living ants. m and v are the
+    mean and the variance of the activity in the rows of the episode so far. The variance is divided
+    by the number of rows. Independent ants with equal, constant activity give about 1; ants that all move or
     rest together give n. Studies of activity cycles in ants, such as Cole [1]_, look at the same
     series, the share of active ants. The value is nan with fewer than two rows, without ants, and
     if m is 0 or 1.
