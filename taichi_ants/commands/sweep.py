@@ -40,6 +40,7 @@ def sweep(settings: argparse.Namespace) -> None:
         with command_line.progress_bar("sweep") as progress:
             values = asked.measured(blocks, settings.threads, settings.arch, progress)
         asked.write(values, ready, draws=not settings.no_figures)
+        asked.write_series(blocks, ready)
 
     work_or_show(settings, asked.facts(), work)
 

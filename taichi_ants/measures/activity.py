@@ -33,10 +33,10 @@ def synchrony(values: np.ndarray, snapshot: Snapshot) -> float:
 
     It is n v / (m (1 - m)), the binomial index of dispersion, for n living ants. m and v are the
     mean and the variance of the activity in the rows of the episode so far. The variance is divided
-    by the number of rows. Independent ants with equal, constant activity give about 1; ants that all move or
-    rest together give n. Studies of activity cycles in ants, such as Cole [1]_, look at the same
-    series, the share of active ants. The value is nan with fewer than two rows, without ants, and
-    if m is 0 or 1.
+    by the number of rows. Independent ants with equal, constant activity give about 1. Ants that
+    all move or rest together give n. Studies of activity cycles in ants, such as Cole [1]_, look at
+    the same series, the share of active ants. The value is nan with fewer than two rows, without
+    ants, and if m is 0 or 1.
 
     .. [1] B. J. Cole (1991), Short-term activity cycles in ants: generation of periodicity by
        worker interaction, American Naturalist 137, 244-259.

@@ -123,8 +123,7 @@ class Recorder:
 
     def stops(self, ticks: int) -> Iterator[int]:
         """Yield the ticks at which to call `read` in an episode of this length."""
-        yield from range(self.every or ticks, ticks, self.every or ticks)
-        yield ticks
+        return stops(ticks, self.every)
 
     def read(self, colony: Colony) -> None:
         """Read all measures, except in worlds that have not changed since their last row."""
@@ -167,6 +166,12 @@ class Recorder:
             maps={name: _stacked(name, [row.values.get(name) for row in rows]) for name in arrays},
             units=dict(self._units),
         )
+
+
+def stops(ticks: int, every: int | None) -> Iterator[int]:
+    """Yield the ticks of the rows of an episode of this length, in which the last tick has one."""
+    yield from range(every or ticks, ticks, every or ticks)
+    yield ticks
 
 
 def _named(name: str, value: Value) -> Iterator[tuple[str, Value]]:

@@ -18,8 +18,9 @@ def entropy(snapshot: Snapshot) -> dict[str, float]:
 
     It is -(sum of p log p) / log N. N is the number of cells that are not obstacles, and p is the
     level of each of them, divided by the sum of their levels. This is Shannon's entropy [1]_
-    divided by its largest value, which is called Pielou's evenness [2]_. All of the pheromone in one cell gives 0, equal levels in all cells give
-    1. A field without pheromone, and a world with one cell, give 0.
+    divided by its largest value, which is called Pielou's evenness [2]_. All of the pheromone in
+    one cell gives 0, equal levels in all cells give 1. A field without pheromone, and a world with
+    one cell, give 0.
 
     .. [1] C. E. Shannon (1948), A mathematical theory of communication, Bell System Technical
        Journal 27, 379-423.
