@@ -109,7 +109,7 @@ __all__ = [
 
 
 def _show_pages_in_notebooks() -> None:
-    """Register colonies, traces and recordings with IPython, if it runs, to be shown as pages."""
+    """Register worlds, colonies, traces and recordings with IPython, if it runs, to be drawn."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if shell is None:
         return
@@ -123,6 +123,7 @@ def _show_pages_in_notebooks() -> None:
     formatter.for_type_by_name("taichi_ants.engines.colony.colony", "Colony", page_of)
     formatter.for_type_by_name("taichi_ants.engines.runs.traces", "Trace", page_of)
     formatter.for_type_by_name("taichi_ants.viewer.frames", "Recording", page_of)
+    formatter.for_type_by_name("taichi_ants.worlds.world", "World", page_of)
 
 
 prepare_for_taichi()
