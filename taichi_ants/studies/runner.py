@@ -153,8 +153,8 @@ class ColonyPoint:
 
     Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
     integer (seeds, rollouts), as in `ColonyEpisodes`; `q_values`, float32 (seeds, n_states, 5), if
-    ants learned into a shared table; `series_NAME` of each measure NAME, float64 (seeds, rollouts,
-    rows).
+    ants learned into a shared table. `series_NAME`, float64 (seeds, rollouts, rows), of each
+    measure NAME.
 
     Attributes:
         world: The world, or one for each seed, all of the same ranges.
