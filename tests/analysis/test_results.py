@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,11 +12,21 @@ from taichi_ants import AntsError, Colony, TrainingConfig, compare, evaluate, tr
 from taichi_ants.analysis.results import curves, of_seeds
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.measures.tidy import Measured
+from taichi_ants.measures.tidy import Measured, Tidy
 
 SEEDS = range(5)
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
 ASKED = ["deliveries", "entropy", "path_length"]
+
+
+class Made(Tidy):
+    """A result of given rows."""
+
+    def __init__(self, table: Measured) -> None:
+        self.table = table
+
+    def measured(self) -> Measured:
+        return self.table
 
 
 def run(ants=6, seeds=SEEDS, **asked):
@@ -131,6 +142,12 @@ def test_seeds_without_a_value_do_not_count():
     )  # fmt: skip
     assert of_seeds(table, "length").tolist() == [[2, 6]]
     assert np.isnan(of_seeds(table, "none")).all()
+    full = replace(table, values={"length": np.array([1.0, 1.0, 3.5, 1.0])})
+    for pair, difference in (((table, full), -1.5), ((full, table), 1.5)):
+        for missing in (np.nan, 6.0):
+            table.values["length"][3] = missing
+            found = compare(*map(Made, pair), "length")
+            assert (found.seeds, found.differences[0]) == (1 + (missing == 6.0), difference)
     ((x, values),) = curves(table, "length", "tick")
     assert x.tolist() == [10, 15, 20]
     np.testing.assert_array_equal(values, [[1, np.nan], [1, 6], [2, 6]])
