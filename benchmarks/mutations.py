@@ -37,6 +37,9 @@ SERVER = "tests/live/test_server.py"
 SESSION = "tests/live/test_session.py"
 EDITS = "tests/live/test_edits.py"
 SETTINGS = "tests/test_settings.py"
+MEASURES = "tests/measures"
+RESULTS_OF_RUNS = "tests/analysis/test_results.py"
+SWEEPS = "tests/commands/test_sweep_measures.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
@@ -204,6 +207,24 @@ MUTATIONS = [
     ("worlds/world.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
     ("worlds/world.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
     ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
+    # Measures and results.
+    (
+        "engines/colony/steps.py",
+        "Tally.CARRIED, chunk, carried)",
+        "Tally.CARRIED, chunk, 1)",
+        COLONY,
+    ),
+    ("measures/paths.py", 'counts["carried"] / counts', 'counts["moves"] / counts', MEASURES),
+    ("measures/paths.py", "float(reached.min()) - 1)", "float(reached.min()))", MEASURES),
+    ("measures/trails.py", "level, n in pairs)", "level, _ in pairs for n in (1,))", MEASURES),
+    ("measures/trails.py", "/ math.log(cells))", "/ math.log(cells + 1))", MEASURES),
+    ("measures/activity.py", "(one - mean) ** 2", "abs(one - mean)", MEASURES),
+    ("measures/series.py", "if self._read.get(world) == tick:", "if False:", MEASURES),
+    ("measures/ants.py", "snapshot.distances[snapshot.ant_cells]", "snapshot.distances", MEASURES),
+    ("measures/tidy.py", "[last[key] == tick", "[last[key] >= tick", RESULTS_OF_RUNS),
+    ("analysis/results.py", "goes_on, np.roll(begins, -1)", "goes_on, begins + 1", RESULTS_OF_RUNS),
+    ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
+    ("studies/sweep.py", "last = array[..., -1]", "last = array[..., 0]", SWEEPS),
     # Settings.
     ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
     ("settings.py", "elif value != one.default:", "elif False:", SETTINGS),

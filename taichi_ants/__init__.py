@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING
 from taichi_ants.environment import prepare_for_taichi
 
 if TYPE_CHECKING:
-    from taichi_ants import analysis, learners, offline, reference, rendering, task, worlds
+    from taichi_ants import (
+        analysis,
+        learners,
+        measures,
+        offline,
+        reference,
+        rendering,
+        task,
+        worlds,
+    )
+    from taichi_ants.analysis.results import compare
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
@@ -28,6 +38,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _NAMES_IN = {
+    "analysis.results": ("compare",),
     "engines.colony.colony": ("Colony", "ColonyEpisodes"),
     "engines.runs.results": ("Rollouts", "TrainingResult"),
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
@@ -43,7 +54,17 @@ _NAMES_IN = {
     "worlds": ("World",),
 }
 _MODULES = (
-    *("analysis", "learners", "offline", "reference", "rendering", "task", "task.states", "worlds"),
+    *(
+        "analysis",
+        "learners",
+        "measures",
+        "offline",
+        "reference",
+        "rendering",
+        "task",
+        "task.states",
+        "worlds",
+    ),
 )
 
 __all__ = [
@@ -63,11 +84,13 @@ __all__ = [
     "World",
     "__version__",
     "analysis",
+    "compare",
     "continue_training",
     "evaluate",
     "from_minari",
     "learners",
     "load_policy",
+    "measures",
     "offline",
     "record",
     "record_colony",
@@ -86,7 +109,7 @@ __all__ = [
 
 
 def _show_pages_in_notebooks() -> None:
-    """Register colonies, traces and recordings with IPython, if it runs, to be shown as pages."""
+    """Register worlds, colonies, traces and recordings with IPython, if it runs, to be drawn."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if shell is None:
         return
@@ -100,6 +123,7 @@ def _show_pages_in_notebooks() -> None:
     formatter.for_type_by_name("taichi_ants.engines.colony.colony", "Colony", page_of)
     formatter.for_type_by_name("taichi_ants.engines.runs.traces", "Trace", page_of)
     formatter.for_type_by_name("taichi_ants.viewer.frames", "Recording", page_of)
+    formatter.for_type_by_name("taichi_ants.worlds.world", "World", page_of)
 
 
 prepare_for_taichi()

@@ -22,7 +22,7 @@ LAYERS = (
     {"files", "grid", "settings"},
     {"task"},
     {"runtime", "worlds", "learners"},
-    {"checks"},
+    {"checks", "measures"},
     {"baselines", "engines", "reference"},
     {"analysis", "rendering"},
     {"offline"},

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from taichi_ants.errors import shown
 from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.task.constants import QUEEN
+
+if TYPE_CHECKING:
+    from taichi_ants.worlds.world import World
 
 
 class Record:
@@ -31,15 +37,29 @@ class Record:
         return "\n".join([f"{type(self).__name__}(", *lines, ")"])
 
 
+def _none() -> np.ndarray:
+    """Return an array without ants."""
+    return np.zeros(0, np.int32)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Snapshot(Record):
-    """The state of one world at one time, which `taichi_ants.rendering` draws.
+    """The state of one world at one time, which `rendering` draws and `measures` read.
+
+    Only a `Colony` sets the attributes after `ant_carries`.
 
     Attributes:
         ground: uint8 (grid.size,), EMPTY, OBSTACLE, FOOD or QUEEN; EMPTY under ants.
         trail: int32 or float32 (grid.size,), trail levels.
         ant_cells, ant_headings: int32 (n,), flat cell indices and headings of the living ants.
         ant_carries: bool (n,), whether each ant carries food.
+        ant_carried: int32 (n,), ticks since each ant picked up its food; 0 without food.
+        ant_numbers: int32 (n,), the numbers of the ants.
+        ant_actions: int32 (n,), the last action of each ant; -1 before its first one.
+        ant_events: int32 (n,), the result of the last action, an `Event`.
+        fields: The levels of each pheromone by name, (grid.size,); "trail" is `trail`.
+        counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers.
+        world: The world at the start of the episode; None if unknown.
     """
 
     grid: AxialGrid
@@ -48,10 +68,25 @@ class Snapshot(Record):
     ant_cells: np.ndarray
     ant_headings: np.ndarray
     ant_carries: np.ndarray
+    ant_carried: np.ndarray = field(default_factory=_none)
+    ant_numbers: np.ndarray = field(default_factory=_none)
+    ant_actions: np.ndarray = field(default_factory=_none)
+    ant_events: np.ndarray = field(default_factory=_none)
+    fields: Mapping[str, np.ndarray] = field(default_factory=dict)
+    counts: Mapping[str, int] = field(default_factory=dict)
+    world: World | None = None
+
+    @property
+    def distances(self) -> np.ndarray:
+        """Steps from each cell to the nearest queen, without obstacles, int32 (grid.size,)."""
+        queens = self.grid.cells(np.flatnonzero(self.ground == QUEEN))
+        return np.min([self.grid.distances(tuple(one)) for one in queens.tolist()], axis=0)
 
 
 def same(one: object, other: object) -> bool:
     """Return whether two values, arrays or not, are equal; NaN equals NaN in arrays."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(same(one[name], other[name]) for name in one)
     if not isinstance(one, np.ndarray) or not isinstance(other, np.ndarray):
         return not isinstance(one, np.ndarray) and type(one) is type(other) and one == other
     floats = one.dtype.kind == "f"

@@ -144,6 +144,34 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
     return [LEFT]
 
 
+# Policies without learning, by the names that studies accept.
+WITHOUT_LEARNING = {"trail_follower": trail_follower, "random": random_policy}
+
+
+def frozen_policy(name_or_path: str, observation: str = "paper") -> ActionValues:
+    """Return a policy without learning by its name, or the policy in a file (.npz).
+
+    Raises:
+        AntsError: There is no such policy for this observation, or the file cannot be used.
+    """
+    expect("policy", name_or_path, str)
+    if name_or_path in WITHOUT_LEARNING:
+        return WITHOUT_LEARNING[name_or_path](observation)
+    if not name_or_path.endswith(".npz"):
+        raise AntsError(
+            f"policy is {shown(name_or_path)}; it must be one of {', '.join(WITHOUT_LEARNING)}, or "
+            "the path of a policy file (.npz)."
+        )
+    policy = load_policy(name_or_path)
+    if policy.observation != observation:
+        raise AntsError(
+            f"policy is {shown(name_or_path)}, which is for the observation "
+            f"{policy.observation!r}, but task.observation is {observation!r}; set the observation "
+            "of the policy."
+        )
+    return policy.q_values
+
+
 def save_policy(
     path: PathLike, q_values: npt.ArrayLike, metadata: Mapping[str, Any], observation: str = "paper"
 ) -> None:

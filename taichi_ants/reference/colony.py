@@ -42,6 +42,7 @@ class EpisodeRecord:
     deliveries: int = 0
     moves: int = 0  # attempted
     blocked: int = 0  # moves that failed
+    carried: int = 0  # ticks from the pick-up to the delivery, of all delivered loads
     first_delivery: int = -1  # number of ticks up to the first delivery; -1 if there is none
     births: int = 0
     deaths: int = 0
@@ -193,6 +194,11 @@ class ReferenceColony:
                 self.food_sources.taken(intent.target, tick)
         self.world.trail.tick()
         delivered = self._count(acting)
+        self.record.carried += sum(
+            was.carried
+            for was, ant in zip(before, acting, strict=True)
+            if ant.event is Event.DELIVERED
+        )
         if self.task.life.births:
             self.store += delivered
             self._births()

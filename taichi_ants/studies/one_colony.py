@@ -188,7 +188,7 @@ def _pieces(
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:
     """Return a summary of two lines for a run of `ticks` ticks that took `seconds`."""
-    outcome = {name: int(array.sum()) for name, array in vars(colony.outcome()).items()}
+    outcome = {name: int(array.sum()) for name, array in colony.outcome().counts().items()}
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
     changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
     changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []

@@ -45,7 +45,8 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     """Compare the episode's counters, the store, the food sources, and the size of the model."""
     outcome, record, row = colony.outcome(), plain.record, colony.arrays["worlds"][:, world]
     assert outcome.returns[0, world] == record.episode_return
-    for name in ("ticks", "deliveries", "first_delivery", "moves", "blocked", "births", "deaths"):
+    names = ("ticks", "deliveries", "first_delivery", "moves", "blocked", "births", "deaths")
+    for name in (*names, "carried"):
         assert getattr(outcome, name)[0, world] == getattr(record, name), name
     assert outcome.regrown[0, world] == record.regrown
     assert row[WorldRow.STORE] == plain.store

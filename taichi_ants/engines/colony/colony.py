@@ -13,6 +13,8 @@ from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState, checked_worlds
 from taichi_ants.engines.colony.stepping import Stepper
 from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown
+from taichi_ants.measures.measure import Measure
+from taichi_ants.measures.series import Recorder
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -169,31 +171,41 @@ class Colony(ColonyState):
         ticks: int,
         progress: Progress | None = None,
         worlds: Sequence[World | Sequence[World]] | None = None,
+        *,
+        measures: str | Measure | Sequence[str | Measure] = (),
+        every: int | None = None,
     ) -> ColonyEpisodes:
         """Return the results of whole episodes with a fixed number of ticks.
 
         Args:
             progress: A function that is called with the share of the work done, 0 to 1.
             worlds: The `world` of `begin_episode` for each episode; None keeps the present worlds.
+            measures: Names of registered measures, or `Measure` objects, to read at the end of each
+                episode; see `taichi_ants.measures`. They do not change the colony.
+            every: Read the measures also every n ticks.
         """
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         places = self._checked_places(worlds, episodes)
         checks.check_progress(progress)
+        recorder = Recorder(measures, every)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode(ticks, places[episode])
-            for _ in self._stepper.pieces(self, ticks):
-                if progress is not None:
-                    progress((episode + self.ticks / ticks) / episodes)
+            recorder.begin(episode)
+            for stop in recorder.stops(ticks):
+                for _ in self._stepper.pieces(self, stop - self.ticks):
+                    if progress is not None:
+                        progress((episode + self.ticks / ticks) / episodes)
+                    if not self.running.any():
+                        break
+                recorder.read(self)
                 if not self.running.any():
                     break
-            outcomes.append(self.outcome())
+            outcomes.append(self.outcome().counts())
             self.end_episode()
-        return ColonyEpisodes(
-            **{name: np.stack([vars(one)[name][0] for one in outcomes])
-               for name in vars(outcomes[0])}
-        )  # fmt: skip
+        counts = {name: np.concatenate([one[name] for one in outcomes]) for name in outcomes[0]}
+        return ColonyEpisodes(**counts, seeds=self.seeds, series=recorder.series())
 
     def _checked_places(self, worlds: Any, episodes: int) -> Sequence[Any]:
         """Return the worlds of each episode after checks; None to keep the present ones."""

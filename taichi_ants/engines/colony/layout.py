@@ -66,11 +66,12 @@ class Tally(IntEnum):
     RETURNS = 0
     MOVES = auto()
     BLOCKED = auto()
+    CARRIED = auto()  # ticks with food of all delivered loads
     DELIVERIES = auto()
     DEATHS = auto()
 
 
-TOTALS = (Tally.RETURNS, Tally.MOVES, Tally.BLOCKED)
+TOTALS = (Tally.RETURNS, Tally.MOVES, Tally.BLOCKED, Tally.CARRIED)
 # Wide enough that two chunks never share a cache line, which would slow threads down.
 TALLY_WIDTH = 16
 

@@ -7,7 +7,7 @@ The state is in NumPy arrays, which kernels change in place. Only this package r
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
@@ -42,6 +42,8 @@ from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
+from taichi_ants.measures.series import Series
+from taichi_ants.measures.tidy import Measured, Tidy, seed_array
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.worlds.world import Start, World
@@ -57,18 +59,20 @@ _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 # Unused settings for colonies with given actions, in which ants neither choose nor learn.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
-_KIND = Kind("colony", 11, "Colony.save")
+_KIND = Kind("colony", 12, "Colony.save")
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ColonyEpisodes(Record):
+class ColonyEpisodes(Record, Tidy):
     """Results of episodes, arrays of shape (episodes, worlds).
 
-    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `living` ants at the
-    end. Returns, moves and blocked are int64, all others int32.
+    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
+    with food of all delivered loads, `living` ants at the end. Returns, moves, blocked and carried
+    are int64, all others int32. `seeds` has the seed of each world. `series` has the values of the
+    measures that you asked `Colony.run` for, else None.
     """
 
     returns: np.ndarray
@@ -77,10 +81,40 @@ class ColonyEpisodes(Record):
     first_delivery: np.ndarray
     moves: np.ndarray
     blocked: np.ndarray
+    carried: np.ndarray
     births: np.ndarray
     deaths: np.ndarray
     regrown: np.ndarray
     living: np.ndarray
+    seeds: tuple[int, ...] = ()
+    series: Series | None = field(default=None, repr=False)
+
+    def counts(self) -> Arrays:
+        """Return the arrays of all counts by name."""
+        return {name: array for name, array in vars(self).items() if isinstance(array, np.ndarray)}
+
+    def measured(self) -> Measured:
+        """Return the values of the measures, or all counts if `Colony.run` was asked for none."""
+        shape, series = self.returns.shape, self.series
+        if series is None:
+            episodes, worlds = (one.ravel().astype(np.int32) for one in np.indices(shape))
+            ticks = self.ticks.ravel()
+            values = {name: array.ravel() for name, array in self.counts().items()}
+            usual: tuple[str, ...] = ("deliveries",)
+        else:
+            worlds, episodes, ticks = series.worlds, series.episodes, series.ticks
+            values, usual = dict(series.values), tuple(series.values)
+        seeds = seed_array(self.seeds)[worlds]
+        index = {"world": worlds, "seed": seeds, "episode": episodes, "tick": ticks}
+        return Measured(
+            index=index,
+            values=values,
+            of_seed=worlds,
+            of_group=np.zeros(len(worlds), np.int32),
+            seeds=self.seeds,
+            usual=usual,
+            units={} if series is None else dict(series.units),
+        )
 
 
 def column(name: str) -> property:
@@ -261,10 +295,14 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
+        counts: dict[str, Any] = {n: one[None].copy() for n, one in self._counts().items()}
+        return ColonyEpisodes(**counts, seeds=self.seeds)
+
+    def _counts(self) -> Arrays:
+        """Return views of the counts of the episode (W,), by their names in `ColonyEpisodes`."""
         totals, worlds = self.arrays["totals"], self.arrays["worlds"]
-        counts = {row.name: totals[row] for row in TOTALS}
-        counts |= {row.name: worlds[row] for row in WorldRow if row >= WorldRow.TICKS}
-        return ColonyEpisodes(**{name.lower(): one[None].copy() for name, one in counts.items()})
+        counts = {row.name.lower(): totals[row] for row in TOTALS}
+        return counts | {row.name.lower(): worlds[row] for row in WorldRow if row >= WorldRow.TICKS}
 
     def snapshot(self, world: int = 0) -> Snapshot:
         """Return the present state of world number `world`; arrays are copies."""
@@ -277,13 +315,22 @@ class ColonyState:
         ground[ant_cells] = EMPTY
         stored, clock = self.stored_trail(world)
         trail = np.maximum(stored - stored.dtype.type(clock), 0)
+        carries = self.carrying[world, living]
+        carried = self.arrays["carried"].reshape(self.cells.shape)[world, living]
         return Snapshot(
             self.grid,
             ground,
             trail,
             ant_cells,
             self.headings[world, living].astype(np.int32),
-            self.carrying[world, living],
+            carries,
+            ant_carried=np.where(carries, carried, np.int32(0)),
+            ant_numbers=self.numbers[world, living],
+            ant_actions=self.actions[world, living].astype(np.int32),
+            ant_events=self.events[world, living].astype(np.int32),
+            fields={"trail": trail},
+            counts={name: int(array[world]) for name, array in self._counts().items()},
+            world=self.worlds[world],
         )
 
     def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:

@@ -258,6 +258,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         if goes != cell:
             deposit(c, v, base + goes, clock, carried)
         elif can_give(action, percept):
+            tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
             put(c.carries, ant, 0)
             put(c.heading, ant, heading_after_delivery(heading, c.turns_at_queen))

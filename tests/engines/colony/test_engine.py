@@ -205,7 +205,7 @@ def test_both_schedules_agree_where_places_stay_vacant():
         colony = Colony(worlds.paper(), task, TRAINING, 3, ants=5, capacity=9, schedule=schedule)
         colony.begin_episode()
         colony.tick(100)
-        deliveries.append(vars(colony.outcome()))
+        deliveries.append(colony.outcome().counts())
     for name, counted in deliveries[0].items():
         np.testing.assert_array_equal(counted, deliveries[1][name], name)
 

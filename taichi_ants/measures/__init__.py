@@ -1,0 +1,22 @@
+"""Measures: registered functions of the state of a colony, and their series over time.
+
+`Colony.run(..., measures=("deliveries", "entropy"), every=100)` reads measures. `register` adds
+your own. docs/measures.md lists the built-in ones.
+"""
+
+from taichi_ants.measures.ants import share_in
+from taichi_ants.measures.measure import Measure
+from taichi_ants.measures.paths import shortest_path
+from taichi_ants.measures.registry import BUILT_IN, get, names, register
+from taichi_ants.measures.series import Series
+
+__all__ = [
+    "BUILT_IN",
+    "Measure",
+    "Series",
+    "get",
+    "names",
+    "register",
+    "share_in",
+    "shortest_path",
+]
