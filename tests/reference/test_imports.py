@@ -24,6 +24,7 @@ OUTSIDE = {
     "dataclasses",
     "enum",
     "functools",
+    "math",
     "numpy",
     "typing",
 }

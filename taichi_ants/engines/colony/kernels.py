@@ -204,8 +204,9 @@ def wait_for_all(c: ti.template(), part, parts, number):
     """Wait until all parts arrive at barrier `number`; return 0 if one does not arrive, else 1.
 
     The first part that starts decides: it opens the barrier once the others have arrived, or gives
-    up. If it gives up, all parts that have started wait at this barrier and leave. A part that
-    starts later leaves at its first barrier, which is the same one.
+    up. If it gives up, all parts that have started leave at this barrier, also those that still
+    wait at the one before. A part that starts later leaves at its first barrier, which is the same
+    one.
     """
     goes_on = 1
     if part == 0:
@@ -224,6 +225,9 @@ def wait_for_all(c: ti.template(), part, parts, number):
         opened = ti.atomic_add(c.barrier[Barrier.OPENED], 0)
         while opened >= 0 and opened <= number:
             opened = ti.atomic_add(c.barrier[Barrier.OPENED], 0)
+        # The first part may have opened this barrier, and given up at the next one since then.
+        if opened < 0:
+            opened -= ti.i64(GAVE_UP)
         goes_on = ti.cast(opened > number, ti.i32)
     return goes_on
 

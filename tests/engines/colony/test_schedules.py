@@ -75,7 +75,7 @@ def test_threads_that_do_not_come_are_not_waited_for_without_end(monkeypatch):
     assert given_up == 4
 
 
-@pytest.mark.parametrize("spins", [0, 20, 4000])
+@pytest.mark.parametrize("spins", [0, 20, 4000, 100_000])
 def test_giving_up_at_any_barrier_gives_the_same(spins, monkeypatch):
     """With so little patience, threads give up here and there, and the rest follows on one."""
     monkeypatch.setattr(stepping, "_SPINS", spins)
