@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 
@@ -40,6 +40,7 @@ class Snapshot(Record):
         trail: int32 or float32 (grid.size,), trail levels.
         ant_cells, ant_headings: int32 (n,), flat cell indices and headings of the living ants.
         ant_carries: bool (n,), whether each ant carries food.
+        fields: The levels of further pheromones by name, arrays like `trail`.
     """
 
     grid: AxialGrid
@@ -48,10 +49,13 @@ class Snapshot(Record):
     ant_cells: np.ndarray
     ant_headings: np.ndarray
     ant_carries: np.ndarray
+    fields: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 def same(one: object, other: object) -> bool:
     """Return whether two values, arrays or not, are equal; NaN equals NaN in arrays."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return list(one) == list(other) and all(same(one[name], other[name]) for name in one)
     if not isinstance(one, np.ndarray) or not isinstance(other, np.ndarray):
         return not isinstance(one, np.ndarray) and type(one) is type(other) and one == other
     floats = one.dtype.kind == "f"

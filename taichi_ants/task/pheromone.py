@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar, get_args
 
 from taichi_ants.settings import Is, Settings
 from taichi_ants.task.constants import DEPOSIT_LEVEL
@@ -11,6 +11,7 @@ from taichi_ants.task.constants import DEPOSIT_LEVEL
 if TYPE_CHECKING:
     import numpy as np
 
+Own = TypeVar("Own", bound="Pheromone")
 Evaporation = Literal["linear", "exponential", "none"]
 Deposit = Literal["set", "add", "fading", "none"]
 View = Literal["half", "strongest", "strongest_under_carriers"]
@@ -48,7 +49,7 @@ class Pheromone(Settings, path="task.pheromone"):
     diffusion: Annotated[
         float, Is("share of a trail that spreads to the six neighbours per tick", least=0, most=1)
     ] = 0.0
-    deposit: Annotated[Deposit, Is("rule for deposits of ants with food")] = "set"
+    deposit: Annotated[Deposit, Is("rule for deposits")] = "set"
     level: Annotated[
         int,
         Is("trail level of a new deposit", least=1, most=MAX_DEPOSIT),
@@ -58,9 +59,16 @@ class Pheromone(Settings, path="task.pheromone"):
         Level, Is("largest level to which deposits add up", usual=1000, only=("deposit", "add"))
     ] = None
     slope: Annotated[
-        Level, Is("decrease of deposits per tick with food", usual=10, only=("deposit", "fading"))
+        Level,
+        Is(
+            "decrease of deposits per tick since the load changed",
+            usual=10,
+            only=("deposit", "fading"),
+        ),
     ] = None
-    view: Annotated[View, Is("trails that ants without food see as T")] = "half"
+    view: Annotated[View, Is("levels that ants see as T or, if it is the homing cue, as S")] = (
+        "half"
+    )
 
     @property
     def dense(self) -> bool:
@@ -73,7 +81,7 @@ class Pheromone(Settings, path="task.pheromone"):
         return -(-int(self.level) // self.slope) if self.slope else 0
 
     @property
-    def lasting(self) -> Pheromone:
+    def lasting(self: Own) -> Own:
         """This pheromone without evaporation."""
         return self.but(evaporation="none")
 
