@@ -52,7 +52,7 @@ def wrong_values(one: Setting) -> list:
     if one.is_group:
         return ["no such name", 3, {}]
     rule, wrong = one.rule, list(WRONG[one.kind])
-    if one.kind is str and not one.allowed_words:  # any text, such as the name of a field
+    if one.is_text:
         wrong.remove("no such word")
     beyond = 1 if one.kind is int else 1e-9
     if rule.least is not None:
