@@ -44,6 +44,17 @@ SWEEPS = "tests/commands/test_sweep_measures.py"
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
     # Rules.
+    ("engines/colony/steps.py", "if c.counts_without_food == 1:", "if False:", COLONY),
+    ("engines/colony/steps.py", "ti.select(carries == had_food, age, 0)", "age", COLONY),
+    (
+        "engines/colony/trail.py",
+        "laid == Occasion.DEAD_END, cell, goes",
+        "False, cell, goes",
+        COLONY,
+    ),
+    ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
+    ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
+    ("engines/colony/steps.py", "homing.half", "v.half", COLONY),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from taichi_ants.learners.policies import load_policy, save_policy
     from taichi_ants.offline.dataset import Dataset
     from taichi_ants.offline.recording import record, record_colony
-    from taichi_ants.task import Life, Observation, Pheromone, Rewards, Task, states
+    from taichi_ants.task import Field, Life, Observation, Pheromone, Rewards, Task, states
     from taichi_ants.worlds import World
 
 __version__ = "0.1.0"
@@ -50,7 +50,7 @@ _NAMES_IN = {
     "learners.policies": ("load_policy", "save_policy"),
     "offline.dataset": ("Dataset",),
     "offline.recording": ("record", "record_colony"),
-    "task": ("Life", "Observation", "Pheromone", "Rewards", "Task"),
+    "task": ("Field", "Life", "Observation", "Pheromone", "Rewards", "Task"),
     "worlds": ("World",),
 }
 _MODULES = (
@@ -72,6 +72,7 @@ __all__ = [
     "Colony",
     "ColonyEpisodes",
     "Dataset",
+    "Field",
     "Life",
     "Observation",
     "Pheromone",

@@ -24,6 +24,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import checked_values
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
+from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.worlds.world import STARTS, World
 
 if TYPE_CHECKING:
@@ -57,6 +58,20 @@ def checked_runs_task(task: Task | None) -> Task:
         raise AntsError(
             f"pheromone of the task is {task.pheromone}; runs of one ant support neither "
             "exponential evaporation nor diffusion, so use a Colony."
+        )
+    further = [
+        f"{name} of the task is {value}"
+        for name, value, usual in (
+            ("fields", ", ".join(task.fields), ""),
+            ("outbound_cue", task.outbound_cue, TRAIL),
+            ("homing_cue", task.homing_cue, COMPASS),
+            (f"reads of the observation {task.observation!r}", ", ".join(task.sees.reads), ""),
+        )
+        if value != usual
+    ]
+    if further:
+        raise AntsError(
+            f"{further[0]}; runs of one ant have only the trail and the compass, so use a Colony."
         )
     return task
 

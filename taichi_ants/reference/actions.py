@@ -174,6 +174,7 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
     entered, pushed = settle(intents, winning, task.traffic)
     for intent in intents:
         ant, slot = intent.ant, intent.ant.slot
+        start, had_food = ant.cell, ant.carries
         ant.action = intent.action
         if intent.action < PICK_UP:
             # Ants turn even if the way is blocked, so that they get out of dead ends.
@@ -185,8 +186,35 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
         else:
             event = _handle(world, intent, slot in winning, task)
         ant.event, ant.reward = event, getattr(task.rewards, PAID[event])
-        ant.carried += ant.carries
+        for name, trail in world.fields.items():
+            for cell in _marked(task.fields[name].laid, intent, start, had_food):
+                trail.deposit(cell, ant.carried)
+        ant.carried += 1
     world.ants = {intent.ant.cell: intent.ant for intent in intents}
+
+
+def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell]:
+    """Return the cells on which an ant deposits in a field, after its action.
+
+    `start` and `had_food` are its cell and its load before the action.
+    """
+    ant = intent.ant
+    if laid == "dead_end":
+        return [start] if not had_food and ant.percept == 0b01_01_01 else []
+    if laid == "failed_pick_up":
+        fails = intent.action == PICK_UP and ant.event is Event.FAILED
+        return [start] if fails and not had_food else []
+    if laid != "always" and laid != ("with_food" if had_food else "without_food"):
+        # A pick-up counts as an occasion with food, and a delivery as one without.
+        changes = {"with_food": Event.PICKED_UP, "without_food": Event.DELIVERED}
+        if ant.event is not changes.get(laid):
+            return []
+    if ant.event is Event.PICKED_UP and laid != "without_food":
+        assert intent.target is not None
+        return [intent.target, start]
+    if ant.event is Event.DELIVERED and laid != "with_food":
+        return [start]
+    return [ant.cell] if ant.cell != start else []
 
 
 def _move(world: WorldState, intent: Intent, destination: Cell | None) -> Event:
@@ -211,7 +239,7 @@ def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
         world.ground[intent.target] = EMPTY
         world.trail.deposit(intent.target, 0)
         world.trail.deposit(ant.cell, 0)
-        ant.carries = True
+        ant.carries, ant.carried = True, 0
         ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.PICKED_UP
     return Event.FAILED

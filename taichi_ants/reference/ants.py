@@ -27,7 +27,7 @@ class Ant:
         slot: The ant's place in the colony, 0 .. slots - 1; free again after its death.
         number: 0 .. n - 1 for the initial ants; n, n + 1, ... for ants born in the episode.
         age: Ticks since the ant was born, if there is a lifespan.
-        carried: Ticks since the ant picked up its food.
+        carried: Ticks since the ant's last pick-up or delivery, its birth, or the start.
         percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
         action, event, reward: The last ones; -1, NONE and 0 before the first tick.

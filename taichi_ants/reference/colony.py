@@ -59,6 +59,7 @@ class ReferenceColony:
         world: The present state of the world; each episode starts from `start_world`.
         n_ants: The number of ants at the start of an episode.
         pheromone: The task's pheromone, without evaporation where the task switches it off.
+        fields: The task's further pheromones by name, likewise.
         ants: The living ants by slot, 0 to `slots` - 1.
         streams: The random streams of the initial ants, which continue through all episodes.
         next_number: The number of the next ant that is added.
@@ -98,6 +99,7 @@ class ReferenceColony:
             task.evaporation_in_evaluation if sharing == "frozen" else task.evaporation_in_training
         )
         self.pheromone = task.pheromone if falls else task.pheromone.lasting
+        self.fields = {n: one if falls else one.lasting for n, one in task.fields.items()}
         self._row = OBSERVATIONS[task.observation]
         self.start_world, self._training = world, training
         self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
@@ -114,7 +116,10 @@ class ReferenceColony:
 
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
-        self.world = WorldState(self.start_world, self.pheromone)
+        self.world = WorldState(
+            *(self.start_world, self.pheromone, self.fields),
+            *(self.task.outbound_cue, self.task.homing_cue),
+        )
         self.food_sources = FoodSources(self.start_world)
         self.store = 0
         self.next_number = self.n_ants
@@ -192,7 +197,8 @@ class ReferenceColony:
         for intent in intents:
             if intent.ant.event is Event.PICKED_UP and intent.target is not None:
                 self.food_sources.taken(intent.target, tick)
-        self.world.trail.tick()
+        for trail in (self.world.trail, *self.world.fields.values()):
+            trail.tick()
         delivered = self._count(acting)
         self.record.carried += sum(
             was.carried

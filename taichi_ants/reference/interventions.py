@@ -33,6 +33,8 @@ class Interventions:
         self._first = colony.start_world
         self._pheromone = colony.task.pheromone
         self._falls = colony.pheromone.evaporation == self._pheromone.evaporation
+        for name, one in colony.fields.items():
+            self._falls = self._falls and one == colony.task.fields[name]
         world = colony.start_world
         # The content of the cells that are not empty when later episodes start.
         self._start: dict[Cell, int] = {world.queen: QUEEN}
@@ -85,15 +87,20 @@ class Interventions:
         self._observe()
 
     def _new_trail(self) -> None:
-        """Make a new trail with the same levels, for the present rocks and pheromone."""
+        """Make new trails with the same levels, for the present rocks and pheromones."""
         world = self.colony.world
         rocks = [cell for cell, held in world.ground.items() if held == OBSTACLE]
         bare = World(self._first.ranges, world.queen, obstacles=rocks)
-        trail = Trail(bare, world.pheromone)
-        for cell, held in world.ground.items():
+        world.trail = self._copy(world.trail, Trail(bare, world.pheromone))
+        for name, one in self.colony.fields.items():
+            world.fields[name] = self._copy(world.fields[name], Trail(bare, one))
+
+    def _copy(self, old: Trail, new: Trail) -> Trail:
+        """Return a new trail after setting it to the levels of an old one."""
+        for cell, held in self.colony.world.ground.items():
             if held != OBSTACLE:
-                trail.lay(cell, world.trail.level(cell))
-        world.trail = trail
+                new.lay(cell, old.level(cell))
+        return new
 
     def lay_trail(self, cells: Sequence[Cell], level: int) -> None:
         """Set the trail of cells other than rocks."""
@@ -151,6 +158,10 @@ class Interventions:
         still: dict[str, Any] = {} if self._falls else {"evaporation": "none", "half_life": None}
         now = replace(self._pheromone, **still)
         self.colony.pheromone = self.colony.world.pheromone = now
+        self.colony.fields = {
+            name: one if self._falls else one.lasting
+            for name, one in self.colony.task.fields.items()
+        }
         self._new_trail()
 
     def set_epsilon(self, epsilon: float) -> None:

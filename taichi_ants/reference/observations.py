@@ -31,27 +31,30 @@ def cells_in_view(ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Cell]:
 
 
 def strongest_in_view(world: WorldState, ant: Ant) -> Level:
-    """Return the largest trail level among the cells ahead that count, 0 if none does."""
+    """Return the largest level of the ant's cue in the cells ahead that count, 0 if none does."""
+    trail = world.cue(ant)
     counting = [cell for cell in cells_in_view(ant) if world.content(cell) == EMPTY]
-    if world.pheromone.view == "strongest_under_carriers":
+    if trail.rule.view == "strongest_under_carriers":
         others = [world.ants.get(cell) for cell in cells_in_view(ant)]
         counting += [other.cell for other in others if other is not None and other.carries]
-    return max((world.trail.level(cell) for cell in counting), default=0)
+    return max((trail.level(cell) for cell in counting), default=0)
 
 
 def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
     """Return whether a cell is better for an ant than its own.
 
-    A better cell is nearer to the queen for a carrier, and has a stronger trail for a forager.
+    A better cell is nearer to the queen for a carrier with a compass, and has a higher level of the
+    ant's cue for other ants.
     """
-    if ant.carries:
+    if world.has_compass(ant):
         return distance(cell, world.queen) < distance(ant.cell, world.queen)
-    return bool(world.trail.level(cell) > world.trail.level(ant.cell))
+    trail = world.cue(ant)
+    return bool(trail.level(cell) > trail.level(ant.cell))
 
 
 def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
     """Return the code of each cell: SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
-    strongest = 0 if ant.carries else strongest_in_view(world, ant)
+    strongest = 0 if world.has_compass(ant) else strongest_in_view(world, ant)
     return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
 
 
@@ -61,11 +64,12 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
         return SEES_GOAL
     if content != EMPTY:  # also the queen for foragers, and food for carriers
         return SEES_OBSTACLE
-    if ant.carries:
+    if world.has_compass(ant):
         lures = is_better(world, ant, cell)
     else:
-        level = world.trail.level(cell)
-        enough = 2 * level if world.pheromone.view == "half" else level
+        trail = world.cue(ant)
+        level = trail.level(cell)
+        enough = 2 * level if trail.rule.view == "half" else level
         lures = bool(level >= 1 and enough >= strongest)
     return SEES_LURE if lures else SEES_EMPTY
 
@@ -108,7 +112,7 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
             codes.append(STRONG if code == SEES_LURE else NOTHING)
         else:
             # Ants do not see trails under food or the queen.
-            level = world.trail.level(cell) if world.content(cell) == EMPTY else 0
+            level = world.cue(ant).level(cell) if world.content(cell) == EMPTY else 0
             codes.append(_share(level, strongest))
     return _number([ant.carries, *codes], 6)
 

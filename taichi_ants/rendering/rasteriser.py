@@ -226,10 +226,16 @@ class Rasteriser:
         of_ground[FOOD] = colours.FLOOR_FOOD
         of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
         of_cells = of_ground[snapshot.ground & 15]
-        marked = np.flatnonzero((snapshot.ground == EMPTY) & (snapshot.trail >= 1))
-        levels = snapshot.trail[marked].astype(np.float32)
-        share = np.minimum(levels / np.float32(self._strongest), 1)
-        of_cells[marked] = colours.TRAIL_RAMP[(share * 255 + 0.5).astype(np.int32)]
+        ramps = [(colours.TRAIL_RAMP, snapshot.trail)]
+        ramps += [
+            (colours.field_ramp(number), levels)
+            for number, levels in enumerate(snapshot.further_fields.values())
+        ]
+        for ramp, of_field in reversed(ramps):  # the trail covers further fields
+            marked = np.flatnonzero((snapshot.ground == EMPTY) & (of_field >= 1))
+            levels = of_field[marked].astype(np.float32)
+            share = np.minimum(levels / np.float32(self._strongest), 1)
+            of_cells[marked] = ramp[(share * 255 + 0.5).astype(np.int32)]
         of_cells[~self.grid.exists] = colours.PAGE
         return of_cells
 

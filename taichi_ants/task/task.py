@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Literal, get_args
 
-from taichi_ants.errors import AntsError
-from taichi_ants.settings import Is, Settings
+from taichi_ants.errors import AntsError, shown
+from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.constants import MAX_STEPS
+from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -105,6 +106,16 @@ class Task(Settings, path="task"):
     pheromone: Annotated[Pheromone, Is("rules by which trails are laid, evaporate and spread")] = (
         field(default_factory=Pheromone)
     )
+    fields: Annotated[Named[Field], Is("further pheromones, by name")] = field(
+        default_factory=Named
+    )
+    outbound_cue: Annotated[
+        str, Is("pheromone that ants without food see as T: trail, or the name of a field")
+    ] = TRAIL
+    homing_cue: Annotated[
+        str,
+        Is("what ants with food see as S: compass (nearer cells), trail, or the name of a field"),
+    ] = COMPASS
     traffic: Annotated[Traffic, Is("rules for entering a cell with an ant on it")] = field(
         default_factory=Traffic
     )
@@ -126,6 +137,32 @@ class Task(Settings, path="task"):
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "foraging" and "queueing"."""
         return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
+
+    def __post_init__(self) -> None:
+        self.check()
+        for name in (TRAIL, COMPASS):
+            if name in self.fields:
+                raise AntsError(
+                    f"`task.fields` has a field {name!r}, but that name is taken; choose another "
+                    "name."
+                )
+        pheromones = (TRAIL, *self.fields)
+        for setting, cues in (
+            ("outbound_cue", pheromones),
+            ("homing_cue", (COMPASS, *pheromones)),
+        ):
+            cue = getattr(self, setting)
+            if cue not in cues:
+                raise AntsError(
+                    f"`task.{setting}` is {shown(cue)}; it must be one of {', '.join(cues)}, or "
+                    "the name of a field that you add to `task.fields`."
+                )
+        for name in self.sees.reads:
+            if name not in pheromones:
+                raise AntsError(
+                    f"`task.observation` is {self.observation!r}, which reads the field {name!r}; "
+                    f"add `task.fields.{name}`."
+                )
 
     def __repr__(self) -> str:
         """Return the settings that differ from the paper's."""
@@ -160,6 +197,15 @@ class Task(Settings, path="task"):
         """Return the pheromone while ants learn or do not, with or without evaporation."""
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
         return self.pheromone if falls else self.pheromone.lasting
+
+    def fields_while(self, learning: bool) -> dict[str, Field]:
+        """Return the fields while ants learn or do not, with or without evaporation."""
+        falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
+        return {name: one if falls else one.lasting for name, one in self.fields.items()}
+
+    def number_of(self, cue: str) -> int:
+        """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""
+        return -1 if cue == COMPASS else (TRAIL, *self.fields).index(cue)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the task as names and numbers; `from_dict` reads it."""

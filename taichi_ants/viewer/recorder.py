@@ -151,6 +151,8 @@ class Recorder:
             "seed": str(colony.seeds[self.world]),
             "observation": f"{colony.task.sees.name}, {self._n_states} states",
         }
+        if colony.fields:
+            lines["pheromone"] = f"the trail; hidden: {', '.join(colony.fields)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
             lines["table"] = "one per ant" if colony.one_a_slot else "shared"

@@ -24,9 +24,9 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 # Each entry takes kernels of its own, see tests/engines/colony/test_against_reference.py.
 KERNELS = [
-    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest", "ab", ("trail", "b")),
     ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),
-    ("double_q", "independent", "ants_seen", True, "blocking", "half"),
+    ("double_q", "independent", "ants_seen", True, "blocking", "half", "aB", ("a", "B")),
     ("dyna_q", "shared", "trail_levels", True, "blocking", "half"),
     ("n_step_sarsa", "independent", "paper", False, "blocking", "half"),
 ]
@@ -55,7 +55,7 @@ def assert_sound(interventions: Interventions) -> None:
 
 @pytest.mark.parametrize("kernel", MARKED, ids=lambda kernel: "-".join(map(str, kernel[:4])))
 def test_edits_keep_colony_and_reference_equal(kernel):
-    learner, sharing, observation, dense, traffic, view = kernel
+    learner, sharing, observation, dense, traffic, view, *fields = kernel
     done, refused = {}, 0
     for seed in range(8):
         rng = np.random.default_rng(seed)
@@ -64,6 +64,7 @@ def test_edits_keep_colony_and_reference_equal(kernel):
             traffic=traffic,
             view=view,
             changes=True,
+            **dict(zip(("fields", "cues"), fields, strict=False)),
         )
         population = {**drawn.population, "ends_at_delivery": False}
         population["capacity"] = population["ants"] + int(rng.integers(0, 9))

@@ -28,7 +28,7 @@ OUTSIDE = {
     "numpy",
     "typing",
 }
-RULES = {"Life", "Pheromone", "Rewards", "Task", "Traffic"}
+RULES = {"Field", "Life", "Pheromone", "Rewards", "Task", "Traffic"}
 
 
 FILES = sorted(FOLDER.rglob("*.py"))

@@ -10,7 +10,7 @@ from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
 from taichi_ants.engines.colony.state import SHARINGS
-from taichi_ants.task import Life, Pheromone, Rewards, Task, observations
+from taichi_ants.task import Field, Life, Pheromone, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY, GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds import World
 from taichi_ants.worlds.world import STARTS
@@ -43,11 +43,16 @@ def random_colony(
     traffic: str = "blocking",
     view: str = "half",
     changes: bool = False,
+    fields: str = "",
+    cues: tuple[str, str] = ("trail", "compass"),
 ) -> RandomColony:
     """Return the random colony of a seed.
 
     `sharing`, `learner` and `dense` (trails as real numbers) are random unless they are given. With
     `changes`, ants are born or die and food grows back or wanders, which uses separate kernels.
+
+    Each letter of `fields` names a further pheromone. Those of capitals are dense, the others are
+    not; all else about them is random, except the views of `cues`, outbound and homing.
     """
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
@@ -64,6 +69,9 @@ def random_colony(
             rewards=rewards or Rewards(),
             observation=observation,
             pheromone=replace(task.pheromone, view=view),
+            fields={name: _field(seed, name, view) for name in fields},
+            outbound_cue=cues[0],
+            homing_cue=cues[1],
             traffic=traffic,
             turns_at_queen=bool(rng.random() < 0.5),
         ),
@@ -134,6 +142,15 @@ def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
         cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
         slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
     )
+
+
+def _field(seed: int, name: str, view: str) -> Field:
+    """Return a random field, which is dense if its name is a capital."""
+    rng = np.random.default_rng([seed, 4, ord(name)])
+    rules = vars(_pheromone(rng, name.isupper()))
+    laid = rng.choice(["with_food", "without_food", "always", "dead_end", "failed_pick_up"])
+    laid = laid if rng.random() < 0.9 else "never"
+    return Field(**{**rules, "view": view, "laid": str(laid)})
 
 
 def _training(rng: np.random.Generator, learner: str | None) -> tuple[TrainingConfig, str]:

@@ -36,6 +36,10 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     assert ours.ground[places].tolist() == list(plain.world.ground.values())
     levels = np.array([plain.world.trail.level(cell) for cell in plain.world.ground])
     assert np.array_equal(ours.trail[places], levels.astype(ours.trail.dtype))
+    assert list(ours.fields) == ["trail", *plain.world.fields]
+    for name, field in ours.fields.items():
+        levels = np.array([plain.world.fields[name].level(cell) for cell in plain.world.ground])
+        assert np.array_equal(field[places], levels.astype(field.dtype)), name
     assert np.array_equal(colony.q_values[world], plain.q_values)
     assert int(arrays["queen_streams"][world]) == plain.queen_stream.state
     _assert_equal_records(colony, plain, world)

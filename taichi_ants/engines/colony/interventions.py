@@ -18,7 +18,13 @@ import numpy as np
 
 from taichi_ants import files
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import ANT_GROUND, FoodSourceRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import (
+    ANT_GROUND,
+    FoodSourceRow,
+    Stage,
+    WorldRow,
+    array_of,
+)
 from taichi_ants.errors import AntsError, count
 from taichi_ants.grid.constants import (
     N_HEADINGS,
@@ -93,7 +99,8 @@ class Interventions:
         arrays["ground"][cells] = what
         arrays["walls"][cells] = what == OBSTACLE
         if what == OBSTACLE:
-            self._lay(cells, 0)
+            for number in range(len(self.colony.pheromones)):
+                self._lay(cells, 0, number)
         self._change_food_sources(cells, what)
         self.colony.observe()
 
@@ -140,12 +147,10 @@ class Interventions:
         self._lay(cells[self.colony.arrays["walls"][cells] == 0], level)
         self.colony.observe()
 
-    def _lay(self, cells: np.ndarray, level: int) -> None:
-        arrays = self.colony.arrays
-        if self.colony.pheromone.dense:
-            arrays["level"][cells] = level
-        else:
-            arrays["trail"][cells] = level + self.colony.trail_clock(0) if level else 0
+    def _lay(self, cells: np.ndarray, level: int, number: int = 0) -> None:
+        name = array_of(number, self.colony.pheromones[number].dense)
+        clock = self.colony.trail_clock(0, number)
+        self.colony.arrays[name][cells] = level + clock if level else 0
 
     def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
         """Put newborn ants on those of the cells that are empty, with random headings by default.
@@ -231,11 +236,16 @@ class Interventions:
             self._remove(slots[np.argsort(colony.numbers[0, slots])[missing:]])
 
     def set_task(self, task: Task) -> None:
-        """Set a task that differs only in numbers of the pheromone and in evaporation."""
-        colony, arrays = self.colony, self.colony.arrays
-        levels = np.maximum(arrays["trail"] - colony.trail_clock(0), 0)
-        colony.task, colony.pheromone = task, task.pheromone_while(colony.learns)
-        arrays["trail"][:] = np.where(levels > 0, levels + colony.trail_clock(0), 0)
+        """Set a task that differs only in numbers of the pheromones and in evaporation."""
+        colony, levels = self.colony, {}
+        for number, pheromone in enumerate(colony.pheromones):
+            if not pheromone.dense:
+                stored = colony.arrays[array_of(number, False)]
+                levels[number] = np.maximum(stored - colony.trail_clock(0, number), 0)
+        colony.set_pheromones(task)
+        for number, level in levels.items():
+            clock = colony.trail_clock(0, number)
+            colony.arrays[array_of(number, False)][:] = np.where(level > 0, level + clock, 0)
 
     def set_epsilon(self, epsilon: float) -> None:
         """Set epsilon, which no longer decays."""

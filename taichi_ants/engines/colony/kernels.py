@@ -32,7 +32,8 @@ class Phase(NamedTuple):
     """A part of a tick that all ants, cells or worlds (`of`: ANTS, CELLS, WORLD) finish together.
 
     It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
-    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, place) for CELLS, (c, v, w, tick) for WORLD.
+    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place) for CELLS, (c, v, w, tick) for
+    WORLD.
     """
 
     of: str
@@ -43,16 +44,21 @@ class Features(NamedTuple):
     """The features of a model that decide what is compiled, and nothing else.
 
     With `own_tables` there is a table for each slot, not one for each world; for the others, see
-    `ColonyState` and `Pheromone`. A model does not pay for features that it does not use: kernels
-    without births, deaths or food that changes are faster, and compile much faster.
+    `ColonyState` and `Pheromone`. `dense` and `views` have an entry for each pheromone, the trail
+    first. The cues and `reads` are numbers of pheromones; -1 is the compass. A model does not pay
+    for features that it does not use: kernels without births, deaths or food that changes are
+    faster, and compile much faster.
     """
 
     learner: Learner | None
     own_tables: bool
     is_given_actions: bool
     observation: Observation
-    dense: bool
-    view: str
+    dense: tuple[bool, ...]
+    views: tuple[str, ...]
+    outbound: int
+    homing: int
+    reads: tuple[int, ...]  # of the observation
     traffic: Traffic
     ants_change: bool
     food_changes: bool
@@ -63,9 +69,15 @@ class Variant:
 
     def __init__(self, features: Features) -> None:
         learner, observation = features.learner, features.observation
-        self.own_tables, self.dense = features.own_tables, features.dense
+        self.own_tables, self.dense = features.own_tables, any(features.dense)
         self.is_given_actions = features.is_given_actions
-        self.view, self.half = features.view, features.view == "half"
+        self.pheromones = tuple(zip(features.dense, features.views, strict=True))
+        self.outbound, self.homing = features.outbound, features.homing
+        self.has_compass = self.homing < 0
+        cues = {self.outbound} | ({self.homing} - {-1})
+        self.half = features.views[self.outbound] == "half"
+        self.homing_view = "" if self.has_compass else features.views[self.homing]
+        self.reads = features.reads
         self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
@@ -85,10 +97,26 @@ class Variant:
         self.n_pairs = observation.n_states * ROW  # state-action pairs, and unused numbers
         self.sees_percept = observation.name == "paper"  # the percept is the state index
         # Whether the cell of an ant must show that the ant carries food.
-        self.sees_ants = not self.sees_percept or self.view == "strongest_under_carriers"
+        under_carriers = any(features.views[cue] == "strongest_under_carriers" for cue in cues)
+        self.sees_ants = not self.sees_percept or under_carriers
         if not self.sees_percept:
             self.encode = views.encode_function(observation)
-            self.view_type = views.view_type(observation, self.dense)
+            sees_dense = any(features.dense[cue] for cue in cues)
+            self.level_type = ti.f32 if sees_dense else ti.i32
+            reads_dense = tuple(features.dense[number] for number in self.reads)
+            self.view_type = views.view_type(observation, sees_dense, reads_dense)
+
+    def field(self, c: Any, number: int) -> trail.Pheromone:
+        """Return the arrays and numbers of a pheromone; 0 is the trail."""
+        return trail.pheromone_of(c, number, *self.pheromones[number])
+
+    def dense_fields(self, c: Any) -> list[trail.Pheromone]:
+        """Return the arrays and numbers of the dense pheromones."""
+        return [self.field(c, k) for k, (dense, _) in enumerate(self.pheromones) if dense]
+
+    def further_fields(self, c: Any) -> list[trail.Pheromone]:
+        """Return the arrays and numbers of the pheromones other than the trail."""
+        return [self.field(c, number) for number in range(1, len(self.pheromones))]
 
 
 variant = cache(Variant)
@@ -157,7 +185,7 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
         for place in range(w * c.size + first, w * c.size + last * running):
-            phase.do(c, place)
+            phase.do(c, v, place)
     elif running == 1:
         phase.do(c, v, w, tick)
 

@@ -10,7 +10,7 @@ from taichi_ants.task.constants import OBSTACLE
 # which is a quarter of the memory traffic.
 INTEGER_COLUMNS = (
     "cell",
-    "carried",  # ticks since the pick-up of its food
+    "carried",  # ticks since the pick-up of its food, or, if a field needs it, without food
     "number",  # -1 in a slot that was never used in this episode
     "want",  # the cell to enter or to take food from, else its own; later its previous cell
     "state",  # the state index, unless it is the percept
@@ -122,6 +122,11 @@ ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
 # The number of slots from which threads share a world: a single world, and each of many.
 _LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
 _CHUNKS_PER_THREAD = 2
+
+
+def array_of(number: int, dense: bool) -> str:
+    """Return the name of the array of a pheromone; 0 is the trail."""
+    return f"field_{number}" if number else "level" if dense else "trail"
 
 
 def usual_schedule(n_worlds: int, capacity: int) -> str:

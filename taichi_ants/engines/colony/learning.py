@@ -20,9 +20,9 @@ _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 
 
 @ti.func
-def see_anew(c: ti.template(), v: ti.template(), w, ant, clock):
+def see_anew(c: ti.template(), v: ti.template(), w, ant, tick):
     """Update the percept and the state index of an ant."""
-    percept, state = steps.observe(c, v, w, ant, clock)
+    percept, state = steps.observe(c, v, w, ant, tick)
     note_seen(c, v, ant, percept, state)
 
 
@@ -49,13 +49,13 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         steps.put(c.stage, ant, Stage.LIVING)
         if ti.static(v.alone):
             forget(c, v, ant)
-    see_anew(c, v, w, ant, tick * c.evaporates)
+    see_anew(c, v, w, ant, tick)
 
 
 @ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action if the learner needs it, and learn."""
-    percept, state = steps.observe(c, v, w, ant, (tick + 1) * c.evaporates)
+    percept, state = steps.observe(c, v, w, ant, tick + 1)
     next_action = -1
     if steps.trait(c.stage, ant) != Stage.NEWBORN:
         c.wants[w * c.size + c.want[ant]] = 0

@@ -94,6 +94,7 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
     put(c.stage, ant, Stage.NEWBORN)
     put(c.action, ant, -1)
     c.age[ant] = 0
+    c.carried[ant] = 0
     c.number[ant] = number
     born = ti.cast(c.episodes[w], ti.u64) << ti.u64(32) | ti.cast(number, ti.u64)
     c.streams[ant] = stream_of(c.seeds[w], STREAM_BORN, born)

@@ -24,6 +24,7 @@ from taichi_ants.engines.colony.layout import (
     Stage,
     SumRow,
     WorldRow,
+    array_of,
     chunks_of,
     usual_schedule,
 )
@@ -44,8 +45,9 @@ from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.measures.series import Series
 from taichi_ants.measures.tidy import Measured, Tidy, seed_array
-from taichi_ants.task import Task
+from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.constants import EMPTY, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import Start, World
 
 State = TypeVar("State", bound="ColonyState")
@@ -137,6 +139,7 @@ class ColonyState:
         food_changes: Whether food grows back or wanders.
         memory: The size of the learner's memory for each table.
         pheromone: The pheromone of the task, with or without evaporation.
+        fields: The further pheromones of the task by name, with or without evaporation.
         stored: The names of the arrays in a file.
         length: Length of the episode in ticks; 0 if unknown.
         ticks: Number of ticks since an episode started in all worlds.
@@ -195,7 +198,7 @@ class ColonyState:
         life = self.task.life
         self.ants_change = life.births or life.lifespan is not None
         self.food_changes = life.regrowth is not None or life.wander is not None
-        self.pheromone = self.task.pheromone_while(self.learns)
+        self.set_pheromones(self.task)
         self.memory = Memory()
         if self.learner and (self.one_a_slot or self.plans_together):
             self.memory = padded(self.learner.memory_for(self.training, self.task.n_states))
@@ -206,6 +209,16 @@ class ColonyState:
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
         self.length = self.ticks = 0
         self.delivered = np.zeros(len(self.seeds), np.int64)
+
+    def set_pheromones(self, task: Task) -> None:
+        """Set the task, which may differ from the present one only in numbers of pheromones."""
+        self.task, self.pheromone = task, task.pheromone_while(self.learns)
+        self.fields = task.fields_while(self.learns)
+
+    @property
+    def pheromones(self) -> tuple[Pheromone, ...]:
+        """All pheromones, in the order of their numbers: the trail, then the further fields."""
+        return self.pheromone, *self.fields.values()
 
     @property
     def learner(self) -> Learner | None:
@@ -313,14 +326,13 @@ class ColonyState:
         ant_cells = self.cells[world, living]
         ground = self.arrays["ground"][cells].copy()
         ground[ant_cells] = EMPTY
-        stored, clock = self.stored_trail(world)
-        trail = np.maximum(stored - stored.dtype.type(clock), 0)
         carries = self.carrying[world, living]
         carried = self.arrays["carried"].reshape(self.cells.shape)[world, living]
+        fields = {name: self._levels(world, name) for name in (TRAIL, *self.fields)}
         return Snapshot(
             self.grid,
             ground,
-            trail,
+            fields[TRAIL],
             ant_cells,
             self.headings[world, living].astype(np.int32),
             carries,
@@ -328,25 +340,34 @@ class ColonyState:
             ant_numbers=self.numbers[world, living],
             ant_actions=self.actions[world, living].astype(np.int32),
             ant_events=self.events[world, living].astype(np.int32),
-            fields={"trail": trail},
+            fields=fields,
             counts={name: int(array[world]) for name, array in self._counts().items()},
             world=self.worlds[world],
         )
 
-    def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:
+    def _levels(self, world: int, field: str) -> np.ndarray:
+        """Return the levels of a pheromone in a world."""
+        stored, clock = self.stored_trail(world, field)
+        return np.maximum(stored - stored.dtype.type(clock), 0)
+
+    def stored_trail(self, world: int = 0, field: str = TRAIL) -> tuple[np.ndarray, int]:
         """Return a copy of the trail of world number `world` as kernels store it, and the clock.
 
-        The stored trail has expiry clocks, int32 (grid.size,). If the pheromone is dense, it has
-        levels, float32, and the clock is 0. The level of a cell is max(stored - clock, 0).
+        `field` is the name of another pheromone; AntsError if there is none. The stored trail has
+        expiry clocks, int32 (grid.size,). If the pheromone is dense, it has levels, float32, and
+        the clock is 0. The level of a cell is max(stored - clock, 0).
         """
+        check_one_of("field", field, (TRAIL, *self.fields))
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
-        if self.pheromone.dense:
-            return self.arrays["level"][cells].copy(), 0
-        return self.arrays["trail"][cells].copy(), self.trail_clock(world)
+        number = self.task.number_of(field)
+        stored = self.arrays[array_of(number, self.pheromones[number].dense)][cells].copy()
+        return stored, self.trail_clock(world, number)
 
-    def trail_clock(self, world: int) -> int:
-        """Return the amount by which integer trails have evaporated in this episode."""
-        return int(self.episode_ticks[world]) * (self.pheromone.evaporation == "linear")
+    def trail_clock(self, world: int, number: int = 0) -> int:
+        """Return the amount by which a pheromone in whole numbers has evaporated this episode."""
+        pheromone = self.pheromones[number]
+        falls = pheromone.evaporation == "linear" and not pheromone.dense
+        return int(self.episode_ticks[world]) * falls
 
     def check_begun(self) -> None:
         """Raise an AntsError if no episode has started."""
@@ -461,7 +482,14 @@ class ColonyState:
             # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
             # The clock at which a cell's trail has evaporated; if dense, its level.
-            "level" if self.pheromone.dense else "trail": levels.reshape(-1),
+            array_of(0, self.pheromone.dense): levels.reshape(-1),
+            # The same for each further field, which is empty at the start.
+            **{
+                array_of(number, field.dense): np.zeros(
+                    len(worlds), np.float32 if field.dense else np.int32
+                )
+                for number, field in enumerate(self.fields.values(), start=1)
+            },
             "worlds": rows,
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
@@ -481,6 +509,12 @@ class ColonyState:
             **{name: array.copy() for name, array in self._at_start().items()},
             "trail": np.zeros(1 if dense else cells, np.int32),
             "level": np.zeros(cells if dense else 1, np.float32),
+            **{
+                array_of(number, field.dense): np.zeros(
+                    cells, np.float32 if field.dense else np.int32
+                )
+                for number, field in enumerate(self.fields.values(), start=1)
+            },
         }
         for names, dtype in ((INTEGER_COLUMNS, np.int32), (BYTE_COLUMNS, np.int8)):
             used = [name for name in names if name not in unused]
@@ -579,6 +613,11 @@ class ColonyState:
             # By cell: the mark of what its ant wants, see `rules.conflicts`.
             "wants": np.zeros(cells, np.uint8),
             "spare": np.zeros_like(self.arrays["level"]),  # the next levels, with diffusion
+            **{
+                f"spare_{number}": np.zeros(cells, np.float32)
+                for number, field in enumerate(self.fields.values(), start=1)
+                if field.dense
+            },
             "orders": np.zeros(len(Order), np.int32),
             "barrier": np.zeros(24, np.int64),  # see `kernels.wait_for_all`
             "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),

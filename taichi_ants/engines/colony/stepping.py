@@ -119,14 +119,22 @@ class Stepper:
         from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.colony import kernels
 
-        task, pheromone = state.task, state.pheromone
+        task, pheromones = state.task, state.pheromones
+        outbound, homing = task.number_of(task.outbound_cue), task.number_of(task.homing_cue)
         features = kernels.Features(
             learner=state.learner,
             own_tables=state.one_a_slot,
             is_given_actions=state.is_given_actions,
             observation=task.sees,
-            dense=pheromone.dense,
-            view=pheromone.view,
+            dense=tuple(one.dense for one in pheromones),
+            # Only the views of cues are compiled.
+            views=tuple(
+                one.view if number in (outbound, homing) else "half"
+                for number, one in enumerate(pheromones)
+            ),
+            outbound=outbound,
+            homing=homing,
+            reads=tuple(task.number_of(name) for name in task.sees.reads),
             traffic=task.traffic,
             ants_change=state.ants_change,
             food_changes=state.food_changes,
@@ -142,6 +150,17 @@ def _has_barrier(running: runtime.Runtime) -> bool:
     return running.arch == "cpu"
 
 
+def _field_numbers(state: ColonyState) -> dict[str, Any]:
+    """Return the numbers of further fields, empty without fields."""
+    fields = state.fields.values()
+    counts = {"counts_without_food": int(any(one.counts_without_food for one in fields))}
+    return (counts if fields else {}) | {
+        f"{name}_{number}": value
+        for number, field in enumerate(fields, start=1)
+        for name, value in field.numbers.items()
+    }
+
+
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
     """Return the numbers that kernels read in addition to arrays."""
     memory = state.memory
@@ -154,6 +173,7 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "size": state.grid.size,
         "length": state.length,
         **state.pheromone.numbers,
+        **_field_numbers(state),
         **state.task.numbers,
         "ends_at_delivery": int(state.ends_at_delivery),
         "initial_q": state.training.initial_q,

@@ -6,6 +6,8 @@ tick. If ants can enter cells with ants, see `Traffic`, an additional phase mark
 all ants act.
 """
 
+from typing import Any
+
 import taichi as ti
 from taichi.math import popcnt
 
@@ -16,7 +18,14 @@ from taichi_ants.engines.colony.layout import (
     FoodSourceRow,
     Tally,
 )
-from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
+from taichi_ants.engines.colony.trail import (
+    deposit,
+    lay,
+    level_in_view,
+    level_of,
+    level_that_counts,
+    occasions_of,
+)
 from taichi_ants.engines.views import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
@@ -58,21 +67,21 @@ def state_index_of(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def observe(c: ti.template(), v: ti.template(), w, ant, clock):
+def observe(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the percept and the state index of an ant."""
     percept, state = 0, 0
     if ti.static(v.sees_percept):
-        percept = see(c, v, w, ant, clock)
+        percept = see(c, v, w, ant, tick)
         state = percept
     else:
-        view = view_around(c, v, w, ant, clock)
+        view = view_around(c, v, w, ant, tick)
         percept = view.percept
         state = v.encode(view)
     return percept, state
 
 
 @ti.func
-def see(c: ti.template(), v: ti.template(), w, ant, clock):
+def see(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the percept, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     left = here + step_towards(c.compass, heading, LEFT)
@@ -82,52 +91,126 @@ def see(c: ti.template(), v: ti.template(), w, ant, clock):
     ground_right = looks_of(c.ground[right])
     percept = 0
     if trait(c.carries, ant) == 1:
-        nearer = vision.nearer_from(c.closer[here], heading)
-        percept = vision.percept_carrying(ground_left, ground_forward, ground_right, nearer)
+        if ti.static(v.has_compass):
+            nearer = vision.nearer_from(c.closer[here], heading)
+            percept = vision.percept_carrying(ground_left, ground_forward, ground_right, nearer)
+        else:
+            homing = ti.static(v.field(c, v.homing))
+            percept = vision.percept_homing(
+                homing.half,
+                ground_left,
+                ground_forward,
+                ground_right,
+                level_in_view(c, homing, left, tick),
+                level_in_view(c, homing, forward, tick),
+                level_in_view(c, homing, right, tick),
+                strongest_of(c, homing, left, forward, right, tick),
+            )
     else:
+        outbound = ti.static(v.field(c, v.outbound))
         percept = vision.percept_foraging(
             v.half,
             ground_left,
             ground_forward,
             ground_right,
-            level_in_view(c, v, left, clock),
-            level_in_view(c, v, forward, clock),
-            level_in_view(c, v, right, clock),
-            strongest_of(c, v, left, forward, right, clock),
+            level_in_view(c, outbound, left, tick),
+            level_in_view(c, outbound, forward, tick),
+            level_in_view(c, outbound, right, tick),
+            strongest_of(c, outbound, left, forward, right, tick),
         )
     return percept
 
 
 @ti.func
-def strongest_of(c: ti.template(), v: ti.template(), left, forward, right, clock):
+def strongest_of(c: ti.template(), field: ti.template(), left, forward, right, tick):
     """Return the largest level that counts among the three cells ahead."""
-    others = ti.max(level_that_counts(c, v, forward, clock), level_that_counts(c, v, right, clock))
-    return ti.max(level_that_counts(c, v, left, clock), others)
+    others = ti.max(
+        level_that_counts(c, field, forward, tick), level_that_counts(c, field, right, tick)
+    )
+    return ti.max(level_that_counts(c, field, left, tick), others)
 
 
 @ti.func
-def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
+def cue_level(c: ti.template(), v: ti.template(), carries, place, tick):
+    """Return the level of a cell in the pheromone that an ant with this load follows.
+
+    If ants have a compass, this is the outbound cue for all ants.
+    """
+    level = ti.cast(level_of(ti.static(v.field(c, v.outbound)), place, tick), v.level_type)
+    if ti.static(not v.has_compass):
+        homing = ti.cast(level_of(ti.static(v.field(c, v.homing)), place, tick), v.level_type)
+        level = ti.select(carries == 1, homing, level)
+    return level
+
+
+@ti.func
+def strongest_cue(c: ti.template(), v: ti.template(), carries, here, heading, tick):
+    """Return the largest level that counts ahead, in the pheromone of `cue_level`."""
+    left = here + step_towards(c.compass, heading, LEFT)
+    forward = here + step_towards(c.compass, heading, FORWARD)
+    right = here + step_towards(c.compass, heading, RIGHT)
+    outbound = ti.static(v.field(c, v.outbound))
+    level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
+    if ti.static(not v.has_compass):
+        field = ti.static(v.field(c, v.homing))
+        homing = ti.cast(strongest_of(c, field, left, forward, right, tick), v.level_type)
+        level = ti.select(carries == 1, homing, level)
+    return level
+
+
+@ti.func
+def view_around(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the view of an ant."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    nearer = vision.nearer_from(c.closer[here], heading)
-    view = v.view_type(carries=trait(c.carries, ant), own_level=level_of(c, v, here, clock))
+    nearer, carries = vision.nearer_from(c.closer[here], heading), trait(c.carries, ant)
+    view = v.view_type(carries=carries, own_level=cue_level(c, v, carries, here, tick))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
         place = here + step_around(c.compass, heading, cells[k])
         standable = (looks_of(c.ground[place]) == EMPTY) | (c.ground[place] >= ANT_GROUND)
-        view.levels[k] = ti.select(standable, level_of(c, v, place, clock), 0)
+        view.levels[k] = ti.select(standable, cue_level(c, v, carries, place, tick), 0)
         # 0 without an ant, 1 with a forager, 2 with a carrier.
         view.ants[k] = (ti.cast(c.ground[place] >> 4, ti.i32) + 1) >> 3
-        view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
+        if ti.static(v.has_compass):
+            view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
+        else:
+            view.nearer[k] = ti.cast(view.levels[k] > view.own_level, ti.i32)
         view.codes[k] = looks_of(c.ground[place])
-    view.strongest = strongest_of(
-        *(c, v, here + step_towards(c.compass, heading, LEFT)),
-        here + step_towards(c.compass, heading, FORWARD),
-        here + step_towards(c.compass, heading, RIGHT),
-        clock,
-    )
-    judge(v.half, view, v.observation)
+        read_fields(c, v, view, k, place, standable, tick)
+    read_own_levels(c, v, view, here, tick)
+    view.strongest = strongest_cue(c, v, carries, here, heading, tick)
+    judge(v.half, v.homing_view, view, v.observation)
     return view
+
+
+def entry_of(view: Any, name: str) -> Any:
+    """Return a vector of a view by its name, while a kernel compiles."""
+    return getattr(view, name)
+
+
+def set_entry(view: Any, name: str, level: Any) -> None:
+    """Set the level of the ant's own cell in a view, while a kernel compiles."""
+    getattr(view, f"own_{name}")._assign(level)
+
+
+# Taichi requires this attribute, with any value, of Python functions that kernels call.
+entry_of._is_taichi_function = set_entry._is_taichi_function = False  # type: ignore[attr-defined]
+
+
+@ti.func
+def read_fields(c: ti.template(), v: ti.template(), view: ti.template(), k, place, standable, tick):
+    """Set the levels of cell number k of a view in the pheromones that the observation reads."""
+    for i in ti.static(range(len(v.reads))):
+        level = level_of(ti.static(v.field(c, v.reads[i])), place, tick)
+        entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
+
+
+@ti.func
+def read_own_levels(c: ti.template(), v: ti.template(), view: ti.template(), here, tick):
+    """Set the levels of the ant's own cell in the pheromones that the observation reads."""
+    for i in ti.static(range(len(v.reads))):
+        level = level_of(ti.static(v.field(c, v.reads[i])), here, tick)
+        set_entry(view, v.observation.reads[i], level)
 
 
 @ti.func
@@ -203,7 +286,7 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
     c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, conflicts.WINS, 0), ti.u8)
     c.want[ant] = ti.select(won, wanted, cell)
-    put(c.event, ant, event_of(c, v, base, ant, tick * c.evaporates))
+    put(c.event, ant, event_of(c, v, base, ant, tick))
 
 
 @ti.func
@@ -213,24 +296,34 @@ def step_ahead(c: ti.template(), ant):
 
 
 @ti.func
-def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
+def event_of(c: ti.template(), v: ti.template(), base, ant, tick):
     """Return the event of a successful move; a cell with an ant is a lure if it is better."""
     action, percept = trait(c.action, ant), trait(c.percept, ant)
     event = move_event(vision.code_in_view(percept, ti.min(action, RIGHT)))
     here = base + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
-        rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
-        nearer = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
-        better = ti.select(trait(c.carries, ant) == 1, nearer, rises)
+        better = is_stronger(ti.static(v.field(c, v.outbound)), ahead, here, tick)
+        if trait(c.carries, ant) == 1:
+            if ti.static(v.has_compass):
+                better = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
+            else:
+                better = is_stronger(ti.static(v.field(c, v.homing)), ahead, here, tick)
         event = ti.select(better, Event.ENTERED_LURE, Event.ENTERED_EMPTY)
     return event
 
 
 @ti.func
+def is_stronger(field: ti.template(), place, other, tick):
+    """Return whether the level of a cell is higher than that of another one."""
+    return level_of(field, place, tick) > level_of(field, other, tick)
+
+
+@ti.func
 def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Do the action of an ant: move or pick up if it has won, or deliver; and deposit."""
-    base, clock = w * c.size, tick * c.evaporates
+    base = w * c.size
+    trail = ti.static(v.field(c, 0))
     action, percept = trait(c.action, ant), trait(c.percept, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
@@ -253,10 +346,11 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if not filled:
         c.ground[base + cell] = EMPTY
     c.want[ant] = cell  # the cell with the ant's mark
+    had_food, age = carries, c.carried[ant]
     if carries == 1:
         carried = c.carried[ant]
         if goes != cell:
-            deposit(c, v, base + goes, clock, carried)
+            deposit(trail, base + goes, tick, carried)
         elif can_give(action, percept):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
@@ -270,9 +364,16 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         c.carried[ant] = 1
         c.ground[base + wanted] = EMPTY
         take_from_source(c, base + wanted, tick)
-        deposit(c, v, base + wanted, clock, 0)
-        deposit(c, v, base + cell, clock, 0)
+        deposit(trail, base + wanted, tick, 0)
+        deposit(trail, base + cell, tick, 0)
         put(c.heading, ant, turn_round(heading))
+    if ti.static(len(v.pheromones) > 1):
+        age = ti.select(carries == had_food, age, 0)
+        occasions = occasions_of(had_food, percept, action, event, goes != cell)
+        for field in ti.static(v.further_fields(c)):
+            lay(field, occasions, base, cell, goes, wanted, tick, age)
+        if c.counts_without_food == 1:
+            c.carried[ant] = age + 1
     ground = ANT_GROUND
     if ti.static(v.sees_ants):
         ground = OBSTACLE | (ANT_STANDS << 4) + (carries << 7)

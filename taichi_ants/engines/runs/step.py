@@ -108,7 +108,7 @@ def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
             view.codes[k] = ground_of(cell)
         ahead = ti.max(view.levels[left], view.levels[forward])
         view.strongest = ti.max(ahead, view.levels[right])
-        judge(half, view, observation)
+        judge(half, "", view, observation)
         return encode(view)
 
     return see

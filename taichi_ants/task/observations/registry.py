@@ -23,6 +23,10 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 # Tables of this many rows have 5 * 2**20 values; kernels index several tables with 32 bits.
 MAX_STATES = 1 << 20
 AHEAD = (-1, 0, 1)
+_VIEW = (
+    *("carries", "percept", "codes", "levels", "ants", "nearer", "strongest", "own_level"),
+    *("entries", "keys", "items"),  # methods of a view in kernels
+)
 _VIEWS = 3000  # the number of views, and of names of states, that a check tries
 
 
@@ -39,6 +43,11 @@ class Observation:
     - `ants` (k): 0 for no ant, 1 for an ant without food, 2 for an ant with food.
     - `nearer` (k): 1 if the cell is nearer to the queen than the ant's own.
     - `strongest`: The level of the strongest trail ahead; `own_level`: the ant's own cell.
+    - `NAME` (k), for each NAME in `reads`: The level of this field, like `levels`; `own_NAME`: that
+      of the ant's own cell.
+
+    Trails and levels are those of the outbound cue of the task. If the homing cue is a field, those
+    of ants with food are its levels, and `nearer` is 1 if the level exceeds `own_level`.
 
     Attributes:
         name: The name that tasks use.
@@ -46,6 +55,7 @@ class Observation:
         encode: A function of the view that returns the state index, from 0 to n_states - 1. It is
             compiled for the kernels. It computes with whole numbers: arithmetic, comparisons, `if`,
             and `for` over a `range`, without imports and calls. Its only `return` is its last line.
+        reads: The names of fields to read, or "trail"; the task must have these fields.
         cells: The cells in view, as headings relative to the ant's, each from -2 to 3. They must
             include -1, 0 and 1, the cells ahead.
         name_of: A function that returns the name of a state for people.
@@ -62,6 +72,7 @@ class Observation:
     summary: str = ""
     letters: str = ""
     shape: tuple[int, ...] = ()
+    reads: tuple[str, ...] = ()
 
     def __reduce__(self) -> Any:
         # A pickle holds only the name, because reading it requires the registered observation.
@@ -108,6 +119,7 @@ def register(observation: Observation) -> Observation:
             "-2, 2 and 3, each once."
         )
     expect(f"summary of {name!r}", observation.summary, str)
+    _check_reads(observation)
     shape = observation.shape
     expect(f"shape of {name!r}", shape, tuple)
     if shape and math.prod(checked_whole(f"shape of {name!r}", n) for n in shape) != (
@@ -121,6 +133,19 @@ def register(observation: Observation) -> Observation:
         _try_functions(observation)
     _OBSERVATIONS[name] = observation
     return observation
+
+
+def _check_reads(observation: Observation) -> None:
+    reads = observation.reads
+    expect(f"reads of {observation.name!r}", reads, tuple)
+    taken = {*_VIEW, *(f"own_{name}" for name in reads if isinstance(name, str))}
+    for name in reads:
+        if not isinstance(name, str) or not name.isidentifier() or name in taken:
+            raise AntsError(
+                f"reads of {observation.name!r} contains {shown(name)}; it must contain names of "
+                "fields, each once, other than the names in a view."
+            )
+        taken.add(name)
 
 
 def _is_built_in(name: str) -> bool:
@@ -195,6 +220,8 @@ def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
             ants=_Vector(ants[n]),
             nearer=_Vector(nearer[n]),
             own_level=trail[0],
+            **{name: _Vector(np.roll(levels, 1 + r)) for r, name in enumerate(observation.reads)},
+            **{f"own_{name}": trail[-1] for name in observation.reads},
         )
 
 

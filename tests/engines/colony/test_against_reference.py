@@ -16,22 +16,23 @@ from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.observations import registry
 
 # Each entry takes kernels of its own, so that there are few: learner, sharing, observation, dense,
-# and where these are not the paper's the traffic and which trails are seen.
+# and where these are not the paper's the traffic, which trails are seen, further fields, and cues.
 # For all but the first, ants and food come and go: what stays the same is left out of kernels.
+UNDER = "strongest_under_carriers"
 KERNELS = [
     ("q_learning", "shared", "paper", False),
-    ("sarsa", "shared", "ants_seen", True),
+    ("sarsa", "shared", "ants_seen", True, "blocking", "half", "Ab", ("b", "compass")),
     ("expected_sarsa", "shared", "five_cells", False),
-    ("dyna_q", "shared", "trail_levels", True),
+    ("dyna_q", "shared", "trail_levels", True, "blocking", "half", "aBc", ("B", "c")),
     ("dyna_q", "independent", "ants_seen", False),
-    ("double_q", "independent", "paper", True),
+    ("double_q", "independent", "paper", True, "blocking", "half", "ABc", ("A", "trail")),
     ("sarsa_lambda", "independent", "paper", False),
-    ("n_step_sarsa", "independent", "paper", False),
-    ("prioritized_sweeping", "independent", "trail_levels", False),
-    ("q_learning", "frozen", "six_cells", False),
-    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
-    ("q_learning", "shared", "queues", False, "following", "strongest_under_carriers"),
-    ("q_learning", "frozen", "paper", True, "following", "strongest_under_carriers"),
+    ("n_step_sarsa", "independent", "paper", False, "blocking", "half", "abC", ("a", "C")),
+    ("prioritized_sweeping", "independent", "trail_levels", False, "blocking", "half", "a"),
+    ("q_learning", "frozen", "six_cells", False, "blocking", "strongest", "A", ("trail", "A")),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest", "ab", ("trail", "b")),
+    ("q_learning", "shared", "queues", False, "following", UNDER, "Ab", ("A", "b")),
+    ("q_learning", "frozen", "paper", True, "following", UNDER, "ab", ("b", "b")),
 ]
 
 
@@ -65,7 +66,7 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
             learner=learner,
             observation=observation,
             dense=dense,
-            **dict(zip(("traffic", "view"), rules, strict=False)),
+            **dict(zip(("traffic", "view", "fields", "cues"), rules, strict=False)),
             changes=kernel is not KERNELS[0],
         )
         colony, plain = both(drawn)

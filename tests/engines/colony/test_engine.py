@@ -137,7 +137,7 @@ def test_births_fill_the_slots_and_no_more():
         ),
         ({"task": Task("trail_levels"), "q_values": np.zeros((128, 5))}, "(432, 5)"),
         ({"sharing": "some"}, "'some'"),
-        ({"sharing": "frozen"}, "sharing is 'frozen', but q_values is None; these ants"),
+        ({"sharing": "frozen"}, "sharing is 'frozen', but q_values is None; give the action"),
         ({"world": World((3, 3, 3), (0, 0, 0))}, "the world has no food"),
         ({"seeds": []}, "seeds"),
         ({"seeds": [1, 1]}, "1"),
