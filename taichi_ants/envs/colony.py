@@ -48,6 +48,7 @@ class ColonyWorlds(Ants):
         max_episode_steps: int | None = None,
     ) -> None:
         task = checks.checked_task(Task() if task is None else task)
+        checks.check_given_actions(task)
         super().__init__(
             *(world, n_worlds, task, max_steps, max_episode_steps, observation_format),
             *(evaporation, render_mode, METADATA["render_modes"]),

@@ -59,6 +59,7 @@ class LoneAnts(Ants):
     ) -> None:
         task = Task.from_dict(task) if isinstance(task, Mapping) else task  # a spec read from JSON
         task = checks.checked_runs_task(task)
+        checks.check_given_actions(task)
         super().__init__(
             *(world, n, task, max_steps, max_episode_steps, observation_format, evaporation),
             *(render_mode, METADATA["render_modes"]),

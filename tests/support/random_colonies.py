@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from random_choices import NO_NOISE, random_choice, random_noise
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
@@ -25,7 +26,7 @@ class RandomColony:
     world: World
     task: Task
     population: dict[str, Any]
-    training: TrainingConfig
+    training: TrainingConfig | None
     seed: int
     sharing: str
     q_values: np.ndarray | None
@@ -43,11 +44,15 @@ def random_colony(
     traffic: str = "blocking",
     view: str = "half",
     changes: bool = False,
+    choice: str = "greedy",
+    noise: str = NO_NOISE,
 ) -> RandomColony:
     """Return the random colony of a seed.
 
     `sharing`, `learner` and `dense` (trails as real numbers) are random unless they are given. With
     `changes`, ants are born or die and food grows back or wanders, which uses separate kernels.
+    `choice` is the rule, with random numbers, and `noise` names its kinds. Ants that choose by
+    "deneubourg" have no training, so their `sharing` must be "frozen".
     """
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
@@ -56,6 +61,9 @@ def random_colony(
     population, task = _rules(rng, min(room, most_ants), dense, changes)
     training, delivery = _training(rng, learner)
     given = sharing == "frozen" or rng.random() < 0.6
+    chooses = random_choice(seed, choice)
+    if not chooses.needs_table:
+        training, given = None, False
     return RandomColony(
         world=world,
         task=replace(
@@ -66,6 +74,8 @@ def random_colony(
             pheromone=replace(task.pheromone, view=view),
             traffic=traffic,
             turns_at_queen=bool(rng.random() < 0.5),
+            choice=chooses,
+            noise=random_noise(seed, noise),
         ),
         population=population,
         training=training,

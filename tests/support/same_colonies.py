@@ -28,7 +28,9 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
             assert mine["age"] == ant.age
         assert (mine["percept"], states[slot]) == (ant.percept, ant.state)
         assert int(mine["streams"]) == ant.stream.state
+        assert mine["action"] == ant.action
         if ant.action >= 0:
+            assert colony.executed[world, slot] == ant.executed
             assert mine["event"] == ant.event
             assert arrays["rewards"][ant.event] == ant.reward
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)

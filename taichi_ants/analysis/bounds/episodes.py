@@ -58,6 +58,10 @@ class EpisodeBounds:
         changes = task.evaporation_in_training and task.pheromone.evaporation != "none"
         if changes or task.pheromone.diffusion:
             raise AntsError("exact bounds require training without evaporation and diffusion.")
+        if task.noise.slip or task.noise.misread:
+            raise AntsError(
+                f"noise of the task is {task.noise}; exact bounds require a task without noise."
+            )
         around = look_around(world)
         cells, headings = world.start(seed=0)
         cell = int(np.searchsorted(around.cells, cells[0]))

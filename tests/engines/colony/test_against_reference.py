@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_choices import NOISE
 from random_colonies import RandomColony, random_colony
 from random_rewards import random_rewards
 from same_colonies import assert_equal
@@ -16,7 +17,7 @@ from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.observations import registry
 
 # Each entry takes kernels of its own, so that there are few: learner, sharing, observation, dense,
-# and where these are not the paper's the traffic and which trails are seen.
+# and where these are not the paper's the traffic, which trails are seen, the choice and the noise.
 # For all but the first, ants and food come and go: what stays the same is left out of kernels.
 KERNELS = [
     ("q_learning", "shared", "paper", False),
@@ -32,7 +33,18 @@ KERNELS = [
     ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
     ("q_learning", "shared", "queues", False, "following", "strongest_under_carriers"),
     ("q_learning", "frozen", "paper", True, "following", "strongest_under_carriers"),
+    ("sarsa", "shared", "ants", False, "right_of_way", "half", "softmax", NOISE),
+    ("q_learning", "frozen", "paper", False, "right_of_way", "half", "deneubourg", NOISE),
+    ("q_learning", "shared", "paper", False, "blocking", "half", "softmax"),
+    ("sarsa", "independent", "trail_levels", True, "blocking", "half", "softmax", "misread"),
+    ("dyna_q", "shared", "six_cells", False, "blocking", "half", "greedy", NOISE),
+    ("expected_sarsa", "shared", "queues", False, "following", "strongest", "greedy", NOISE),
+    ("n_step_sarsa", "independent", "ants_seen", False, "blocking", "half", "softmax", "slip"),
+    ("double_q", "independent", "paper", True, "blocking", "half", "greedy", "misread"),
+    ("q_learning", "frozen", "paper", True, "blocking", "half", "deneubourg"),
+    ("q_learning", "frozen", "paper", True, "following", "half", "deneubourg", "misread"),
 ]
+OPTIONS = ("traffic", "view", "choice", "noise")
 
 
 def both(drawn: RandomColony) -> tuple[Colony, ReferenceColony]:
@@ -47,7 +59,7 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK = (0, 1, 7, 10, 11)
+QUICK = (0, 1, 7, 10, 11, 13, 14)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 MARKED = [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in KERNELS]
 
@@ -65,7 +77,7 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
             learner=learner,
             observation=observation,
             dense=dense,
-            **dict(zip(("traffic", "view"), rules, strict=False)),
+            **dict(zip(OPTIONS, rules, strict=False)),
             changes=kernel is not KERNELS[0],
         )
         colony, plain = both(drawn)
@@ -88,7 +100,8 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
                 record.deliveries > 0,
                 record.blocked > 0,
             ]
-    assert (happened >= [1, 3, 3, 2, 12]).all(), happened
+    rarely = len(rules) == len(OPTIONS)  # ants that slip or misread deliver rarely
+    assert (happened >= [not rarely, 3, 3, 1 if rarely else 2, 12]).all(), happened
 
 
 def test_each_learner_and_observation_is_compared():
