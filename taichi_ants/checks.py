@@ -101,9 +101,9 @@ def check_sharing(learner: Learner, sharing: str) -> None:
 def refuse_table(task: Task, sharing: str) -> None:
     """Raise an AntsError, because the ants of the task choose without action values."""
     raise AntsError(
-        f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action values and do "
-        f"not learn, but sharing is {shown(sharing)} and there is a training or q_values; set "
-        'sharing to "frozen" and training to None, and leave out q_values.'
+        f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action values, but "
+        f"sharing is {shown(sharing)} and there is a training or q_values; set sharing to "
+        '"frozen" and training to None, and leave out q_values.'
     )
 
 
