@@ -5,8 +5,8 @@ and do not know their way except by the compass. On the late bridge, rock closes
 for the first half of the time. Shares are of the crossings in the last tenth of the time.
 
 The script prints, for each bridge, the share of colonies with most crossings on the short branch,
-and the share of colonies with at least 80 % of them on one branch. It writes double_bridge.csv, with a row for each
-colony, and double_bridge.png. See docs/models.md.
+and the share of colonies with at least 80 % of them on one branch. It writes double_bridge.csv,
+with a row for each colony, and double_bridge.png. See docs/models.md.
 """
 
 from __future__ import annotations
