@@ -40,6 +40,8 @@ SETTINGS = "tests/test_settings.py"
 MEASURES = "tests/measures"
 RESULTS_OF_RUNS = "tests/analysis/test_results.py"
 SWEEPS = "tests/commands/test_sweep_measures.py"
+CHOICE = "tests/task/test_choice.py"
+NUMBERS = "tests/task/test_numbers.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
@@ -86,6 +88,17 @@ MUTATIONS = [
         "(1.0 - explores) / ti.cast(ties",
         "1.0 / ti.cast(ties",
         "tests/offline/test_recording.py",
+    ),
+    ("task/rules/policy.py", "cumulative <= drawn", "cumulative < drawn / 2", CHOICE),
+    ("task/rules/policy.py", "(is_open_at * is_nearer).sum() > 0", "False", COLONY),
+    ("task/rules/numbers.py", "if m > ti.f64(SQRT_2)", "if m > ti.f64(2.0)", NUMBERS),
+    ("task/rules/noise.py", "ti.cast(other >= code", "ti.cast(other > code", CHOICE),
+    ("engines/colony/steps.py", "ti.select(is_true, level, 0)", "level", COLONY),
+    (
+        "engines/colony/learning.py",
+        "c.streams[ant] == c.first",
+        "0 * c.streams[ant] != 1 + c.first",
+        CHOICE,
     ),
     ("task/rules/random_bits.py", "ti.u64(27)", "ti.u64(28)", RUNS),
     ("task/rules/vision.py", "2 * level >= ti.max", "2 * level > ti.max", COLONY),

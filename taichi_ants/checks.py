@@ -73,6 +73,11 @@ def checked_runs_task(task: Task | None) -> Task:
         raise AntsError(
             f"{further[0]}; runs of one ant have only the trail and the compass, so use a Colony."
         )
+    if not task.choice.needs_table:
+        raise AntsError(
+            f"`task.choice.rule` of the task is {task.choice.rule!r}; only colonies support it, so "
+            "use a Colony."
+        )
     return task
 
 
@@ -105,6 +110,48 @@ def check_sharing(learner: Learner, sharing: str) -> None:
         raise AntsError(
             f"learner {learner.name!r} has no TD error that can be summed over ants, so ants "
             'cannot share its table; set sharing to "independent".'
+        )
+
+
+def refuse_table(task: Task, sharing: str) -> None:
+    """Raise an AntsError, because the ants of the task choose without action values."""
+    raise AntsError(
+        f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action values, but "
+        f"sharing is {shown(sharing)} and there is a training or q_values; set sharing to "
+        '"frozen" and training to None, and leave out q_values.'
+    )
+
+
+def check_table(task: Task) -> None:
+    """Raise AntsError if the ants of a task do not choose by action values."""
+    if not task.choice.needs_table:
+        raise AntsError(
+            f"`task.choice.rule` is {task.choice.rule!r}, which has no action values, so the "
+            "probabilities of actions are not known; record ants that are greedy or softmax."
+        )
+
+
+def check_choice(learner: Learner, task: Task) -> None:
+    """Raise AntsError if the learner cannot learn about the choices of the task's ants."""
+    if learner.name == "expected_sarsa" and task.choice.rule != "greedy":
+        raise AntsError(
+            f"learner 'expected_sarsa' takes the mean over epsilon-greedy actions, but "
+            f"`task.choice.rule` is {task.choice.rule!r}; use 'sarsa', or the rule 'greedy'."
+        )
+
+
+def check_choices(configs: Sequence[TrainingConfig], task: Task) -> None:
+    """Raise AntsError if a learner cannot learn about the choices of the task's ants."""
+    for config in configs:
+        check_choice(learners.get(config.learner), task)
+
+
+def check_given_actions(task: Task) -> None:
+    """Raise AntsError if the task has a rule of choice, which given actions would not follow."""
+    if task.choice.rule != "greedy":
+        raise AntsError(
+            f"`task.choice.rule` is {task.choice.rule!r}, but the actions of an environment are "
+            "given; leave `task.choice` out."
         )
 
 

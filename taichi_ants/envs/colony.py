@@ -43,6 +43,7 @@ class ColonyWorlds(Ants):
         capacity: int | None = None,
     ) -> None:
         task = checks.checked_task(Task() if task is None else task)
+        checks.check_given_actions(task)
         super().__init__(n_worlds, task, given, METADATA["render_modes"])
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],

@@ -43,6 +43,7 @@ class LoneAnts(Ants):
     ) -> None:
         task = Task.from_dict(task) if isinstance(task, Mapping) else task  # a spec read from JSON
         task = checks.checked_runs_task(task)
+        checks.check_given_actions(task)
         super().__init__(n, task, given, METADATA["render_modes"])
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)

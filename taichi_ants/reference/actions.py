@@ -6,18 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better
-from taichi_ants.reference.random_stream import RandomStream, hash_of, pick
+from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import (
     EMPTY,
     GIVE,
-    N_ACTIONS,
     PICK_UP,
     SEES_EMPTY,
     SEES_GOAL,
@@ -38,19 +35,6 @@ PAID = {
     Event.BLOCKED: "failed",
     Event.FAILED: "failed",
 }
-
-
-def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomStream) -> int:
-    """Return an action: any with probability epsilon, else one with the largest of these 5 values.
-
-    It makes one draw: the high word decides whether to explore, the low word chooses the action.
-    """
-    high, low = stream.draw()
-    if high < int(epsilon * 4294967296.0):
-        return pick(low, N_ACTIONS)
-    best_value = max(values)
-    best = [action for action in range(N_ACTIONS) if values[action] == best_value]
-    return best[pick(low, len(best))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +159,7 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
     for intent in intents:
         ant, slot = intent.ant, intent.ant.slot
         start, had_food = ant.cell, ant.carries
-        ant.action = intent.action
+        ant.executed = intent.action
         if intent.action < PICK_UP:
             # Ants turn even if the way is blocked, so that they get out of dead ends.
             ant.heading = intent.heading

@@ -30,7 +30,9 @@ class Ant:
         carried: Ticks since the ant's last pick-up or delivery, its birth, or the start.
         percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
+        misread: The codes of cells in view that the ant misreads, by turns from its heading.
         action, event, reward: The last ones; -1, NONE and 0 before the first tick.
+        executed: The last action as executed, which differs from `action` if that slipped.
         chosen: The action already drawn for the next tick, if any.
     """
 
@@ -44,7 +46,9 @@ class Ant:
     carried: int = 0
     percept: int = 0
     state: int = 0
+    misread: dict[int, int] = field(default_factory=dict)
     action: int = -1
+    executed: int = -1
     event: Event = Event.NONE
     reward: int = 0
     chosen: int | None = None
@@ -57,6 +61,7 @@ class Transition:
     Attributes:
         episode, step: The episode in the run and the tick in the episode, from 0.
         cell, heading, state: Values before the tick.
+        action, executed: The action that the ant chose, and the one that it executed.
         next_state, next_action: Values after the tick; the action is None if none was drawn.
         terminated: Whether the ant delivered into a terminal state: the update does not bootstrap.
         truncated: Whether this is the ant's last update of the episode without `terminated`: the
@@ -79,6 +84,7 @@ class Transition:
     terminated: bool
     truncated: bool
     td_error: np.float32 | None = None
+    executed: int = -1
 
     @property
     def pair(self) -> Pair:

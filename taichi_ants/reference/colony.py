@@ -18,12 +18,18 @@ from taichi_ants.grid.constants import (
     STREAM_ROLLOUT,
 )
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.reference.actions import carry_out, choose_action, intend
+from taichi_ants.reference.actions import carry_out, intend
 from taichi_ants.reference.ants import Ant, Transition, starts
+from taichi_ants.reference.choice import (
+    choose_action,
+    choose_cell,
+    misread_codes,
+    slipped,
+)
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.learners import LEARNERS
-from taichi_ants.reference.observations import OBSERVATIONS, observe
+from taichi_ants.reference.observations import OBSERVATIONS, TURNS, codes_in_view, observe
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.sharing import SHARING
 from taichi_ants.reference.world_state import WorldState
@@ -82,7 +88,7 @@ class ReferenceColony:
         self,
         world: World,
         task: Task | None,
-        training: TrainingConfig,
+        training: TrainingConfig | None,
         seed: int,
         ants: int = 1,
         capacity: int | None = None,
@@ -92,6 +98,8 @@ class ReferenceColony:
         q_values: np.ndarray | None = None,
     ) -> None:
         self.task = task = task or Task()
+        if training is None:  # ants choose without action values
+            training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
         check_one_of("sharing", sharing, tuple(SHARING))
         check_one_of("learner", training.learner, tuple(LEARNERS))
         check_one_of("observation", task.observation, tuple(OBSERVATIONS))
@@ -145,8 +153,12 @@ class ReferenceColony:
         return tables if self.sharing == "independent" else tables[0]
 
     def observe(self, ant: Ant) -> None:
-        """Update the percept and the state index of an ant."""
-        ant.percept = observe(self.world, ant)
+        """Update the percept and the state index of an ant, which may misread cells in view."""
+        ant.percept, ant.misread = observe(self.world, ant), {}
+        if self.task.noise.misread > 0 and self.episode >= 0:  # not before the first episode
+            turns = TURNS[self.task.observation]
+            codes = codes_in_view(self.world, ant, turns)
+            ant.misread = misread_codes(codes, turns, self.task.noise.misread, ant.stream)
         ant.state = self._row(self.world, ant)
 
     def begin_episode(self, world: World | None = None) -> None:
@@ -190,8 +202,9 @@ class ReferenceColony:
         traffic = self.task.traffic
         intents = []
         for ant in acting:
-            action = self._draw_action(ant) if ant.chosen is None else ant.chosen
+            ant.action = self._draw_action(ant) if ant.chosen is None else ant.chosen
             ant.chosen = None
+            action = slipped(ant.action, self.task.noise.slip, ant.stream)
             intents.append(intend(self.world, ant, action, traffic))
         carry_out(self.world, intents, tick, self.task)
         for intent in intents:
@@ -221,16 +234,19 @@ class ReferenceColony:
         self.record.ticks += 1
 
     def _draw_action(self, ant: Ant) -> int:
+        choice = self.task.choice
+        if choice.rule == "deneubourg":
+            return choose_cell(self.world, ant, choice, self.task.traffic)
         values = self.minds.of(ant.slot).rows[ant.state]
-        return choose_action(values, self.epsilon, ant.stream)
+        return choose_action(values, self.epsilon, ant.stream, choice)
 
     def _count(self, acting: Sequence[Ant]) -> int:
         """Record what happened in the tick, and return the number of deliveries."""
         record, delivered = self.record, sum(ant.event is Event.DELIVERED for ant in acting)
         record.episode_return += sum(ant.reward for ant in acting)
-        record.moves += sum(ant.action < PICK_UP for ant in acting)
+        record.moves += sum(ant.executed < PICK_UP for ant in acting)
         record.blocked += sum(
-            ant.action < PICK_UP and ant.event in (Event.BLOCKED, Event.PUSHED) for ant in acting
+            ant.executed < PICK_UP and ant.event in (Event.BLOCKED, Event.PUSHED) for ant in acting
         )
         record.deliveries += delivered
         if record.deliveries and record.first_delivery < 0:
@@ -297,6 +313,7 @@ class ReferenceColony:
                     heading=was.heading,
                     state=was.state,
                     action=ant.action,
+                    executed=ant.executed,
                     reward=ant.reward,
                     event=ant.event,
                     next_state=ant.state,

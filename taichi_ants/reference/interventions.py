@@ -140,10 +140,12 @@ class Interventions:
         colony, world = self.colony, self.colony.world
         self.ants = n
         by_number = sorted(colony.ants.values(), key=lambda ant: ant.number)
-        self.remove_ants([ant.cell for ant in by_number[n:]])
-        order = start_order(self._first, world.queen, colony.seed, colony.start)
-        free = [cell for cell in order if world.content(cell) == EMPTY]
-        self.add_ants(free[: max(0, n - len(by_number))])
+        if n < len(by_number):
+            self.remove_ants([ant.cell for ant in by_number[n:]])
+        elif n > len(by_number):
+            order = start_order(self._first, world.queen, colony.seed, colony.start)
+            free = [cell for cell in order if world.content(cell) == EMPTY]
+            self.add_ants(free[: n - len(by_number)])
 
     def set_evaporation(self, falls: bool) -> None:
         """Switch evaporation on (that of the task, or 1 per tick if it has none) or off."""

@@ -19,6 +19,8 @@ from taichi_ants.task.constants import (
 )
 
 AHEAD = (-1, 0, 1)  # headings relative to the ant's: left, forward, right
+# From back left to back right; the sixth cell is the one behind.
+FIVE, SIX = (-2, -1, 0, 1, 2), (-2, -1, 0, 1, 2, 3)
 ANOTHER_ANT = 4  # in addition to the paper's four codes
 # Codes of ants: other load on a better cell, other load elsewhere, same load on a better cell.
 BETTER, OTHER, IN_QUEUE = 4, 5, 6
@@ -80,21 +82,30 @@ def observe(world: WorldState, ant: Ant) -> int:
     return 64 * ant.carries + 16 * left + 4 * forward + right
 
 
-def paper(world: WorldState, ant: Ant) -> int:
-    """Return the percept."""
-    return ant.percept
+def codes_seen(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
+    """Return the code of each cell as the ant sees it, which may be misread."""
+    codes = codes_in_view(world, ant, turns)
+    return [ant.misread.get(turn, code) for turn, code in zip(turns, codes, strict=True)]
+
+
+def ants_in_view(world: WorldState, ant: Ant) -> list[Ant | None]:
+    """Return the ant that the ant sees on each cell ahead; it sees none on cells it misreads."""
+    return [
+        None if turn in ant.misread else world.ants.get(cell)
+        for turn, cell in zip(AHEAD, cells_in_view(ant), strict=True)
+    ]
 
 
 def more_cells(turns: tuple[int, ...], world: WorldState, ant: Ant) -> int:
     """Return the state index of the load and the paper's codes of the cells at these turns."""
-    return _number([ant.carries, *codes_in_view(world, ant, turns)], 4)
+    return _number([ant.carries, *codes_seen(world, ant, turns)], 4)
 
 
 def ants_seen(world: WorldState, ant: Ant) -> int:
     """Return the state index of the load and the cells ahead; other ants have their own code."""
     codes = [
-        ANOTHER_ANT if cell in world.ants else code
-        for cell, code in zip(cells_in_view(ant), codes_in_view(world, ant), strict=True)
+        code if there is None else ANOTHER_ANT
+        for there, code in zip(ants_in_view(world, ant), codes_seen(world, ant), strict=True)
     ]
     return _number([ant.carries, *codes], 5)
 
@@ -103,7 +114,8 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
     """Return the state index of load and cells ahead; trails count in thirds of the strongest."""
     strongest = strongest_in_view(world, ant)
     codes = []
-    for code, cell in zip(codes_in_view(world, ant), cells_in_view(ant), strict=True):
+    views = zip(AHEAD, codes_seen(world, ant), cells_in_view(ant), strict=True)
+    for turn, code, cell in views:
         if code == SEES_GOAL:
             codes.append(GOAL)
         elif code == SEES_OBSTACLE:
@@ -111,8 +123,9 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
         elif ant.carries:
             codes.append(STRONG if code == SEES_LURE else NOTHING)
         else:
-            # Ants do not see trails under food or the queen.
-            level = world.cue(ant).level(cell) if world.content(cell) == EMPTY else 0
+            # Ants do not see trails under food or the queen, or on cells that they misread.
+            sees = turn not in ant.misread and world.content(cell) == EMPTY
+            level = world.cue(ant).level(cell) if sees else 0
             codes.append(_share(level, strongest))
     return _number([ant.carries, *codes], 6)
 
@@ -122,12 +135,11 @@ def crowd(queue: bool, world: WorldState, ant: Ant) -> int:
 
     If `queue`, ants with the same load on a better cell have a code, too.
     """
-    codes = codes_in_view(world, ant)
-    for side, cell in enumerate(cells_in_view(ant)):
-        there = world.ants.get(cell)
+    codes = codes_seen(world, ant)
+    for side, there in enumerate(ants_in_view(world, ant)):
         if there is None:
             continue
-        better = is_better(world, ant, cell)
+        better = is_better(world, ant, there.cell)
         if there.carries != ant.carries:
             codes[side] = BETTER if better else OTHER
         elif queue and better:
@@ -152,12 +164,13 @@ def _number(digits: list[int], base: int) -> int:
 
 
 OBSERVATIONS: dict[str, Callable[[WorldState, Ant], int]] = {
-    "paper": paper,
-    # From back left to back right, in `six_cells` then back.
-    "five_cells": partial(more_cells, (-2, -1, 0, 1, 2)),
-    "six_cells": partial(more_cells, (-2, -1, 0, 1, 2, 3)),
+    "paper": partial(more_cells, AHEAD),
+    "five_cells": partial(more_cells, FIVE),
+    "six_cells": partial(more_cells, SIX),
     "trail_levels": trail_levels,
     "ants_seen": ants_seen,
     "ants": partial(crowd, False),
     "queues": partial(crowd, True),
 }
+# The cells in view, in the order in which ants may misread them.
+TURNS = {**dict.fromkeys(OBSERVATIONS, AHEAD), "five_cells": FIVE, "six_cells": SIX}

@@ -122,7 +122,10 @@ class WorldState:
     def cue(self, ant: Ant) -> Trail:
         """Return the pheromone that an ant follows; with a compass, that of ants without food."""
         uses_homing = ant.carries and self.homing != "compass"
-        name = self.homing if uses_homing else self.outbound
+        return self.pheromone_named(self.homing if uses_homing else self.outbound)
+
+    def pheromone_named(self, name: str) -> Trail:
+        """Return the trail, or a further field."""
         return self.trail if name == "trail" else self.fields[name]
 
     def content(self, cell: Cell) -> int:

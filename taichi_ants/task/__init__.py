@@ -1,5 +1,6 @@
 """The rules: observations, actions, pheromone and rewards of ants."""
 
+from taichi_ants.task.choice import Choice, Noise
 from taichi_ants.task.field import Field
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
@@ -7,8 +8,10 @@ from taichi_ants.task.rewards import Rewards
 from taichi_ants.task.task import Life, Task, Traffic, foraging, paper, queueing
 
 __all__ = [
+    "Choice",
     "Field",
     "Life",
+    "Noise",
     "Observation",
     "Pheromone",
     "Rewards",

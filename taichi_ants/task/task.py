@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
+from taichi_ants.task.choice import Choice, Noise
 from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.observations import Observation
@@ -95,10 +96,11 @@ class Life(Settings, path="task.life"):
 class Task(Settings, path="task"):
     """The rules of perception, action and reward; by default, those of the paper.
 
-    `traffic` can be a name of `Traffic.named`. If `delivery` "terminates", the target of the update
-    is the reward alone; if it "truncates", the update bootstraps from the next observation. Both
-    end an episode of one ant. Kernels are compiled for an observation and a kind of pheromone; they
-    read all other settings as numbers.
+    `traffic` and `choice` can be names of `Traffic.named` and `Choice.named`. If `delivery`
+    "terminates", the target of the update is the reward alone; if it "truncates", the update
+    bootstraps from the next observation. Both end an episode of one ant. Kernels are compiled for
+    an observation, a kind of pheromone, and rules of choice and noise; they read all other settings
+    as numbers.
     """
 
     observation: Annotated[str, Is("observation of an ant", choices=observations.names)] = "paper"
@@ -132,14 +134,31 @@ class Task(Settings, path="task"):
         bool, Is("evaporate trails while ants follow a fixed policy")
     ] = True
     life: Annotated[Life, Is("changes of ants and food in colonies")] = field(default_factory=Life)
+    choice: Annotated[Choice, Is("rule by which ants choose actions")] = field(
+        default_factory=Choice
+    )
+    noise: Annotated[Noise, Is("failures of actions and observations")] = field(
+        default_factory=Noise
+    )
+
+    def __post_init__(self) -> None:
+        self.check()
+        self._check_choice()
+        self._check_fields()
 
     @classmethod
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "foraging" and "queueing"."""
         return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
 
-    def __post_init__(self) -> None:
-        self.check()
+    def _check_choice(self) -> None:
+        if not self.choice.needs_table and self.observation != "paper":
+            raise AntsError(
+                f"`task.observation` is {self.observation!r}; it must be 'paper' if "
+                f"`task.choice.rule` is {self.choice.rule!r}, which chooses without states."
+            )
+
+    def _check_fields(self) -> None:
         for name in (TRAIL, COMPASS):
             if name in self.fields:
                 raise AntsError(
@@ -181,7 +200,7 @@ class Task(Settings, path="task"):
         return self.sees.n_states
 
     @property
-    def numbers(self) -> dict[str, int]:
+    def numbers(self) -> dict[str, Any]:
         """The numbers of all rules but the pheromone's, as kernels read them; -1 is off."""
         life, off = self.life, -1
         return {
@@ -191,6 +210,7 @@ class Task(Settings, path="task"):
             "lifespan": life.lifespan or off,
             "regrowth": off if life.regrowth is None else life.regrowth,
             "wander": life.wander or off,
+            **self.noise.numbers,
         }
 
     def pheromone_while(self, learning: bool) -> Pheromone:

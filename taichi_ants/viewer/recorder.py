@@ -192,7 +192,8 @@ class Recorder:
         order = np.argsort(after, kind="stable")
         places = order[np.searchsorted(after, numbers, sorter=order)]
         actions = colony.actions[self.world, places]
-        acts = {"acts": actions + 16 * colony.events[self.world, places]}
+        executed = colony.executed[self.world, places]
+        acts = {"acts": executed + 16 * colony.events[self.world, places]}
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})

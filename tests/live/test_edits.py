@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_choices import NO_NOISE, NOISE
 from random_colonies import random_colony
 from random_edits import apply_to_both, random_edit
 from same_colonies import assert_equal
@@ -64,6 +65,8 @@ def test_edits_keep_colony_and_reference_equal(kernel):
             traffic=traffic,
             view=view,
             changes=True,
+            choice="softmax" if learner == "q_learning" else "greedy",
+            noise=NOISE if learner == "q_learning" else NO_NOISE,
             **dict(zip(("fields", "cues"), fields, strict=False)),
         )
         population = {**drawn.population, "ends_at_delivery": False}

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from random_choices import NO_NOISE, random_choice, random_noise
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
@@ -25,7 +26,7 @@ class RandomColony:
     world: World
     task: Task
     population: dict[str, Any]
-    training: TrainingConfig
+    training: TrainingConfig | None
     seed: int
     sharing: str
     q_values: np.ndarray | None
@@ -45,6 +46,8 @@ def random_colony(
     changes: bool = False,
     fields: str = "",
     cues: tuple[str, str] = ("trail", "compass"),
+    choice: str = "greedy",
+    noise: str = NO_NOISE,
 ) -> RandomColony:
     """Return the random colony of a seed.
 
@@ -53,6 +56,9 @@ def random_colony(
 
     Each letter of `fields` names a further pheromone. Those of capitals are dense, the others are
     not; all else about them is random, except the views of `cues`, outbound and homing.
+
+    `choice` is the rule, with random numbers, and `noise` names its kinds. Ants that choose by
+    "deneubourg" have no training, so their `sharing` must be "frozen".
     """
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
@@ -61,6 +67,9 @@ def random_colony(
     population, task = _rules(rng, min(room, most_ants), dense, changes)
     training, delivery = _training(rng, learner)
     given = sharing == "frozen" or rng.random() < 0.6
+    chooses = random_choice(seed, choice)
+    if not chooses.needs_table:
+        training, given = None, False
     return RandomColony(
         world=world,
         task=replace(
@@ -74,6 +83,8 @@ def random_colony(
             homing_cue=cues[1],
             traffic=traffic,
             turns_at_queen=bool(rng.random() < 0.5),
+            choice=chooses,
+            noise=random_noise(seed, noise),
         ),
         population=population,
         training=training,

@@ -28,7 +28,9 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
             assert mine["age"] == ant.age
         assert (mine["percept"], states[slot]) == (ant.percept, ant.state)
         assert int(mine["streams"]) == ant.stream.state
+        assert mine["action"] == ant.action
         if ant.action >= 0:
+            assert colony.executed[world, slot] == ant.executed
             assert mine["event"] == ant.event
             assert arrays["rewards"][ant.event] == ant.reward
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
@@ -38,7 +40,9 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     assert np.array_equal(ours.trail[places], levels.astype(ours.trail.dtype))
     assert list(ours.fields) == ["trail", *plain.world.fields]
     for name, field in ours.fields.items():
-        levels = np.array([plain.world.fields[name].level(cell) for cell in plain.world.ground])
+        levels = np.array(
+            [plain.world.pheromone_named(name).level(cell) for cell in plain.world.ground]
+        )
         assert np.array_equal(field[places], levels.astype(field.dtype)), name
     assert np.array_equal(colony.q_values[world], plain.q_values)
     assert int(arrays["queen_streams"][world]) == plain.queen_stream.state

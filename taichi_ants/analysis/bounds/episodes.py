@@ -61,6 +61,10 @@ class EpisodeBounds:
                 "trails evaporate or spread in training, but exact bounds require constant trails; "
                 "set `task.evaporation_in_training` to False and `task.pheromone.diffusion` to 0."
             )
+        if task.noise.slip or task.noise.misread:
+            raise AntsError(
+                f"noise of the task is {task.noise}; exact bounds require a task without noise."
+            )
         around = look_around(world)
         cells, headings = world.start(seed=0)
         cell = int(np.searchsorted(around.cells, cells[0]))

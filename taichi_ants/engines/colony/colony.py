@@ -31,8 +31,9 @@ class Colony(ColonyState):
         world: One world for all seeds, or one per seed, all with the same ranges.
         task: The rules; None for those of the paper. Colonies that learn use its evaporation in
             training, others its evaporation in evaluation.
-        training: The learner and its settings. None, with sharing "frozen": you give the actions
-            with `act`, and there are no action values.
+        training: The learner and its settings. None, with sharing "frozen": there are no action
+            values; you give the actions with `act`, or ants choose by a task whose rule of choice
+            is "deneubourg".
         seeds: One seed for each of the W worlds.
         ants: Number of ants at the start of an episode, 1 to 2**24. The ants that the world lists
             are the first.
@@ -232,7 +233,7 @@ class Colony(ColonyState):
         lines = [
             f"world: {self.worlds[0]}{more}",
             f"task: {self.task}",
-            f"training: {None if self.is_given_actions else self.training}",
+            f"training: {self.training if self.has_training else None}",
             f"seeds: {shown(self.seeds)}",
             f"ants: {self.ants}, capacity: {self.capacity}, start: {self.start!r}",
             f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}",

@@ -176,6 +176,7 @@ class Interventions:
             "heading": headings,
             "number": numbers,
             "action": -1,
+            "executed": -1,
             "next_action": -1,
             "stage": Stage.NEWBORN,
             "streams": stream_state(colony.seeds[0], STREAM_BORN, born),

@@ -62,6 +62,9 @@ class Features(NamedTuple):
     traffic: Traffic
     ants_change: bool
     food_changes: bool
+    choice: str = "greedy"
+    slips: bool = False
+    misreads: bool = False
 
 
 class Variant:
@@ -82,6 +85,7 @@ class Variant:
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
+        self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
@@ -95,11 +99,13 @@ class Variant:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
         self.n_pairs = observation.n_states * ROW  # state-action pairs, and unused numbers
-        self.sees_percept = observation.name == "paper"  # the percept is the state index
+        self.is_papers = observation.name == "paper"
+        # The percept is the state index, unless ants misread cells.
+        self.sees_percept = self.is_papers and not self.misreads
         # Whether the cell of an ant must show that the ant carries food.
         under_carriers = any(features.views[cue] == "strongest_under_carriers" for cue in cues)
-        self.sees_ants = not self.sees_percept or under_carriers
-        if not self.sees_percept:
+        self.sees_ants = not self.is_papers or under_carriers
+        if not self.is_papers:
             self.encode = views.encode_function(observation)
             sees_dense = any(features.dense[cue] for cue in cues)
             self.level_type = ti.f32 if sees_dense else ti.i32

@@ -38,7 +38,12 @@ def note_seen(c: ti.template(), v: ti.template(), ant, percept, state):
 def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Let an ant observe and its learner start an episode, unless its world is within one."""
     if tick == 0:
-        see_anew(c, v, w, ant, 0)
+        if ti.static(v.misreads):
+            # An ant that has observed already must not draw again.
+            if c.streams[ant] == c.first_streams[w * c.n_slots + c.number[ant]]:
+                see_anew(c, v, w, ant, 0)
+        else:
+            see_anew(c, v, w, ant, 0)
         begin_to_learn(c, v, ant)
 
 

@@ -77,7 +77,7 @@ def give_birth(c: ti.template(), v: ti.template(), w, tick):
             slot += 1
         c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
         c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
-        place_newborn(c, w, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
+        place_newborn(c, v, w, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
         if ti.static(v.alone):
             forget(c, v, w * c.n_slots + slot)
         c.worlds[WorldRow.STORE, w] -= 1
@@ -85,7 +85,7 @@ def give_birth(c: ti.template(), v: ti.template(), w, tick):
 
 
 @ti.func
-def place_newborn(c: ti.template(), w, ant, cell, heading):
+def place_newborn(c: ti.template(), v: ti.template(), w, ant, cell, heading):
     """Put a newborn ant into a slot and onto a cell."""
     number = c.worlds[WorldRow.NEXT_NUMBER, w]
     c.cell[ant] = cell
@@ -93,6 +93,8 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
     put(c.carries, ant, 0)
     put(c.stage, ant, Stage.NEWBORN)
     put(c.action, ant, -1)
+    if ti.static(v.slips):
+        put(c.executed, ant, -1)
     c.age[ant] = 0
     c.carried[ant] = 0
     c.number[ant] = number

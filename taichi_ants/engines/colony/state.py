@@ -61,6 +61,8 @@ _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 # Unused settings for colonies with given actions, in which ants neither choose nor learn.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
+_UNKNOWN = ("number", "action", "executed", "next_action")  # columns that are -1 at first
+
 _KIND = Kind("colony", 12, "Colony.save")
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
@@ -133,6 +135,8 @@ class ColonyState:
 
     Attributes, in addition to the arguments of `Colony`:
         learns: Whether the ants learn.
+        has_training: Whether a `training` is given. Without it, ants take given actions, or choose
+            by a rule that needs no action values.
         is_given_actions: Whether ants take the actions passed to `Colony.act`.
         one_a_slot: Whether each slot has its own table of action values, not each world.
         ants_change: Whether ants are born or die.
@@ -168,22 +172,27 @@ class ColonyState:
         self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
         self.sharing, self.learns = sharing, sharing != "frozen"
-        self.is_given_actions = training is None and not self.learns and q_values is None
-        if self.is_given_actions:
+        self.has_training = training is not None or self.learns or q_values is not None
+        needs_table = self.task.choice.needs_table
+        self.is_given_actions = needs_table and not self.has_training
+        if not self.has_training:
             training = _NO_TRAINING
+        elif not needs_table:
+            checks.refuse_table(self.task, sharing)
         if not isinstance(training, TrainingConfig):
             raise AntsError(
                 f"training is {shown(training)}; it must be one TrainingConfig, or None with "
                 'sharing="frozen" and without q_values.'
             )
         (self.training,) = checks.checked_configs(training)
-        if not self.learns and q_values is None and not self.is_given_actions:
+        if not self.learns and q_values is None and self.has_training:
             raise AntsError(
                 "sharing is 'frozen', but q_values is None; give the action values that the ants "
                 "follow, because they do not learn."
             )
         if self.learner:
             checks.check_sharing(self.learner, sharing)
+            checks.check_choice(self.learner, self.task)
         table = None if q_values is None else checks.checked_q_values(q_values, self.task)
         self.seeds = checks.checked_seeds(seeds)
         running = runtime.start(threads, arch)
@@ -255,7 +264,7 @@ class ColonyState:
     # Arrays (W, capacity) by slot: the number of its last ant, int32, -1 for none; the flat index
     # of its cell, int32; its heading 0 to 5, percept (see `task.states`), last action (-1 before
     # the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1; and the
-    # state of its random stream, uint64.
+    # state of its random stream, uint64. If actions slip, `actions` are those that ants chose.
     numbers, cells, headings = column("number"), column("cell"), column("heading")
     percepts, actions, events = column("percept"), column("action"), column("event")
     next_actions, streams = column("next_action"), column("streams")
@@ -275,6 +284,13 @@ class ColonyState:
     def states(self) -> np.ndarray:
         """The state index of the last ant in each slot, int32 (W, capacity)."""
         return (self._states if "state" in self.arrays else self.percepts).astype(np.int32)
+
+    @property
+    def executed(self) -> np.ndarray:
+        """The last actions as executed, int8 (W, capacity); unless actions slip, `actions`."""
+        if "executed" not in self.arrays:
+            return self.actions
+        return self.arrays["executed"].reshape(len(self.seeds), self.capacity)
 
     @property
     def draws_ahead(self) -> bool:
@@ -500,7 +516,10 @@ class ColonyState:
         """Return the arrays that change in an episode, at its start."""
         n_worlds, dense = len(self.worlds), self.pheromone.dense
         slots, cells = n_worlds * self.capacity, n_worlds * self.grid.size
-        unused = {"state"} if self.task.sees.name == "paper" else set()  # the percept is the state
+        noise = self.task.noise
+        unused = set() if noise.slip else {"executed"}
+        if self.task.sees.name == "paper" and not noise.misread:
+            unused.add("state")  # the percept is the state
         if not self.ants_change:
             unused.add("age")
         if not self.draws_ahead:
@@ -537,7 +556,7 @@ class ColonyState:
             if name in arrays
         }
         for name, array in column.items():
-            array[which] = -1 if name in ("number", "action", "next_action") else 0
+            array[which] = -1 if name in _UNKNOWN else 0
         n = self.at_start["start_cells"].shape[1]
         column["cell"][which, :n] = self.at_start["start_cells"][which]
         column["heading"][which, :n] = self.at_start["start_headings"][which]
@@ -607,6 +626,7 @@ class ColonyState:
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
             "rewards": self.task.rewards.by_event(),
+            "choice": self.task.choice.numbers(),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
             # By n: the weight of the mean of n errors in an update; see `set_learning_rate`.
             "weights": np.zeros(2, np.float32),
@@ -650,7 +670,7 @@ class ColonyState:
         numbers = {world: number for number, world in enumerate(dict.fromkeys(self.worlds))}
         facts = {
             "task": self.task.as_dict(),
-            "training": None if self.is_given_actions else self.training.as_dict(),
+            "training": self.training.as_dict() if self.has_training else None,
             "worlds": [world.as_dict() for world in numbers],
             "world_of": [numbers[world] for world in self.worlds],
             "one_a_slot": self.one_a_slot,

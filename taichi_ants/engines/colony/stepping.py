@@ -138,6 +138,9 @@ class Stepper:
             traffic=task.traffic,
             ants_change=state.ants_change,
             food_changes=state.food_changes,
+            choice=task.choice.rule,
+            slips=task.noise.slip > 0,
+            misreads=task.noise.misread > 0,
         )
         variant = kernels.variant(features)
         if name == "ticks":

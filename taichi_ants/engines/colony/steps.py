@@ -1,5 +1,10 @@
 """Observations and actions of the ants of a colony in a tick, phase by phase; see `rules`.
 
+In a tick, an ant draws from its random stream in this order, and only what applies: its action,
+unless that was drawn in the last tick or is given; whether the action slips; the choice among
+several food items. Then, when it observes: whether it misreads each cell in view, in the order of
+the observation's cells. Then its next action, if its learner draws ahead; and draws of the learner.
+
 Each ant writes a mark of what it wants into `wants` at its own cell, see `rules.conflicts`. The
 marks do not change while ants act; each ant removes its mark when it observes at the end of the
 tick. If ants can enter cells with ants, see `Traffic`, an additional phase marks the winners before
@@ -17,6 +22,7 @@ from taichi_ants.engines.colony.layout import (
     TALLY_WIDTH,
     FoodSourceRow,
     Tally,
+    WorldRow,
 )
 from taichi_ants.engines.colony.trail import (
     deposit,
@@ -29,9 +35,18 @@ from taichi_ants.engines.colony.trail import (
 from taichi_ants.engines.views import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
-from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, PICK_UP, RIGHT, ROW
+from taichi_ants.task.constants import (
+    EMPTY,
+    FORWARD,
+    LEFT,
+    OBSTACLE,
+    PICK_UP,
+    RIGHT,
+    ROW,
+    SEES_LURE,
+)
 from taichi_ants.task.events import Event
-from taichi_ants.task.rules import conflicts, vision
+from taichi_ants.task.rules import conflicts, noise, vision
 from taichi_ants.task.rules.actions import (
     is_open,
     move_event,
@@ -41,7 +56,14 @@ from taichi_ants.task.rules.actions import (
     turned_by,
 )
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
-from taichi_ants.task.rules.policy import bit_number, choose_in_crowd, lowest_bit_number
+from taichi_ants.task.rules.policy import (
+    attraction,
+    bit_number,
+    choose_cell,
+    choose_in_crowd,
+    choose_softly,
+    lowest_bit_number,
+)
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
 
@@ -68,14 +90,20 @@ def state_index_of(c: ti.template(), v: ti.template(), ant):
 
 @ti.func
 def observe(c: ti.template(), v: ti.template(), w, ant, tick):
-    """Return the percept and the state index of an ant."""
+    """Return the percept and the state index of an ant, which may misread cells."""
     percept, state = 0, 0
-    if ti.static(v.sees_percept):
+    if ti.static(v.is_papers):
         percept = see(c, v, w, ant, tick)
         state = percept
+        if ti.static(v.misreads):
+            state, c.streams[ant] = noise.misread_percept(percept, c.streams[ant], c.misread_below)
     else:
         view = view_around(c, v, w, ant, tick)
         percept = view.percept
+        if ti.static(v.misreads):
+            c.streams[ant] = noise.misread_view(
+                view, v.observation, c.streams[ant], c.misread_below
+            )
         state = v.encode(view)
     return percept, state
 
@@ -228,9 +256,58 @@ def table_of(c: ti.template(), v: ti.template(), owner):
 @ti.func
 def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
-    table = table_of(c, v, ant if ti.static(v.own_tables) else w)
-    values, bits = values_of(c.q, table, state), bits_of(random_state)
-    return choose_in_crowd(c.compass, values, bits, c.explore_below)
+    action, bits = 0, bits_of(random_state)
+    if ti.static(v.choice == "deneubourg"):
+        action = draw_cell(c, v, w, ant, state, bits)
+    else:
+        table = table_of(c, v, ant if ti.static(v.own_tables) else w)
+        values = values_of(c.q, table, state)
+        if ti.static(v.choice == "softmax"):
+            action = choose_softly(values, bits, c.explore_below, c.choice[0])
+        else:
+            action = choose_in_crowd(c.compass, values, bits, c.explore_below)
+    return action
+
+
+@ti.func
+def draw_cell(c: ti.template(), v: ti.template(), w, ant, state, bits):
+    """Return the ant's action by the rule "deneubourg", with 64 random bits.
+
+    `state` is the paper's state as the ant sees it. A cell that it misreads looks as if it had no
+    trail, and is nearer to the queen if it looks S. A cell with an ant is open if the traffic rules
+    ever let an ant with this load enter it. With a field as homing cue, no cell is nearer.
+    """
+    percept, heading, carries = trait(c.percept, ant), trait(c.heading, ant), trait(c.carries, ant)
+    here = w * c.size + c.cell[ant]
+    tick = c.worlds[WorldRow.TICKS, w]
+    nearer = vision.nearer_from(c.closer[here], heading)
+    codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
+    weights = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
+    for i in ti.static((LEFT, FORWARD, RIGHT)):
+        place = here + step_towards(c.compass, heading, i)
+        code = vision.code_in_view(state, i)
+        is_true = code == vision.code_in_view(percept, i)
+        codes[i] = code
+        opens[i] = ti.cast(is_open(code), ti.i32)
+        nears[i] = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(v.has_compass))
+        if ti.static(v.traffic.shared):
+            if is_true & (c.ground[place] >= ANT_GROUND):
+                opens[i] = 1 if ti.static(v.traffic.follow) else carries
+                nears[i] = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(v.has_compass))
+        level = cue_level(c, v, carries, place, tick)
+        weights[i] = attraction(ti.select(is_true, level, 0), c.choice[1], c.choice[2])
+    return choose_cell(carries, codes, opens, nears, weights, bits)
+
+
+@ti.func
+def executed_by(c: ti.template(), v: ti.template(), ant):
+    """Return the action that an ant executes in this tick."""
+    action = 0
+    if ti.static(v.slips):
+        action = trait(c.executed, ant)
+    else:
+        action = trait(c.action, ant)
+    return action
 
 
 @ti.func
@@ -249,6 +326,10 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if action < 0:
         random_state = advance(random_state)
         action = draw_action(c, v, w, ant, state_index_of(c, v, ant), random_state)
+    put(c.action, ant, action)
+    if ti.static(v.slips):
+        action, random_state = noise.slipped(action, random_state, c.slip_below)
+        put(c.executed, ant, action)
     heading = turned_by(c.compass, trait(c.heading, ant), action)
     ahead = cell + step_towards(c.compass, heading, FORWARD)
     enters = is_open(vision.code_in_view(percept, ti.min(action, RIGHT)))
@@ -267,7 +348,6 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         mark = conflicts.TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
     c.streams[ant] = random_state
     put(c.heading, ant, heading)
-    put(c.action, ant, action)
     c.want[ant] = wanted
     if ti.static(v.traffic.shared):
         takes = ti.select(mark >= conflicts.TAKE, conflicts.TAKES_FOOD, 0)
@@ -298,7 +378,7 @@ def step_ahead(c: ti.template(), ant):
 @ti.func
 def event_of(c: ti.template(), v: ti.template(), base, ant, tick):
     """Return the event of a successful move; a cell with an ant is a lure if it is better."""
-    action, percept = trait(c.action, ant), trait(c.percept, ant)
+    action, percept = executed_by(c, v, ant), trait(c.percept, ant)
     event = move_event(vision.code_in_view(percept, ti.min(action, RIGHT)))
     here = base + c.cell[ant]
     ahead = here + step_ahead(c, ant)
@@ -324,7 +404,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Do the action of an ant: move or pick up if it has won, or deliver; and deposit."""
     base = w * c.size
     trail = ti.static(v.field(c, 0))
-    action, percept = trait(c.action, ant), trait(c.percept, ant)
+    action, percept = executed_by(c, v, ant), trait(c.percept, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
     moves = action <= RIGHT

@@ -57,6 +57,7 @@ def train(
     seeds = checks.checked_seeds(seeds)
     checks.checked_world(world, learns=True)
     task = checks.checked_runs_task(task)
+    checks.check_choices(configs, task)
     none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
     start = TrainingResult(
         world=world,
