@@ -1,9 +1,9 @@
 """Compare the speed of a colony with a program in C that does the same.
 
 Ants are spread over open worlds, with eight cells per ant, and learn into one table by Q-learning,
-under the paper's rules and under those of foraging. The program colony.c does the same with as many
-threads, and its results are equal to the bit. The command measures both in turn, several times. The
-table contains medians, and ratios above 1 where ours is faster. On a busy machine, use
+under the rules of `paper()` and of `foraging()`. The program colony.c does the same with as many
+threads, and its results are bit-for-bit equal. The command measures both in turn, several times.
+The table contains medians, and ratios above 1 where Taichi Ants is faster. On a busy machine, use
 `--threads 1`, which is measured by processor time; several threads in C wait long for each other.
 """
 
@@ -133,7 +133,7 @@ def check_same(library: ctypes.CDLL, colony: Colony, ticks: int, threads: int) -
 def measured(
     library: ctypes.CDLL, sizes: Sequence[int], rounds: int, threads: int, seconds: float
 ) -> dict[tuple[str, int], np.ndarray]:
-    """Return million ant steps/s of ours and of C, (rounds, 2), by rules and number of ants."""
+    """Return million ant steps/s of the package and of C, (rounds, 2), by rules and ants."""
     found: dict[tuple[str, int], np.ndarray] = {}
     with progress_bar("Measuring") as progress:
         for rules, task in TASKS.items():
@@ -212,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add = parser.add_argument
     sizes = [10_000, 100_000, 1_000_000]
     several = {"type": whole_number(1), "nargs": "+", "default": sizes, "metavar": "N"}
-    add("--ants", **several, help="put N ants into one world")
+    add("--ants", **several, help="measure worlds with N ants")
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")
     about = "fail if a ratio to C is below RATIO"

@@ -1,8 +1,8 @@
-"""Compare the speed of environments with that of the engine that runs whole episodes.
+"""Compare the speed of vector environments with that of the engine of `taichi_ants.train`.
 
-All ants act at random in the paper's world: in environments with actions that were drawn before, in
-the engine of independent runs with a table and epsilon 1. The command measures them in turn,
-several times. The table contains medians, and the ratio of each median to that of the engine.
+All ants act at random in the paper's world. Environments get actions that were drawn before; the
+engine draws them itself, with epsilon 1. The command measures both in turn, several times. The
+table contains medians, and the ratio of each median to that of the engine.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def main(arguments: list[str] | None = None) -> None:
         nargs="+",
         default=[256, 4096, 65536],
         metavar="N",
-        help="step N environments at once",
+        help="measure N environments that step together",
     )
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")
     add("--threads", type=whole_number(1, 1024), metavar="N", help="use N threads (default: all)")

@@ -1,9 +1,10 @@
 """Measure how speed and memory depend on the number of runs, ants, cells, states and threads.
 
-Runs learn by Q-learning in the paper's world, for 500 episodes. Ants forage in open worlds and
-learn into one table. The command measures all sizes in turn, with 1 thread and with all threads,
-several times, by the wall clock; the tables contain medians. For memory, it doubles the size, and
-reports the growth of stored arrays and of the peak memory of the process, per run, ant or cell.
+Runs learn by Q-learning in the paper's world, for 500 episodes. Ants of colonies forage in open
+worlds and learn into one table. The command measures all sizes in turn, with 1 thread and with all
+threads, several times, by the wall clock; the tables contain medians. For memory, it doubles the
+size, and reports by how much the arrays and the peak memory of the process grow per run, ant or
+cell.
 """
 
 from __future__ import annotations
@@ -229,11 +230,11 @@ def tables(found: Paces, memories: Sequence[Memory], rounds: int) -> list[Table]
         rows.append([one.of, one.step, shown, str(threads), *numbers])
     columns = ["size", "one step", "number", "threads", "M steps/s", "lowest, highest", "CPU ns"]
     about = f"Medians of {rounds} rounds. {machine(('taichi', 'numpy'))}"
-    paces = Table("How throughput grows", columns, rows, [about], text_columns=2)
+    paces = Table("Throughput by size", columns, rows, [about], text_columns=2)
     bytes_each = [[one.of, *map(_whole, one[1:])] for one in memories]
     columns = ["bytes per", "stored arrays", "peak of the process"]
     note = "Runs are counted without their outcomes, which take 12 bytes per episode."
-    return [paces, Table("How memory grows", columns, bytes_each, [note])]
+    return [paces, Table("Memory per run, ant and cell", columns, bytes_each, [note])]
 
 
 def _whole(value: float) -> str:
@@ -248,7 +249,7 @@ def draw(found: Paces) -> None:
     """
     directions = list(dict.fromkeys(one for one, *_ in found))
     with style.styled():
-        drawn = style.new_figure(2.9)
+        drawn = style.new_figure(3.1)
         panels = drawn.subplots(1, len(directions), squeeze=False)[0]
         for axes, one in zip(panels, directions, strict=True):
             lines: dict[str, list[tuple[float, ...]]] = {}
@@ -261,10 +262,12 @@ def draw(found: Paces) -> None:
                     lines.setdefault(label, []).append(point)
             draw_lines(axes, lines)
             axes.set_xscale("log")
-            axes.set(title=one.of, xlabel=f"{one.of}; a step {one.step}", ylim=(0, None))
+            axes.set(title=one.of.capitalize(), xlabel=f"number of {one.of}\n(steps {one.step})")
+            axes.set_ylim(0)
         panels[0].set_ylabel("million steps per second")
         caption = "Medians, with the lowest and highest. Runs learn by Q-learning, ants by SARSA."
-        style.frame(drawn, "How throughput grows", caption, style.legend_entries(panels))
+        title = "Throughput by the number of runs, ants, cells and states"
+        style.frame(drawn, title, caption, style.legend_entries(panels))
     style.save_all({"growth": drawn}, FIGURES)
 
 

@@ -10,6 +10,7 @@ unless all mutations were noticed. It first runs the tests without mutations, wh
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
 import subprocess
@@ -282,4 +283,8 @@ def fails(place: Path, tests: str) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
+    words = "try mutations that contain one of these words (default: all)"
+    parser.add_argument("words", nargs="*", metavar="WORD", help=words)
+    sys.exit(main(parser.parse_args().words))

@@ -1,9 +1,9 @@
 """Compare the speed of Taichi Ants with NumPy, numba, JAX, Mesa and others on this machine.
 
 Each system runs as its users would run it. The command measures all systems in turn, several times,
-by the wall clock; the tables contain medians. Compare within a table, and read the column of steps:
-only the first rows of the first table do exactly the same. To install all systems, run
-pip install -e ".[bench]".
+by the wall clock; the tables contain medians. Compare only rows of the same table, and read the
+column "one step": only the first rows of the first table do exactly the same work. To install all
+systems, run `pip install -e ".[bench]"`.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ GROUPS: Groups = {
             ("ours", "colony", "?ants"),
         ),
         System(
-            "Taichi Ants, many",
+            "Taichi Ants, large colony",
             f"{_COLONY} {{many_ants}} ants, the same",
             ("ours", "colony", "?many_ants"),
         ),

@@ -1,4 +1,4 @@
-"""Compare the ways in which threads can share the ticks of a colony, for colonies of many sizes.
+"""Compare the ways to distribute the work of a tick over threads, for colonies of many sizes.
 
 Each round measures all ways in turn. `benchmarks/growth.py` measures the way that a colony chooses.
 """

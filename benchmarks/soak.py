@@ -1,10 +1,10 @@
-"""Check the consistency of a large colony: 10 000 ants for 20 000 ticks, under two sets of rules.
+"""Check the consistency of a colony of 10 000 ants for 20 000 ticks, under two sets of rules.
 
 Under the rules "paper", ants and food sources do not change. Under the rules "lively", ants are
 born and die, food grows back and wanders, trails evaporate and spread, and ants queue. The command
 checks regularly that no food has appeared or vanished, that ants have different cells, that numbers
-are finite, and that clocks agree. At the end it checks the memory of the process. It stops at the
-first fault. `--ticks 1000000` takes about an hour on two cores.
+are finite, and that clocks agree. At the end it checks that the memory of the process has not
+grown. It stops at the first fault. `--ticks 1000000` takes about half an hour on two cores.
 """
 
 from __future__ import annotations

@@ -1,12 +1,12 @@
 """Compare the speed of training the paper's grid with two programs in C that do the same.
 
-The command trains the 16 configurations of each learner with several seeds, where delivery
-truncates. The program ant.c does one run after another, with branches, as one would write it by
-hand. The program ant_vector.c does sixteen runs at a time, in the lanes of AVX-512 vectors. Both
-are compiled with -O3 for this processor, and their results are equal to ours to the bit. The
+The command trains the paper's 16 configurations of each learner with several seeds; a delivery
+truncates the episode. The program ant.c is straightforward C, which does one run after another. The
+program ant_vector.c does sixteen runs at a time, in the lanes of AVX-512 vectors. Both are compiled
+with -O3 for this processor, and their results are bit-for-bit equal to those of Taichi Ants. The
 command measures all three in turn, several times. The table contains medians, and ratios above 1
-where ours is faster. One thread is measured by processor time, which other programs hardly change;
-several threads are measured by the wall clock.
+where Taichi Ants is faster. One thread is measured by processor time, which other programs hardly
+change; several threads are measured by the wall clock.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ def grid(learner: str, planning_steps: int) -> list[TrainingConfig]:
 
 
 def check_same(trained: Trained, result: TrainingResult) -> None:
-    """Check that the results of C are the same as ours.
+    """Check that the results of C are the same as those of the package.
 
     Raises:
         AntsError: They differ, so the paces cannot be compared.
@@ -181,7 +181,7 @@ def check_same(trained: Trained, result: TrainingResult) -> None:
 def measured(
     yardsticks: dict[str, Yardstick], seeds: Sequence[int], rounds: int, threads: int
 ) -> tuple[dict[str, int], dict[str, np.ndarray]]:
-    """Return steps by learner, and seconds of ours and of n functions in C, (rounds, 1 + n)."""
+    """Return steps by learner, and seconds in the package and in n C functions, (rounds, 1 + n)."""
     steps, seconds = {}, {}
     world, task = worlds.paper(), Task(delivery="truncates")
     with progress_bar("Measuring") as progress:

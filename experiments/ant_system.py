@@ -2,7 +2,7 @@
 
 For each method and world, the script prints the number of colonies that find a shortest path from
 the queen to food, and the median of the iterations in which they find it. It also prints the mean
-length of the tours in the first and the last iteration. See docs/baselines.md.
+length of the ants' tours in the first and the last iteration. See docs/baselines.md.
 """
 
 from __future__ import annotations
@@ -17,7 +17,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     from taichi_ants import World, worlds
     from taichi_ants.baselines.ant_system import METHODS, Method, search
-    from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    from taichi_ants.studies.command_line import (
+        THREADS,
+        Parser,
+        progress_bar,
+        run_command,
+        whole_number,
+    )
 
 HEAD = f"{'world':20} {'method':11} shortest  found by  iteration  first and last mean length"
 
@@ -27,15 +33,16 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__)
     add = parser.add_argument
     places = ("paper", "double_bridge")
-    add("--worlds", nargs="+", default=places, metavar="WORLD", help="names or map files")
+    add("--worlds", nargs="+", default=places, metavar="WORLD", help="worlds or map files")
     number = whole_number(1)
-    add("--iterations", type=number, default=500, metavar="N", help="iterations of a colony")
-    add("--ants", type=number, default=32, metavar="N", help="ants of a colony")
-    add("--colonies", type=number, default=20, metavar="N", help="colonies in each world")
-    evaporation = "share that evaporates per iteration (default: 0.5; max_min: 0.02)"
+    iterations = "number of iterations per colony"
+    add("--iterations", type=number, default=500, metavar="N", help=iterations)
+    add("--ants", type=number, default=32, metavar="N", help="number of ants per colony")
+    add("--colonies", type=number, default=20, metavar="N", help="number of colonies per world")
+    evaporation = "share that evaporates per iteration (default: 0.5; for MAX-MIN, 0.02)"
     add("--evaporation", type=float, metavar="RHO", help=evaporation)
-    add("--seed", type=whole_number(), default=0, help="seed of all colonies")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--seed", type=whole_number(), default=0, metavar="N", help="seed of all colonies")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
     return parser.parse_args(arguments)
 
 

@@ -5,7 +5,7 @@ All ants follow `trail_follower`, a rule written by hand, and explore with the r
 seeds, the worst seed, the tick of the first delivery, and the share of blocked moves. Worlds, seeds
 and random numbers are those of the evaluation in `colony.py study`. With --study, it also prints
 the deliveries of that study's ants, and the difference, learned minus fixed, paired by seed. See
-docs/baselines.md.
+docs/fixed_rules.md.
 """
 
 from __future__ import annotations
@@ -34,7 +34,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.statistics import bootstrap_interval
     from taichi_ants.learners.policies import FOLLOWED, RULES, trail_follower
     from taichi_ants.studies.colony_study import LARGE_SIZE, place, task_in
-    from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    from taichi_ants.studies.command_line import (
+        THREADS,
+        Parser,
+        progress_bar,
+        run_command,
+        whole_number,
+    )
     from taichi_ants.studies.runner import EVALUATION_SEEDS
 
     if TYPE_CHECKING:
@@ -79,12 +85,14 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         "default": tuple(WORLD_KINDS),
     }
     add("--worlds", **worlds, help="kinds of world, as in colony.py study --world-kinds")
-    add("--ants", type=whole_number(1), default=64, metavar="N", help="ants of a colony")
-    add("--seeds", type=whole_number(2), default=20, metavar="N", help="number of seeds, from 0")
-    epsilons = "exploration rates"
+    add("--ants", type=whole_number(1), default=64, metavar="N", help="number of ants per colony")
+    seeds = "number of seeds, starting at 0"
+    add("--seeds", type=whole_number(2), default=20, metavar="N", help=seeds)
+    epsilons = "exploration rates to compare"
     add("--epsilon", type=float, nargs="+", default=[0.0, 0.01], metavar="X", help=epsilons)
-    add("--study", type=Path, metavar="FOLDER", help="compare with results of colony.py study")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    study = "results folder of colony.py study to compare with"
+    add("--study", type=Path, metavar="FOLDER", help=study)
+    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
     return parser.parse_args(arguments)
 
 

@@ -1,10 +1,9 @@
 """Draw all pictures of the README and the docs, in `renders/` and `docs/figures/`.
 
 `render.py` draws the pictures in `renders/`, with arguments from this script. The pictures in
-`docs/figures/` are from the results in `results/compare`, `results/colony` and `results/bridge`,
-and from a run of a million ants. If results are missing, the script runs the study first. The
-comparison takes less than a minute on two cores; see docs/colony.md and docs/bridge.md for the
-other two.
+`docs/figures/` show the results in `results/compare`, `results/colony` and `results/bridge`, and a
+run of a million ants. If results are missing, the script runs the study first. The comparison takes
+less than a minute on two cores; see docs/colony_study.md and docs/bridge.md for the other two.
 """
 
 from __future__ import annotations
@@ -82,8 +81,13 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--folder", type=Path, default=ROOT, help="write renders/ and docs/figures/ here")
-    skip = "make only renders/ and pictures of pages, in half a minute"
+    add(
+        "--folder",
+        type=Path,
+        default=ROOT,
+        help="write the folders renders/ and docs/figures/ here",
+    )
+    skip = "make only renders/ and the pictures of pages, which takes half a minute"
     add("--no-figures", action="store_true", help=skip)
     return parser.parse_args(arguments)
 

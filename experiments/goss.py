@@ -1,8 +1,8 @@
-"""Simulate the double bridge of Goss and others, and print the shares of the shorter branch.
+"""Simulate the double bridge of Goss and others, and print how often the short branch wins.
 
-For branches with a ratio r of their lengths, the script prints the distribution of colonies by the
-share of ants on the short branch, the published distribution, and the standard error. In the last
-rows, the short branch opens late. See docs/baselines.md.
+For each ratio r of the branch lengths, the script prints the share of colonies in each class of the
+share of ants on the short branch. It also prints the published shares and the standard error. In
+the last rows, the short branch opens late. See docs/baselines.md.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
         crossing_steps,
     )
     from taichi_ants.errors import AntsError, count
-    from taichi_ants.studies.command_line import Parser, run_command, whole_number
+    from taichi_ants.studies.command_line import THREADS, Parser, run_command, whole_number
 
 AS_PUBLISHED = 1000  # ants that choose
 MOST_CHOICES = 1 << 32  # of all colonies together; each takes a byte
@@ -32,18 +32,18 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__)
     add = parser.add_argument
     colonies = "number of colonies for each ratio"
-    add("--colonies", type=whole_number(1, 10_000_000), default=100_000, help=colonies)
+    add("--colonies", type=whole_number(1, 10_000_000), default=100_000, metavar="N", help=colonies)
     add(
         "--choices",
         type=whole_number(4, 10_000_000),
         default=AS_PUBLISHED,
         metavar="N",
-        help="even number of ants that choose in each colony, of which the second half counts "
-        "(default: %(default)s, as published); if the short branch opens late, N choose before "
-        "and N after that",
+        help="even number of ants per colony that choose a branch; the second half counts "
+        "(default: %(default)s, as published); if the short branch opens late, N ants choose "
+        "before that and N after",
     )
-    add("--seed", type=whole_number(), default=0, help="seed of all colonies")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--seed", type=whole_number(), default=0, metavar="N", help="seed of all colonies")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
     return parser.parse_args(arguments)
 
 
@@ -52,7 +52,7 @@ def print_table(settings: argparse.Namespace) -> None:
     n, colonies = settings.choices, settings.colonies
     if n % 2:
         raise AntsError(
-            f"--choices is {n}; it must be even, because as many ants leave the nest as the food."
+            f"--choices is {n}; it must be even, because half of the ants choose at each end."
         )
     if 2 * n * colonies > MOST_CHOICES:
         raise AntsError(

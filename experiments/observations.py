@@ -1,4 +1,4 @@
-"""Compare all observations with all learners, at equal numbers of ticks.
+"""Compare all pairs of an observation and a learner, after equal numbers of ticks.
 
 The sweep is experiments/sweeps/observations.toml. For your own sweep, copy and change that file,
 and run it with experiments/sweep.py. See docs/observations.md.

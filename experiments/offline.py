@@ -1,10 +1,10 @@
 """Learn offline from recorded data, and evaluate policies from data.
 
 The script prints three tables, with means and 95 % intervals over seeds. Table (a) has the share of
-rollouts that deliver with policies learned offline, by behaviour policy, number of transitions and
-learner, and with online Q-learning after as many transitions. Table (b) shows how well off-policy
-evaluation ranks ten policies. Table (c) has the deliveries of a colony with policies learned from
-data of ants that are born and die. See docs/offline.md.
+rollouts in which policies learned offline deliver, for each behaviour policy that recorded the
+data, number of transitions and learner. It includes online Q-learning after as many transitions.
+Table (b) shows how well off-policy evaluation ranks ten policies. Table (c) has the deliveries of
+colonies that follow policies learned from data of ants that are born and die. See docs/offline.md.
 """
 
 from __future__ import annotations
@@ -67,7 +67,13 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    add("--seeds", type=whole_number(2), default=10, metavar="N", help="number of seeds, from 0")
+    add(
+        "--seeds",
+        type=whole_number(2),
+        default=10,
+        metavar="N",
+        help="number of seeds, starting at 0",
+    )
     add("--markdown", action="store_true", help="print tables as Markdown")
     return parser.parse_args(arguments)
 

@@ -1,11 +1,11 @@
 """Run ants whose pheromones are utilities (Panait and Luke 2004) on the maps of the package.
 
-The script prints a row for each kind of world and number of ants that fit into a cell. It has the
-deliveries per 1000 ticks with their 95 % interval over seeds, and the tick of the first delivery.
-The path of a colony is a walk from the nest to food and back that always follows the highest
-utility. The row also has the number of colonies that ever had a shortest path, and the median of
-the ticks when they first had it. The last columns are the length of paths at the end, as a multiple
-of the shortest (the mean of the colonies with a path), and their number. See docs/baselines.md.
+The script prints a row for each kind of world and each --room. It has the deliveries per 1000 ticks
+with their 95 % interval over seeds, and the tick of the first delivery. The other columns describe
+the path of a colony, a walk from the nest to food and back that always follows the highest utility.
+They are the number of colonies that ever had a shortest path, and the median of the ticks when they
+first had it. The last two columns are the mean length of paths at the end, as a multiple of the
+shortest, and the number of colonies with a path. See docs/baselines.md.
 """
 
 from __future__ import annotations
@@ -21,7 +21,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants import World, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
     from taichi_ants.baselines.utility import Foraging, forage
-    from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
+    from taichi_ants.studies.command_line import (
+        THREADS,
+        Parser,
+        progress_bar,
+        run_command,
+        whole_number,
+    )
 
 SIZE = (30, 30, 30)
 WORLDS = {
@@ -38,22 +44,25 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    number, room = whole_number(1), "largest numbers of ants in a cell"
-    add("--ants", type=number, default=64, metavar="N", help="ants of a colony")
+    number, room = whole_number(1), "largest number of ants in a cell; several are run in turn"
+    add("--ants", type=number, default=64, metavar="N", help="number of ants per colony")
     add("--room", type=number, nargs="+", default=[1, 10], metavar="N", help=room)
-    add("--ticks", type=number, default=1000, metavar="N", help="ticks to run")
-    add("--seeds", type=whole_number(2), default=20, metavar="N", help="number of seeds, from 0")
-    add("--discount", type=float, default=0.9, metavar="X", help="discount of backed-up utilities")
-    add("--evaporation", type=float, default=0.001, metavar="X", help="share lost per tick")
+    add("--ticks", type=number, default=1000, metavar="N", help="number of ticks to run")
+    seeds = "number of seeds, starting at 0"
+    add("--seeds", type=whole_number(2), default=20, metavar="N", help=seeds)
+    discount = "discount factor of utilities per step"
+    add("--discount", type=float, default=0.9, metavar="X", help=discount)
+    evaporation = "share of a utility that evaporates per tick"
+    add("--evaporation", type=float, default=0.001, metavar="X", help=evaporation)
     add("--exploration", type=float, default=0.1, metavar="X", help="probability of a random step")
     momentum = "probability of going straight on if no utility is known"
     add("--momentum", type=float, default=0.8, metavar="X", help=momentum)
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
     return parser.parse_args(arguments)
 
 
 def print_table(settings: argparse.Namespace) -> None:
-    """Print a row for each kind of world and room of a cell, after building all worlds."""
+    """Print a row for each kind of world and each --room, after building all worlds."""
     places = {kind: [build(n) for n in range(settings.seeds)] for kind, build in WORLDS.items()}
     rows: list[str] = []
     with progress_bar("Ants that back up utilities") as progress:

@@ -118,7 +118,9 @@ def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
         if not -(2**63) <= seed < 2**64:
             raise AntsError(f"seeds contains {shown(seed)}; a seed must fit into 64 bits.")
         if seed % 2**64 in taken:
-            raise AntsError(f"seeds contains {seed} more than once; they must differ in 64 bits.")
+            raise AntsError(
+                f"seeds contains {seed} more than once; give seeds that differ modulo 2**64."
+            )
         taken.add(seed % 2**64)
     return several
 
@@ -127,10 +129,9 @@ def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.
     """Return a seed for each table of the given leading shape, as a flat object array."""
     several = checked_seeds(seeds)
     if len(several) != 1 and (not shape or shape[-1] != len(several)):
-        raise AntsError(
-            f"there are {len(several)} seeds for tables of leading shape {shape}; give one seed, "
-            "or one for each entry of the last leading axis."
-        )
+        tables = f"{' x '.join(map(str, shape))} tables" if shape else "one table"
+        allowed = f"1 seed or {shape[-1]} seeds" if shape else "1 seed"
+        raise AntsError(f"there are {len(several)} seeds for {tables}; give {allowed}.")
     return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
 
 

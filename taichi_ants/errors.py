@@ -138,7 +138,9 @@ def array_of(name: str, values: object) -> np.ndarray:
     try:
         return np.asarray(values)
     except ValueError:
-        raise AntsError(f"{name} is {shown(values)}; it must be an array.") from None
+        raise AntsError(
+            f"{name} is {shown(values)}; it must be an array whose rows have equal lengths."
+        ) from None
 
 
 def check_array(name: str, value: Any, dtype: str | np.dtype, shape: tuple[int, ...]) -> None:

@@ -98,8 +98,8 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
             why = "has fields or arrays" if ours else "was not started by taichi_ants"
             raise AntsError(
                 f"arch={wanted.arch!r}, threads={wanted.threads} requires a restart of Taichi, but "
-                f"it runs with {running.arch!r}, {running.threads}, and {why}; leave out threads "
-                "and arch, or call ti.reset() first, which destroys all fields and arrays."
+                f"it runs with {running.arch!r}, {running.threads} threads, and {why}; leave out "
+                "threads and arch, or call ti.reset() first, which destroys all fields and arrays."
             )
     _init(ti, wanted)
     return wanted
@@ -176,8 +176,8 @@ def _running(ti: ModuleType) -> Runtime | None:
         how = "with fast_math=True, which changes results in the last bit"
         how = how if arch else f"on {config.arch}, on which the kernels are not tested"
         raise AntsError(
-            f"Taichi is running {how}; call ti.init(arch=ti.cpu, fast_math=False), or ti.reset() "
-            "before taichi_ants starts Taichi; both destroy all fields and arrays."
+            f"Taichi is running {how}; call ti.init(arch=ti.cpu, fast_math=False), or call "
+            "ti.reset() and let taichi_ants start Taichi; both destroy all fields and arrays."
         )
     return Runtime(arch, int(config.cpu_max_num_threads))
 

@@ -6,7 +6,7 @@ options, controls of pages, and the tables of the documentation.
 
     @dataclass(frozen=True)
     class Pheromone(Settings, path="task.pheromone"):
-        evaporation: Annotated[Literal["linear", "exponential"], Is("how ...")] = "linear"
+        evaporation: Annotated[Literal["linear", "exponential"], Is("...")] = "linear"
         half_life: Annotated[
             float | None,
             Is("time in which a trail halves", unit="ticks", above=0, usual=50.0,
@@ -121,16 +121,21 @@ class Setting(NamedTuple):
 
     def about(self, value: Any) -> str:
         """Return the help of the command-line option whose default is `value`."""
-        words = self.allowed_words or (self.is_group and self.kind.named())  # type: ignore[attr-defined]
+        named = self.kind.named() if self.is_group else {}  # type: ignore[attr-defined]
+        words = self.allowed_words or tuple(named)
         allowed = f"one of {', '.join(words)}" if words else self._range
         parts = [self.rule.help, *([f"in {self.rule.unit}"] if self.rule.unit else [])]
         parts = [", ".join(parts), *([allowed] if allowed else [])]
         if self.rule.only is not None:
             other, *values = self.rule.only
-            parts.append(f"only with {other} {' or '.join(str(one).lower() for one in values)}")
+            flag = _below(self.path.rpartition(".")[0], other).replace("_", "-")
+            parts.append(f"only with --{flag} {_either(str(one).lower() for one in values)}")
         usual = self.rule.usual if value is None else value
-        given = "" if usual in (None, MISSING) or self.is_group else f" (default: {usual})"
-        return "; ".join(parts) + (given.lower() if self.kind is bool else given)
+        if self.is_group:
+            usual = next((name for name, one in named.items() if one == usual), MISSING)
+        if usual is None or self.kind is bool:
+            usual = str(usual).lower()
+        return "; ".join(parts) + ("" if usual is MISSING else f" (default: {usual})")
 
     def checked(self, value: Any) -> Any:
         """Return a value as a Python object of the setting's kind; AntsError if not allowed."""
@@ -246,7 +251,7 @@ class Settings:
         elif value != one.default:
             raise AntsError(
                 f"`{one.path}` is {shown(value)}; leave it out unless `{other}` is "
-                f"{' or '.join(map(repr, values))}."
+                f"{_either(map(repr, values))}."
             )
 
     def but(self: Self, **changes: Any) -> Self:
@@ -359,7 +364,7 @@ def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     of = f" of {group}" if group else ""
     if not near:
         return f"is not a setting{of}, which has none; leave it out."
-    choice = " or ".join(near) if len(near) <= 2 else f"one of {', '.join(near)}"
+    choice = _either(near) if len(near) <= 2 else f"one of {', '.join(near)}"
     return f"is not a setting{of}; choose {choice}."
 
 
@@ -403,8 +408,12 @@ def _below(path: str, name: object) -> str:
     return f"{path}.{name}" if path else str(name)
 
 
+def _either(values: Iterable[str]) -> str:
+    """Return values as "a", "a or b", or "a, b or c"."""
+    *others, last = values
+    return f"{', '.join(others)} or {last}" if others else last
+
+
 def _plain(bound: float) -> str:
-    """Return a bound with spaces between thousands: 1 000 000."""
-    if isinstance(bound, int) and abs(bound) >= 10_000:
-        return f"{bound:_}".replace("_", " ")
-    return f"{bound:g}"
+    """Return a bound as users write it, with all digits of a whole number: 1000000."""
+    return str(bound) if isinstance(bound, int) else f"{bound:g}"

@@ -16,11 +16,12 @@ settings.load_profile("repeatable")
 def pytest_configure(config: pytest.Config) -> None:
     """Share compiled kernels among all test processes, and with later runs.
 
-    Kernels compile in half the time without Taichi's control-flow optimisation, with equal results.
-    The slow tests, which also compare both engines with the reference, compile kernels as users do.
+    Kernels compile in a third of the time without Taichi's optimisations, with equal results. The
+    slow tests, which also compare both engines with the reference, compile kernels as users do.
     """
     if config.option.markexpr.startswith("not slow"):
         os.environ.setdefault("TI_CFG_OPTIMIZATION", "0")
+        os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")
     folder = config.rootpath / ".pytest_cache" / "kernels"
     os.environ["XDG_CACHE_HOME"] = str(folder)
     os.environ["TI_OFFLINE_CACHE_MAX_SIZE_OF_FILES"] = str(2**30)

@@ -114,11 +114,11 @@ def test_every_module_belongs_to_a_layer():
 
 
 def test_imports_point_one_way():
+    modules = {module_of(path) for path in PACKAGE}
     for path in PACKAGE:
         own = part_of(module_of(path))
         if not own:  # the package itself names all of its parts
             continue
-        modules = {module_of(path) for path in PACKAGE}
         for module in imported(path):
             # A name of the package itself, such as `taichi_ants.train`, comes from any of its
             # parts; only what stands on top of all of them may take it from there.

@@ -86,11 +86,11 @@ def test_an_editable_install_is_a_path(built):
         assert not [name for name in wheel.namelist() if name.endswith(".py")]
 
 
-def call(arguments, folder, *options):
+def call(arguments, folder, *options, kernels=None):
     return subprocess.run(
         [sys.executable, *options, "-m", "taichi_ants", *arguments],
         cwd=folder,
-        env=environment(folder),
+        env=environment(kernels or folder),
         capture_output=True,
         text=True,
         timeout=60,
@@ -142,14 +142,14 @@ def test_the_version(tmp_path):
     assert (done.returncode, done.stdout) == (0, "taichi-ants 0.1.0\n")
 
 
-def test_a_command_by_its_name(tmp_path):
+def test_a_command_by_its_name(kernels, tmp_path):
     """What it works with lies in the package: it runs in a folder of its own."""
     tiny = [
         *("--seeds", "1", "--episodes", "2", "--max-steps", "30", "--learners", "q_learning"),
         *("--learning-rates", "0.1", "--discounts", "0.9", "--epsilons", "0.3"),
         *("--epsilon-decays", "0.9", "--delivery", "terminates"),
     ]
-    done = call(["compare", *tiny], tmp_path)
+    done = call(["compare", *tiny], tmp_path, kernels=kernels)
     assert (done.returncode, done.stderr) == (0, "")
     (folder,) = Path(tmp_path, "results").iterdir()
     assert folder.name == "compare"

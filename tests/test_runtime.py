@@ -139,7 +139,7 @@ for other in ({"threads": 1}, {"arch": "cuda"}):
     try:
         runtime.start(**other)
     except AntsError as error:
-        assert "with 'cpu', 3, and was not started by taichi_ants; leave" in str(error), error
+        assert "'cpu', 3 threads, and was not started by taichi_ants; leave" in str(error), error
     else:
         raise AssertionError("it was restarted")
 assert field.to_numpy().tolist() == [7] * 4

@@ -99,7 +99,8 @@ def table(cls: type) -> str:
             default, meaning = words.get(usual, f"`{usual!r}`"), one.rule.help
             if one.rule.only is not None:
                 other, *values = one.rule.only
-                meaning += f"; only with `{other}` {' or '.join(map(repr, values))}"
+                allowed = re.sub(r", (?=[^,]*$)", " or ", ", ".join(map(repr, values)))
+                meaning += f"; only with `{other}` {allowed}"
             rows.append(f"| `{one.path}` | {one.allowed}{unit} | {default} | {meaning} |")
     return "\n".join(rows)
 
@@ -112,9 +113,9 @@ def refused(make) -> str:
 
 def test_sentences():
     assert refused(lambda: Soup("thick", 0)) == "`kitchen.soup.flour` is 0; it must be above 0."
-    says = "`kitchen.soup.salt` is 60000; it must be between 0 and 50 000."
+    says = "`kitchen.soup.salt` is 60000; it must be between 0 and 50000."
     assert refused(lambda: Soup(salt=60_000)) == says
-    says = "`kitchen.soup.salt` is '3'; it must be a whole number between 0 and 50 000."
+    says = "`kitchen.soup.salt` is '3'; it must be a whole number between 0 and 50000."
     assert refused(lambda: Soup(salt="3")) == says
     says = "`kitchen.soup.kind` is 'thik'; it must be one of thin, thick."
     assert refused(lambda: Soup("thik")) == says

@@ -58,7 +58,7 @@ def look(run: Run) -> Any:
 
 
 def state_of(carries: Any, codes: Any) -> Any:
-    """Return the row of the table."""
+    """Return the state index of the ant."""
     return carries * 64 + codes[0] * 16 + codes[1] * 4 + codes[2]
 
 

@@ -2,7 +2,7 @@
 
 A carrier moves to the free neighbour that is nearest to the nest, and deposits on it. A forager
 takes adjacent food, follows the strongest adjacent trail, or moves at random. Trails evaporate by 1
-per tick, like ours. The ants do not learn.
+per tick, as in Taichi Ants. The ants do not learn.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The paper's world and Q-learning as plain loops, which numba compiles.
 
-Random numbers and arithmetic are the same as ours, so the runs are equal to the bit.
+Random numbers and arithmetic are those of the package, so the runs are bit-for-bit equal.
 """
 
 from __future__ import annotations

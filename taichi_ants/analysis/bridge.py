@@ -174,7 +174,7 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
     titles = {
         SHORT_RIGHT: "Short branch to the right",
         SHORT_LEFT: "Short branch to the left",
-        EQUAL: "Equal branches: the right one",
+        EQUAL: "Equal branches: right branch",
     }
     with style.styled():
         figure = style.new_figure(5.6)
@@ -183,7 +183,7 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
             # The food of equal branches is never aside.
             ahead = {} if bridge == EQUAL else {", food ahead": found[Design(aside=0)][bridge]}
             _draw_shares(axes, {"": found[Design()][bridge], **ahead}, ticks)
-            axes.set(title=title, xlabel="tick")
+            axes.set(title=title, xlabel="Tick")
         for axes, (name, values) in zip(below, PANELS.items(), strict=True):
             mirrored = np.array([_of_both_sides(found, name, value) for value in values])
             _draw_lines(axes, {load: (values, mirrored[:, k]) for k, load in enumerate(LOADS)})
@@ -191,13 +191,13 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
             if name != "evaporation":
                 axes.set_xticks(values)
         caption = (
-            f"{sentence(_means(found))}. Above: {Design().ants} ants.\n"
-            "Below, food aside: one setting varies; second half of the time, mean of both mirror "
-            "images.\nEvaporation: none, 1 per tick (linear), or a half-life in ticks."
+            f"{sentence(_means(found))}. Upper row: {Design().ants} ants.\n"
+            "Lower row: food aside, one setting varies; second half of the time, mean of both "
+            "mirror images.\nEvaporation: none, 1 per tick (linear), or a half-life in ticks."
         )
         for axes in (above[0], below[0]):
-            axes.set(ylabel="% by the short branch", ylim=(0, 103))
-        title = "Who crosses a double bridge by the short branch"
+            axes.set(ylabel="Crossings (%)", ylim=(0, 103))
+        title = "Share of crossings by the short branch of a double bridge"
         style.frame(figure, title, caption, style.legend_entries(above))
     style.save(figure, path)
 
@@ -221,14 +221,14 @@ def draw_late(path: Path, found: Crossings, ticks: int) -> None:
             _draw_shares(axes, {"": found[design][LATE]}, 2 * ticks)
             axes.axvline(ticks, color=style.GREY, linewidth=0.9)
             axes.annotate("opens", (ticks, 95), (-4, 0), textcoords="offset points", ha="right")
-            axes.set(title=title, xlabel="tick", xticks=[0, ticks, 2 * ticks])
-        several[0].set(ylabel="% by the short branch", ylim=(0, 103))
+            axes.set(title=title, xlabel="Tick", xticks=[0, ticks, 2 * ticks])
+        several[0].set(ylabel="Crossings (%)", ylim=(0, 103))
         caption = (
             f"{sentence(_means(found))}; {Design().ants} ants that have learned with both branches "
             "open and follow their final policy.\nIn the model of Goss and others, no colony "
             "switches to a short branch that opens late."
         )
-        title = "Who takes a short branch that opens late"
+        title = "Share of crossings by a short branch that opens late"
         style.frame(figure, title, caption, style.legend_entries(several))
     style.save(figure, path)
 

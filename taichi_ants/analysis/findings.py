@@ -92,8 +92,9 @@ class Contrast:
         values: Float64 (seeds,), or (k, seeds) with `of_estimates`; nan where a value is missing.
         uses_iqm: Whether it is judged by the interquartile mean (IQM) over seeds.
         possible: The range of possible estimates; the interval is clipped to it.
-        of_estimates: A smooth function of k estimates, float (k, ...) -> float (...), if the
-            contrast is about these (are 8 effects unequal?); per seed, noise would count too.
+        of_estimates: A smooth function of k estimates, float (k, ...) -> float (...), or None. It
+            is for questions such as whether 8 effects are unequal: in the values of a single seed,
+            noise would make them unequal.
     """
 
     label: str
@@ -114,7 +115,7 @@ class Contrast:
         return not self.seeds or bool(np.isnan(self.values).any())
 
     def reading(self, uses_iqm: bool) -> tuple[np.ndarray, bool]:
-        """Return the numbers to average over seeds, float64 (seeds,), and whether by their IQM."""
+        """Return numbers to average over seeds, float64 (seeds,), and whether to use the IQM."""
         if self.of_estimates is None:
             return self.values, uses_iqm
         values = interquartile_values(self.values) if uses_iqm else self.values
@@ -125,8 +126,8 @@ class Contrast:
 class Finding:
     """The result of a contrast: verdict, estimate over seeds, and interval at `level`.
 
-    If the contrast is not tested, the numbers are nan. `by_mean` is the finding by the mean on a
-    contrast that is judged by the IQM.
+    If the contrast is not tested, the numbers are nan. If a contrast is judged by the IQM,
+    `by_mean` is its finding by the mean.
     """
 
     contrast: Contrast

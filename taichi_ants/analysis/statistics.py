@@ -18,8 +18,10 @@ that results are reproducible.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -92,23 +94,34 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
     return interquartile_mean(values)[:, None] + moved
 
 
-def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray]:
-    """Return estimates of values (rows, seeds) with intervals, float64 (rows,) by column name.
+class Estimator(NamedTuple):
+    """Estimates of a measure over seeds: mean, IQM or None, 95 % intervals (nan for one seed)."""
 
-    The columns are "mean", "ci_low", "ci_high"; with `uses_iqm` also "iqm", "iqm_ci_low" and
-    "iqm_ci_high".
-    """
+    mean: float
+    ci_low: float
+    ci_high: float
+    iqm: float | None = None
+    iqm_ci_low: float = math.nan
+    iqm_ci_high: float = math.nan
+
+    @property
+    def apart(self) -> bool:
+        """Whether the mean lies outside of the interval of the IQM."""
+        return self.mean < self.iqm_ci_low or self.mean > self.iqm_ci_high
+
+
+def estimates(values: np.ndarray, uses_iqm: bool = True) -> list[Estimator]:
+    """Return the estimates of each row of values (rows, seeds), without IQM unless `uses_iqm`."""
     values = np.asarray(values, float)
-    columns = {"mean": values.mean(axis=1)}
-    columns["ci_low"], columns["ci_high"] = bootstrap_interval(values)
+    columns = [values.mean(axis=1), *bootstrap_interval(values)]
     if uses_iqm:
-        columns["iqm"] = interquartile_mean(values)
-        columns["iqm_ci_low"], columns["iqm_ci_high"] = bootstrap_interval(values, iqm=True)
-    return {name: without_noise(column, values) for name, column in columns.items()}
+        columns += [interquartile_mean(values), *bootstrap_interval(values, iqm=True)]
+    exact = (without_noise(column, values).tolist() for column in columns)
+    return [Estimator(*row) for row in zip(*exact, strict=True)]
 
 
 def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return numbers (rows,) that were computed from values (rows, seeds), rounding errors as 0."""
+    """Return numbers (rows,) computed from values (rows, seeds), with rounding errors set to 0."""
     tiny = TIE_TOLERANCE * np.abs(values).max(axis=1)
     return np.where(np.abs(numbers) <= tiny, 0.0, numbers)
 
@@ -165,8 +178,9 @@ def cautious_interval(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the hull of the bootstrap and the t interval, which verdicts use.
 
-    If half of all seeds differed from the others, n seeds would agree by chance with probability
-    2^(1-n) (the sign test). If they agree and this is above 1 - level, the interval is unbounded.
+    If all n seeds agree, but could do so by chance, the interval is unbounded. By the sign test,
+    this is so if 2^(1-n) is above 1 - level: the probability that n seeds agree if half of all
+    seeds differ from the others.
     """
     values = np.asarray(values, float)
     n = values.shape[1]

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import LEAST_SEEDS
-from taichi_ants.analysis.statistics import bootstrap_interval, estimates
+from taichi_ants.analysis.statistics import Estimator, bootstrap_interval, estimates
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
 if TYPE_CHECKING:
@@ -33,22 +32,6 @@ def seed_rows(
             yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
-class Estimator(NamedTuple):
-    """Estimates of a measure over seeds: mean, IQM or None, 95 % intervals (nan for one seed)."""
-
-    mean: float
-    ci_low: float
-    ci_high: float
-    iqm: float | None = None
-    iqm_ci_low: float = math.nan
-    iqm_ci_high: float = math.nan
-
-    @property
-    def apart(self) -> bool:
-        """Whether the mean lies outside of the interval of the IQM."""
-        return self.mean < self.iqm_ci_low or self.mean > self.iqm_ci_high
-
-
 def centre_columns(found: Mapping[str, Estimator]) -> dict[str, float]:
     """Return the columns of a table for the estimates of several measures."""
     return {
@@ -66,10 +49,8 @@ def centres_of(
 
     Only the measures in `with_iqm` get an interquartile mean.
     """
-    columns = {name: estimates(array, name in with_iqm).values() for name, array in values.items()}
-    rows = {name: np.transpose([*several]).tolist() for name, several in columns.items()}
-    points = len(next(iter(values.values())))
-    return [{name: Estimator(*several[p]) for name, several in rows.items()} for p in range(points)]
+    several = [estimates(array, name in with_iqm) for name, array in values.items()]
+    return [dict(zip(values, row, strict=True)) for row in zip(*several, strict=True)]
 
 
 def columns_of(rows: Sequence[Settings]) -> list[str]:
@@ -85,7 +66,8 @@ def report(
 ) -> str:
     """Return the means with their intervals as a table for a terminal.
 
-    `notes` has the verdict of each point: its first measure, compared with the value `against`.
+    With `against`, a setting and its value, the last column compares the first measure of each
+    point with that value; `notes` has its text.
     """
     names = columns_of(settings)
     ends = {name: bootstrap_interval(array) for name, array in values.items()}

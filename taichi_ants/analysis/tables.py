@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -47,6 +48,11 @@ def percent(share: float) -> str:
 def thousands(number_of: int) -> str:
     """Return a large count in the form "12 800"."""
     return f"{number_of:,}".replace(",", " ")
+
+
+def tally(words: Iterable[str]) -> str:
+    """Return how often each word occurs, the most frequent first, for example "3 yes, 1 no"."""
+    return ", ".join(f"{n} {word}" for word, n in Counter(words).most_common())
 
 
 def sentence(words: str) -> str:

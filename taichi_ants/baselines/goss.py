@@ -45,7 +45,7 @@ _LAUNCH = 1 << 14  # colonies per launch, which takes less than half a second
 
 @checked_arguments
 def crossing_steps(ratio: Annotated[float, Is(least=1, most=100)]) -> tuple[int, int]:
-    """Return the steps to cross the short branch and one `ratio` times as long, 1 or more."""
+    """Return the steps to cross the short branch and a branch that is `ratio` times as long."""
     return SHORT_CELLS - 1, round(SHORT_CELLS * ratio) - 1
 
 
@@ -94,7 +94,7 @@ def choices(
 
 
 def class_shares(took: np.ndarray, first: int = 501, last: int = 1000) -> np.ndarray:
-    """Return the percentage of colonies in classes of ants on the short branch, float64 (5,).
+    """Return the percentage of colonies in each class of shares of the short branch, float64 (5,).
 
     The classes are 0-20 %, ... 80-100 % of the ants `first` to `last`, counted from 1; a share on a
     border belongs to the class above. `took` is a result of `choices`. AntsError if there are no

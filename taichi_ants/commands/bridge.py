@@ -25,9 +25,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--seeds", type=whole_number(1, 1000), default=40, metavar="N", help="number of seeds")
     add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
     counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
-    add("--episodes", **counts, default=60, help="training episodes")
-    add("--ticks", **counts, default=1000, help="ticks of a training episode")
-    add("--evaluation-ticks", **counts, default=3000, help="ticks of an evaluation")
+    add("--episodes", **counts, default=60, help="number of training episodes")
+    add("--ticks", **counts, default=1000, help="ticks per training episode")
+    add("--evaluation-ticks", **counts, default=3000, help="ticks per evaluation")
     quick = f"use {QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks"
     add("--quick", action="store_true", help=quick)
     command_line.add_common(parser)
@@ -54,7 +54,7 @@ def bridge(settings: argparse.Namespace) -> None:
     def work(blocks: Path, ready: Path) -> None:
         found = {}
         with command_line.progress_bar("bridge") as progress:
-            outcomes = study.run(blocks, **where, progress=lambda share: progress(0.6 * share))
+            outcomes = study.run(blocks, lambda share: progress(0.6 * share), **where)
             for number, (design, one) in enumerate(points.items()):
                 path, tables = blocks / f"followed-{number:06d}.npz", outcomes[one]["q_values"]
                 found[design] = followed(path, design, one, seeds, tables, ticks, where)

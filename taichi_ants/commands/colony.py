@@ -74,29 +74,42 @@ def _check_live(
             error(f"{flag} cannot change a resumed colony; leave it out")
         learns = name.startswith("training.") and name != "training.epsilon"
         if settings.sharing == "frozen" and learns:
-            error(f"{flag} has no effect with --sharing frozen (no learning); remove one of them")
+            error(
+                f"{flag} has no effect with --sharing frozen (no learning); leave one of them out"
+            )
     if settings.policy and "task.observation" in given:
-        error("the policy determines --task.observation; leave it out")
+        error(
+            "--task.observation has no effect with --policy, because the file determines the "
+            "observation; leave one of them out"
+        )
     if "frame_interval" in given and (
         not settings.render or settings.render.lower().endswith(".png")
     ):
-        error("--frame-interval requires an animation; give --render a .gif, .mp4 or folder")
+        picture = settings.render or "missing"
+        error(
+            f"--frame-interval requires an animation, but --render is {picture}; name a .gif or "
+            ".mp4 file or a folder"
+        )
 
 
 def _add_study(parser: command_line.Parser) -> None:
     add = parser.add_argument
+    kinds = (
+        "kinds of world, explained in docs/colony_study.md; ants train in paper, open and piles, "
+        "and ants trained in open are evaluated in all others"
+    )
     world_kinds: dict[str, Any] = {"nargs": "+", "choices": WORLD_KINDS, "metavar": "NAME"}
-    add("--world-kinds", **world_kinds, default=WORLD_KINDS, help="kinds of world to study")
+    add("--world-kinds", **world_kinds, default=WORLD_KINDS, help=kinds)
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1, 100_000)}
-    sizes = "numbers of ants of the trained colonies"
+    sizes = "numbers of ants of the colonies; 1 is always included"
     add("--sizes", **several, default=(1, 4, 16, 64), metavar="N", help=sizes)
     add("--seeds", type=whole_number(1, 1000), default=20, metavar="N", help="number of seeds")
     add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
     counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
-    add("--episodes", **counts, default=60, help="training episodes")
-    add("--ticks", **counts, default=1000, help="ticks of an episode")
-    add("--rollouts", **counts, default=4, help="evaluation episodes")
-    quick = "use fewer seeds, sizes and ticks, and the kinds paper, open and piles only"
+    add("--episodes", **counts, default=60, help="number of training episodes")
+    add("--ticks", **counts, default=1000, help="ticks per episode")
+    add("--rollouts", **counts, default=4, help="number of evaluation episodes")
+    quick = "use fewer seeds, sizes, episodes and ticks, and only the kinds paper, open and piles"
     add("--quick", action="store_true", help=quick)
     parser.open_settings, parser.own_settings = ("training",), PLANNED
     command_line.add_settings(parser, _learning(0.3))
@@ -106,28 +119,39 @@ def _add_study(parser: command_line.Parser) -> None:
 
 def _add_live(parser: command_line.Parser) -> None:
     add = parser.add_argument
-    add("--ants", **COUNT, default=80, help="number of ants at the start")
+    add("--ants", **COUNT, default=80, help="number of ants per colony at the start")
     ticks: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
     add("--ticks", **ticks, default=1000, help="number of ticks to run")
-    add("--colonies", **COUNT, default=1, help="number of colonies in parallel, a seed each")
+    add(
+        "--colonies", **COUNT, default=1, help="number of separate colonies, each with its own seed"
+    )
     add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
-    start = "place ants around the queen or anywhere"
+    start = "place ants near the queen (nest) or anywhere (spread)"
     add("--start", choices=("nest", "spread"), default="nest", help=start)
-    add("--world", default="open", metavar="NAME", help=command_line.WORLDS)
+    add("--world", default="open", metavar="WORLD", help=command_line.WORLDS)
     sharings = ("shared", "independent", "frozen")
-    sharing = "share a table of action values, learn into a table each, or do not learn"
+    sharing = (
+        "all ants learn into one table of action values (shared), each into its own (independent), "
+        "or no ant learns (frozen)"
+    )
     add("--sharing", choices=sharings, default="shared", help=sharing)
-    add("--policy", metavar="FILE", help="start with the table of a policy file (.npz)")
-    add("--capacity", **COUNT, help="largest number of ants alive, if births are on")
-    which = "rules, which other options change (default: those of --policy, else the paper's)"
+    add("--policy", metavar="FILE", help="policy file (.npz) with the action values at the start")
+    capacity = (
+        "largest number of living ants per colony (default: --ants, or 2 * --ants + 64 with births)"
+    )
+    add("--capacity", **COUNT, help=capacity)
+    which = (
+        "rules to start from; options such as --task.delivery change them (default: the rules in "
+        "the file of --policy, or paper)"
+    )
     add("--task", choices=("paper", "foraging", "queueing"), help=which)
     add = parser.add_argument_group("files").add_argument
     add("--save", metavar="FILE", help="save the colony at the end (.npz)")
     add("--resume", metavar="FILE", help="resume a saved colony (.npz)")
-    picture = "draw the last tick (.png), or an animation (.gif, .mp4, a folder)"
+    picture = "draw the last tick (.png), or an animation (.gif, .mp4, or a folder of pictures)"
     add("--render", metavar="PATH", help=picture)
     add("--frame-interval", **COUNT, default=2, help="ticks per frame of an animation")
-    figure = "draw deliveries per tick over time, of all colonies together (.png and .csv)"
+    figure = "plot the deliveries per tick of all colonies together (.png), with the numbers (.csv)"
     add("--figure", metavar="FILE.png", help=figure)
     command_line.add_common(parser)
     parser.open_settings = ("world", "task", "training")
@@ -169,7 +193,8 @@ def study(settings: argparse.Namespace) -> None:
 
     def work(blocks: Path, ready: Path) -> Results:
         with command_line.progress_bar("study") as progress:
-            outcomes = asked.run(blocks, settings.threads, settings.arch, progress)
+            where = {"threads": settings.threads, "arch": settings.arch}
+            outcomes = asked.run(blocks, progress, **where)
         return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
 
     words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}

@@ -1,6 +1,7 @@
 """Repeat the paper's comparison of Q-learning, SARSA and Dyna-Q with many seeds.
 
-The command trains every configuration with every seed and follows the final policies greedily. It
+A configuration combines a learner with one value of each option that takes several. The command
+trains every configuration with every seed and evaluates the final policies without exploration. It
 compares the results with the paper and with exact bounds, and writes tables, figures and policies
 to a folder. See docs/paper.md.
 """
@@ -51,24 +52,24 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add = parser.add_argument
     seeds: dict[str, Any] = {"type": whole_number(1, MOST_SEEDS), "metavar": "N"}
     add("--seeds", **seeds, default=100, help=f"number of seeds, at most {MOST_SEEDS}")
-    add("--seed", type=whole_number(), default=0, metavar="BASE", help="first seed")
+    add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
     counts: dict[str, Any] = {"type": whole_number(1), "metavar": "N"}
-    add("--episodes", **counts, default=500, help="training episodes of a run")
+    add("--episodes", **counts, default=500, help="training episodes per run")
     add("--max-steps", **counts, default=600, help="step limit of an episode")
-    delivery = "bootstrap at a delivery (truncates), do not (terminates), or compare both"
+    delivery = "bootstrap at a delivery (truncates), do not bootstrap (terminates), or run both"
     add("--delivery", choices=(*DELIVERIES, "both"), default="both", help=delivery)
     names = ("q_learning", "sarsa", "dyna_q")
     add("--learners", nargs="+", default=names, metavar="NAME", help="learners to compare")
     few: dict[str, Any] = {"nargs": "+", "type": float, "metavar": "X"}
-    add("--learning-rates", **few, default=(0.001, 0.01), help="learning rates of the grid")
-    add("--discounts", **few, default=(0.9, 0.99), help="discounts of the grid")
-    add("--epsilons", **few, default=(0.3, 0.5), help="initial exploration rates of the grid")
-    decays = "factors of the grid on epsilon after each episode"
+    add("--learning-rates", **few, default=(0.001, 0.01), help="learning rates to combine")
+    add("--discounts", **few, default=(0.9, 0.99), help="discount factors to combine")
+    add("--epsilons", **few, default=(0.3, 0.5), help="initial exploration rates to combine")
+    decays = "factors to combine, which multiply epsilon after each episode"
     add("--epsilon-decays", **few, default=(0.99, 0.995), help=decays)
     several: dict[str, Any] = {"nargs": "+", "type": whole_number(1), "metavar": "N"}
-    planning = "planning updates after each step in the world, for learners that plan"
+    planning = "planning updates after each step, to combine for learners that plan, such as dyna_q"
     add("--planning-steps", **several, default=(3, 5), help=planning)
-    add("--world", default="paper", help=WORLDS)
+    add("--world", default="paper", metavar="WORLD", help=WORLDS)
     add_common(parser)
     quick = f"use at most {QUICK_SEEDS} seeds and draw no animations"
     add("--quick", action="store_true", help=quick)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.command_line import (
+    PLUGIN,
     WORLDS,
     Parser,
     add_settings,
@@ -39,10 +40,10 @@ if TYPE_CHECKING:
 # Defaults that options change.
 TASK, TRAINING = Task(), TrainingConfig("sarsa", 0.001, 0.9, 0.3, 0.99)
 KINDS = {  # description and example of each subcommand
-    "episode": ("Render an ant with a fixed policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
-    "colony": ("Render many ants with the same fixed policy", "--ants 200 --out ants.gif"),
-    "learning": ("Render an ant before and after learning, side by side", "--checkpoints 0 5 500"),
-    "sheet": ("Render the best actions in all states", "--policy my.npz --out sheet.png"),
+    "episode": ("render an ant with a fixed policy", "--policy my.npz --epsilon 0.1 --out ant.mp4"),
+    "colony": ("render many ants with the same fixed policy", "--ants 200 --out ants.gif"),
+    "learning": ("render an ant before and after learning, side by side", "--checkpoints 0 5 500"),
+    "sheet": ("render a table of the best action in each state", "--policy my.npz --out sheet.png"),
 }
 
 
@@ -66,22 +67,34 @@ _PLAIN = {"action": "store_false", "dest": "overlay"}
 _OPTIONS: dict[str, tuple[str, str, dict[str, Any]]] = {
     "--out": ("ecls", "file or folder to write", {"metavar": "PATH"}),
     "--title": ("ecls", "title of the picture or page", {"metavar": "TEXT"}),
-    "--world": ("ecls", WORLDS, {"default": "paper"}),
+    "--world": ("ecls", WORLDS, {"default": "paper", "metavar": "WORLD"}),
     "--seed": ("ecls", "seed of training and rendering", _SEED),
-    "--seeds": ("l", "train seeds 0 to N - 1, show the median run, count deliveries", _SEEDS),
-    "--plugin": ("ecls", "Python file with your own learners, worlds or observations", _FILE),
+    "--seeds": (
+        "l",
+        "without --seed, train seeds 0 to N - 1 and show the median one",
+        _SEEDS,
+    ),
+    "--plugin": ("ecls", PLUGIN, _FILE),
     "--ants": ("c", "number of ants", {**_COUNT, "default": 80}),
-    "--follow": ("c", "show the view of the ant with this number", {**_SEED, "default": None}),
+    "--follow": ("c", "show what the ant with this number sees", {**_SEED, "default": None}),
     "--max-steps": ("el", "step limit of the rendered episode", _LENGTH),
-    "--ticks": ("c", "ticks per episode", _LENGTH),
-    "--epsilon": ("ecl", "exploration rate when rendering", {**_NUMBER, "default": 0.0}),
+    "--ticks": ("c", "ticks per episode of training and rendering", _LENGTH),
+    "--epsilon": ("ecl", "exploration rate while rendering", {**_NUMBER, "default": 0.0}),
     "--policy": ("ecs", "policy file (.npz) to use instead of training", _FILE),
     "--episodes": ("ecs", "number of training episodes", {**_COUNT, "default": 500}),
-    "--checkpoints": ("l", "numbers of training episodes to show", _CHECKPOINTS),
+    "--checkpoints": (
+        "l",
+        "numbers of training episodes after which to show the ant",
+        _CHECKPOINTS,
+    ),
     "--size": ("ecl", "width and height in pixels", {"type": _size, "metavar": "WxH"}),
     "--fps": ("ecl", "frames per second", {**_NUMBER, "default": 8.0}),
-    "--frame-interval": ("c", "ticks between frames (default: 4; 1 on a page)", _COUNT),
-    "--no-overlay": ("ec", "render only the world, without text and marks", _PLAIN),
+    "--frame-interval": ("c", "ticks per frame (default: 4; for a page, 1)", _COUNT),
+    "--no-overlay": (
+        "ec",
+        "render only the world, without the panel and the marks of the view",
+        _PLAIN,
+    ),
 }
 _OF_TRAINING = ("--episodes", "--checkpoints", "--training.", "--task.")  # unused with --policy
 # Defaults of options that differ between subcommands.
@@ -105,7 +118,9 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     for kind, (shows, example) in KINDS.items():
         example = f"Example: %(prog)s {example}"
-        one = kinds.add_parser(kind, help=shows, description=f"{shows}.", epilog=example)
+        one = kinds.add_parser(
+            kind, help=shows, description=f"{shows.capitalize()}.", epilog=example
+        )
         for flag, (where, words, reading) in _OPTIONS.items():
             if kind[0] in where:
                 one.add_argument(flag, **{"help": words, **reading})

@@ -1,7 +1,8 @@
 """Sweep any settings of the world, the task, the learner or the colony, from a TOML file.
 
-FILE has fixed settings, settings that vary with their values, seeds, and measures. The command runs
-every combination with every seed, and writes tables and a figure to a folder. See docs/sweeps.md.
+FILE lists fixed settings, the values of settings to vary, seeds, and measures. The command runs
+every combination of values with every seed, and writes tables and a figure to a folder. See
+docs/sweeps.md.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ def parse_arguments(
         parser.add_argument("file", type=Path, metavar="FILE", help="sweep to run (.toml)")
     parser.set_defaults(**({"file": file} if file else {}))
     command_line.add_common(parser)
-    name = f"sweep-{file.stem}" if file else "sweep-NAME, by the name of FILE"
+    name = f"sweep-{file.stem}" if file else "sweep-NAME for the file NAME.toml"
     command_line.add_results(parser, name, quick=False)
     settings = parser.parse_args(arguments)
     settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
@@ -38,7 +39,8 @@ def sweep(settings: argparse.Namespace) -> None:
 
     def work(blocks: Path, ready: Path) -> None:
         with command_line.progress_bar("sweep") as progress:
-            values = asked.measured(blocks, settings.threads, settings.arch, progress)
+            where = {"threads": settings.threads, "arch": settings.arch}
+            values = asked.measured(blocks, progress, **where)
         asked.write(values, ready, draws=not settings.no_figures)
         asked.write_series(blocks, ready)
 

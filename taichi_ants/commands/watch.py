@@ -1,8 +1,9 @@
 """Watch a colony in a browser and change it while it runs.
 
-The command prints the address of a page, which opens only on this machine. On the page you choose
-world, rules and policy, run the colony, draw rock, food, trails and ants, and save the session,
-which replays bit for bit. To end, press Ctrl-C or quit on the page. See docs/watching.md.
+The command prints the address of a page, which opens only on this machine. On the page, you choose
+the world, the rules and the policy, run the colony, and place or remove rocks, food, trails and
+ants. You can save the session, which replays bit for bit. To end, press Ctrl-C or choose "Quit the
+server" on the page. See docs/watching.md.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from typing import TYPE_CHECKING, Any
 
 from taichi_ants.settings import flat
 from taichi_ants.studies.command_line import (
+    PLUGIN,
+    THREADS,
     Parser,
     load_plugin,
     progress_bar,
@@ -53,7 +56,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = Parser(__doc__)
     add = parser.add_argument
     files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
-    add("--policy", **files, help="policy files to offer, in addition to experiments/policies/")
+    offered = "policy files (.npz) to offer on the page, in addition to experiments/policies/"
+    add("--policy", **files, help=offered)
     add("--session", metavar="FILE", help="resume a saved session")
     add(
         "--port",
@@ -62,10 +66,11 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         metavar="N",
         help="port of the page; 0 picks a free one",
     )
-    add("--no-browser", action="store_true", help="do not open a browser (implied if no terminal)")
+    closed = "do not open a browser (the default if the output is not a terminal)"
+    add("--no-browser", action="store_true", help=closed)
     add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
-    add("--plugin", metavar="FILE", help="Python file with learners, worlds or observations")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
+    add("--plugin", metavar="FILE", help=PLUGIN)
+    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
     return parser.parse_args(arguments)
 
 

@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, Worlds
+from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, Arguments, Worlds
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, RIGHT
@@ -35,23 +35,15 @@ class ColonyWorlds(Ants):
 
     def __init__(
         self,
-        world: Worlds,
         n_worlds: int,
         task: Task | None,
+        given: Arguments,
         ants: int,
         start: str,
-        capacity: int | None,
-        max_steps: int,
-        observation_format: ObservationFormat,
-        evaporation: bool | None,
-        render_mode: str | None,
-        max_episode_steps: int | None = None,
+        capacity: int | None = None,
     ) -> None:
         task = checks.checked_task(Task() if task is None else task)
-        super().__init__(
-            *(world, n_worlds, task, max_steps, max_episode_steps, observation_format),
-            *(evaporation, render_mode, METADATA["render_modes"]),
-        )
+        super().__init__(n_worlds, task, given, METADATA["render_modes"])
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
             replace(task, evaporation_in_evaluation=self.evaporates),
@@ -119,15 +111,13 @@ class ColonyWorlds(Ants):
         return rewards, terminated, truncated
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
-        return (
-            self._last
-            if last
-            else {
-                "state": self.colony.states.reshape(-1).astype(np.int64),
-                "action_mask": self.action_masks().reshape(-1, N_ACTIONS),
-                "event": self.events.reshape(-1),
-            }
-        )
+        if last:
+            return self._last
+        return {
+            "state": self.colony.states.reshape(-1).astype(np.int64),
+            "action_mask": self.action_masks().reshape(-1, N_ACTIONS),
+            "event": self.events.reshape(-1),
+        }
 
     def action_masks(self) -> np.ndarray:
         """Return 1 for actions that can succeed, int8 (W, slots, 5).
@@ -216,10 +206,10 @@ class HexColonyVectorEnv(AntVectorEnv):
             raise AntsError(
                 f"num_envs is {num_envs}; it counts ants, so it must be a multiple of ants, {ants}."
             )
-        worlds = ColonyWorlds(
-            *(world, n // ants, task, ants, start, None, max_steps),
-            *(observation_format, evaporation, render_mode, max_episode_steps),
+        given = Arguments(
+            world, max_steps, observation_format, evaporation, render_mode, max_episode_steps
         )
+        worlds = ColonyWorlds(n // ants, task, given, ants, start)
         super().__init__(worlds, n // ants, n, autoreset_mode, render_mode)
         rules = worlds.task
         if rules.life.births or rules.life.lifespan is not None:

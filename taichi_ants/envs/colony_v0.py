@@ -10,6 +10,7 @@ from gymnasium.utils import seeding
 
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
+from taichi_ants.envs.vector import Arguments
 from taichi_ants.errors import shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Life, Task
@@ -75,10 +76,8 @@ class HexColonyParallelEnv(ParallelEnv):
         evaporation: bool | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self._worlds = ColonyWorlds(
-            *(world, 1, task, ants, start, capacity, max_steps),
-            *(observation_format, evaporation, render_mode),
-        )
+        given = Arguments(world, max_steps, observation_format, evaporation, render_mode)
+        self._worlds = ColonyWorlds(1, task, given, ants, start, capacity)
         self.render_mode = render_mode
         colony = self._worlds.colony
         foods, life = len(colony.worlds[0].foods), colony.task.life

@@ -15,17 +15,10 @@ from taichi_ants import checks
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, StepLimit, Worlds
+from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, Arguments, StepLimit
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
 from taichi_ants.task import Task
-from taichi_ants.task.constants import (
-    EMPTY,
-    EPISODE_STEPS,
-    FOOD,
-    N_ACTIONS,
-    OBSTACLE,
-    QUEEN,
-)
+from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
 from taichi_ants.worlds import World, text_map
 
 DELIVERIES = ("terminates", "truncates", "continues")
@@ -46,29 +39,17 @@ class LoneAnts(Ants):
     """Many ants, each alone in its world; a single launch steps all of them."""
 
     def __init__(
-        self,
-        n: int,
-        world: Worlds,
-        task: Task | Mapping[str, Any] | None,
-        delivery: str | None,
-        evaporation: bool | None,
-        max_steps: int,
-        observation_format: ObservationFormat,
-        render_mode: str | None,
-        max_episode_steps: int | None = None,
+        self, n: int, task: Task | Mapping[str, Any] | None, delivery: str | None, given: Arguments
     ) -> None:
         task = Task.from_dict(task) if isinstance(task, Mapping) else task  # a spec read from JSON
         task = checks.checked_runs_task(task)
-        super().__init__(
-            *(world, n, task, max_steps, max_episode_steps, observation_format, evaporation),
-            *(render_mode, METADATA["render_modes"]),
-        )
+        super().__init__(n, task, given, METADATA["render_modes"])
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size
         if n > most:
             raise AntsError(f"num_envs is {n}; it must be at most {most} for a world of this size.")
-        self._text = render_mode == "ansi"
+        self._text = given.render_mode == "ansi"
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, self.evaporates
         )
@@ -182,9 +163,8 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
     ) -> None:
-        self._ants = LoneAnts(
-            *(1, world, task, delivery, evaporation, max_steps, observation_format, render_mode)
-        )
+        given = Arguments(world, max_steps, observation_format, evaporation, render_mode)
+        self._ants = LoneAnts(1, task, delivery, given)
         self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
         self._over, self._begun = True, False
@@ -277,8 +257,8 @@ class HexForageVectorEnv(AntVectorEnv):
         max_episode_steps: int | None = None,
     ) -> None:
         n = checked_whole("num_envs", num_envs)
-        ants = LoneAnts(
-            *(n, world, task, delivery, evaporation, max_steps, observation_format, render_mode),
-            max_episode_steps,
+        given = Arguments(
+            world, max_steps, observation_format, evaporation, render_mode, max_episode_steps
         )
+        ants = LoneAnts(n, task, delivery, given)
         super().__init__(ants, n, n, autoreset_mode, render_mode)

@@ -1,4 +1,4 @@
-"""Observation formats (cells, index, one-hot), and functions of observations as policy tables."""
+"""Observation formats (cells, index, one-hot), and conversion of policies to tables."""
 
 from __future__ import annotations
 

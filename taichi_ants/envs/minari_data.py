@@ -142,7 +142,9 @@ def from_minari(
         if facts is not None:
             known = Dataset.described(json.loads(facts))
     if known["world"] is None:
-        raise AntsError("the data set does not contain a world and a task; give world and task.")
+        raise AntsError(
+            "the data set does not contain a world and a task; give the arguments world and task."
+        )
     form = Shown(known["task"].sees, _FORMATS.get(type(source.observation_space), "cells"))
     if (source.observation_space, source.action_space) != (form.space, spaces.Discrete(N_ACTIONS)):
         raise AntsError(
@@ -175,7 +177,8 @@ def _rows(episode: Any, number: int, form: Shown) -> dict[str, np.ndarray]:
     states, n = form.states(episode.observations), len(episode)
     rewards = np.rint(episode.rewards)
     if not np.array_equal(rewards, episode.rewards):
-        raise AntsError("the data set has rewards that are not whole; name a data set of ants.")
+        wrong = np.asarray(episode.rewards)[rewards != episode.rewards][0]
+        raise AntsError(f"a reward is {wrong:g}; it must be a whole number.")
     infos = episode.infos or {}
     usual = {"run": np.zeros(n), "agent": np.zeros(n), "step": np.arange(n)}
     usual["behaviour_probability"] = np.full(n, np.nan)

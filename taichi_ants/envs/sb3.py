@@ -90,8 +90,8 @@ class SB3VecEnv(VecEnv):
         """Set an attribute of `envs`; AntsError if `indices` are not all environments."""
         if set(self._get_indices(indices)) != set(range(self.num_envs)):
             raise AntsError(
-                f"indices is {shown(indices)}; the environments are one object and share their "
-                "attributes, so leave it out."
+                f"indices is {shown(indices)}; all environments share their attributes, so leave "
+                "indices out."
             )
         setattr(self.envs, attr_name, value)
 
@@ -101,8 +101,8 @@ class SB3VecEnv(VecEnv):
         """Return the result of `action_masks`, the only method, for each environment."""
         if method_name != "action_masks":
             raise AntsError(
-                f"method_name is {shown(method_name)}; the environments are one object, and their "
-                "only method is action_masks, so call other methods of `envs`."
+                f"method_name is {shown(method_name)}; the only method of a single environment is "
+                "action_masks, so call methods of `envs` instead."
             )
         return list(self.action_masks()[[*self._get_indices(indices)]])
 

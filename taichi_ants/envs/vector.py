@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
@@ -43,6 +43,17 @@ def _action_masks() -> np.ndarray:
 ACTION_MASKS = _action_masks()  # the actions that can succeed, by percept: int8 (128, 5)
 
 
+class Arguments(NamedTuple):
+    """The arguments that all environments have, see `HexForageEnv`."""
+
+    world: Worlds
+    max_steps: int
+    observation_format: ObservationFormat
+    evaporation: bool | None
+    render_mode: str | None
+    max_episode_steps: int | None = None
+
+
 class Ants(ABC):
     """The ants of an environment, in one or more worlds; AntsError if an argument is not allowed.
 
@@ -55,28 +66,19 @@ class Ants(ABC):
     """
 
     def __init__(
-        self,
-        world: Worlds,
-        n_worlds: int,
-        task: Task,
-        max_steps: int,
-        max_episode_steps: int | None,
-        observation_format: ObservationFormat,
-        evaporation: bool | None,
-        render_mode: str | None,
-        render_modes: Sequence[str],
+        self, n_worlds: int, task: Task, given: Arguments, render_modes: Sequence[str]
     ) -> None:
-        self.task, self.worlds = task, _worlds_of(world, n_worlds)
+        self.task, self.worlds = task, _worlds_of(given.world, n_worlds)
         self.evaporates = task.evaporation_in_training
-        if evaporation is not None:
-            self.evaporates = checked_flag("evaporation", evaporation)
-        if render_mode is not None:
-            check_one_of("render_mode", render_mode, render_modes)
-        self.max_steps = checks.checked_max_steps(max_steps, task)
-        if max_episode_steps is not None:
-            limit = checked_whole("max_episode_steps", max_episode_steps)
+        if given.evaporation is not None:
+            self.evaporates = checked_flag("evaporation", given.evaporation)
+        if given.render_mode is not None:
+            check_one_of("render_mode", given.render_mode, render_modes)
+        self.max_steps = checks.checked_max_steps(given.max_steps, task)
+        if given.max_episode_steps is not None:
+            limit = checked_whole("max_episode_steps", given.max_episode_steps)
             self.max_steps = min(self.max_steps, limit)
-        self.shown = Shown(task.sees, observation_format)
+        self.shown = Shown(task.sees, given.observation_format)
         self._scene: Scene | None = None
 
     @abstractmethod
@@ -89,7 +91,7 @@ class Ants(ABC):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return rewards, float64 (n,), terminations and truncations, bool (n,), as copies.
 
-        `actions` are those of all ants, (n,); `waiting`, bool (W,), are worlds at an episode's end.
+        `actions` are those of all ants, (n,); `waiting`, bool (W,), marks worlds that had ended.
         """
 
     @abstractmethod

@@ -174,7 +174,7 @@ def read_csv(path: PathLike) -> list[dict[str, Any]]:
     except (csv.Error, ValueError) as error:
         if isinstance(error, AntsError):
             raise
-        raise AntsError(f"{named(path)} is not a table; name another file.") from error
+        raise AntsError(f"{named(path)} is not a table (CSV); name another file.") from error
 
 
 def smallest(array: np.ndarray) -> np.ndarray:

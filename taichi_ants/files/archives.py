@@ -134,7 +134,7 @@ class Kind:
         arrays: Mapping[str, np.ndarray],
         compress: bool = True,
     ) -> None:
-        """Write a file."""
+        """Write a file of this kind from facts and arrays; raises as the function `write` does."""
         text = files.to_json({"kind": self.name, "version": self.version, **facts})
         write(path, {**arrays, "facts": np.array(text.encode())}, compress)
 
@@ -142,7 +142,7 @@ class Kind:
     def reading(
         self, path: files.PathLike, content: bytes | None = None
     ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
-        """Yield the arrays and facts of a file of this kind and version, within `building`."""
+        """Yield the arrays and facts of a file; the block raises as that of `building` does."""
         arrays = read(path, content, self.most, self.foreign)
         try:
             text = arrays.pop("facts").item()

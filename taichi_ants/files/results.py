@@ -63,7 +63,7 @@ class ResultFolder:
         if self.path.is_dir() and any(item != self._unfinished for item in self.path.iterdir()):
             raise AntsError(
                 f"{str(self.path)!r} contains files, but no finished results; "
-                "choose another --out, or give --force to write among them."
+                "choose another --out, or give --force to add results to them."
             )
         return False
 
@@ -191,8 +191,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         return manifest
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise AntsError(
-            f"{str(folder / MANIFEST)!r} is damaged or of another version, so the results among "
-            "these files are unknown; choose another --out."
+            f"{str(folder / MANIFEST)!r} is damaged or of another version, so the command cannot "
+            "use this folder; choose another --out."
         ) from error
 
 

@@ -1,4 +1,4 @@
-"""The directions of the grid and the random streams of a seed, shared by every part."""
+"""The directions of the grid and the random streams of a seed, for the whole package."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Geometry of the hexagonal grid, in NumPy alone.
 
-A cell is the class of cube coordinates (x, y, z) equal up to adding (c, c, c). Its normal form has
-minimum 0; its axial form is q = x - z, r = y - z. Arrays of cells have shape (..., 3). The six
+Cube coordinates (x, y, z) and (x + c, y + c, z + c) are the same cell. Its normal form is the one
+with minimum 0; its axial form is q = x - z, r = y - z. Arrays of cells have shape (..., 3). The six
 headings run clockwise, heading 0 points up.
 """
 
@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, array_of
+from taichi_ants.errors import AntsError, array_of, shown
 from taichi_ants.grid.constants import HEADING_STEPS
 
 # Arrays cover the whole grid; at four bytes a cell, this many cells take one gibibyte.
@@ -142,14 +142,19 @@ class AxialGrid:
         beyond = ((qr < 0) | (qr >= (self.width, self.height))).any(axis=-1)
         if beyond.any():
             cell = tuple(np.asarray(cells)[beyond][0].tolist())
-            raise AntsError(f"the cell {cell} is outside a world of ranges {self.ranges}.")
+            raise AntsError(
+                f"the cell {cell} is outside the world; give a cell within its ranges, "
+                f"{self.ranges}."
+            )
         return (qr[..., 1] * self.width + qr[..., 0]).astype(np.int32)
 
     def cells(self, index: object) -> np.ndarray:
         """Return the normal forms, int32 (..., 3), of flat indices (...)."""
         flat = array_of("index", index)
         if flat.dtype.kind not in "iu" or ((flat < 0) | (flat >= self.size)).any():
-            raise AntsError(f"flat indices must be whole numbers from 0 to {self.size - 1}.")
+            raise AntsError(
+                f"index is {shown(index)}; it must be whole numbers from 0 to {self.size - 1}."
+            )
         # int32 throughout saves memory: worlds often have millions of cells.
         r, q = np.divmod(flat.astype(np.int32), np.int32(self.width))
         r -= self.ranges[2]

@@ -30,22 +30,26 @@ class TrainingConfig(Settings, path="training"):
     that the learner exists and has these hyperparameters.
     """
 
-    learner: Annotated[str, Is("name of a learner")]
+    learner: Annotated[
+        str, Is("name of the learner, such as sarsa or q_learning; see docs/learners_reference.md")
+    ]
     # Smaller step sizes could underflow to zero in float32.
-    learning_rate: Annotated[float, Is("learning rate in the first episode", least=1e-37, most=1)]
+    learning_rate: Annotated[float, Is("learning rate of the first episode", least=1e-37, most=1)]
     discount: Annotated[Share, Is("discount factor")]
-    epsilon: Annotated[Share, Is("exploration rate of the first episode")]
-    epsilon_decay: Annotated[Factor, Is("factor on epsilon after each episode")]
-    min_epsilon: Annotated[Share, Is("value below which epsilon does not decay")] = 0.01
-    learning_rate_decay: Annotated[Factor, Is("factor on the learning rate after each episode")] = (
-        1.0
+    epsilon: Annotated[
+        Share, Is("exploration rate (probability of a random action) in the first episode")
+    ]
+    epsilon_decay: Annotated[Factor, Is("factor that multiplies epsilon after each episode")]
+    min_epsilon: Annotated[Share, Is("smallest value to which epsilon decays")] = 0.01
+    learning_rate_decay: Annotated[
+        Factor, Is("factor that multiplies the learning rate after each episode")
+    ] = 1.0
+    min_learning_rate: Annotated[Share, Is("smallest value to which the learning rate decays")] = (
+        0.0
     )
-    min_learning_rate: Annotated[
-        Share, Is("value below which the learning rate does not decay")
-    ] = 0.0
     initial_q: Annotated[
         InitialValue,
-        Is("value of each action before learning; high values make ants try every action"),
+        Is("action values before learning; high values make ants try every action"),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 

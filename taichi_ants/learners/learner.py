@@ -121,6 +121,5 @@ def check_td_error(name: str, td_error: Any, draws_next_action: bool) -> None:
     if looks and not draws_next_action:
         raise AntsError(
             f"the TD error of {shown(name)} uses {next_action}, but no next action is drawn; give "
-            "draws_next_action=True, unless the learner plans (updates from a model have no next "
-            "action)."
+            "draws_next_action=True or, if the learner plans, compute the error without it."
         )

@@ -14,9 +14,11 @@ from taichi_ants.task.constants import ROW
 
 @dataclass(frozen=True)
 class Steps(Hyperparameters):
-    """The hyperparameter of n-step SARSA; targets end with the episode."""
+    """The hyperparameter of n-step SARSA; targets near the end of an episode have fewer rewards."""
 
-    n_steps: Annotated[int, Is("number of rewards in a target", least=1, most=64)] = 4
+    n_steps: Annotated[
+        int, Is("number of rewards in the target of an update", least=1, most=64)
+    ] = 4
 
 
 @ti.func

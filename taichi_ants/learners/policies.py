@@ -237,7 +237,7 @@ def finite(what: str, values: np.ndarray) -> np.ndarray:
     if not np.isfinite(tables).all():
         *_, state, action = where = np.argwhere(~np.isfinite(tables))[0]
         raise AntsError(
-            f"{what} {tables[tuple(where)]} for state {state} and action {action}; values must be "
-            "finite, so give actions to avoid a low value."
+            f"{what} {tables[tuple(where)]} for state {state} and action {action}; it must be "
+            "finite, so use a low number instead of -inf."
         )
     return tables

@@ -16,7 +16,8 @@ class Sweeping(model.Planning):
     """The hyperparameters of prioritized sweeping."""
 
     threshold: Annotated[
-        float, Is("absolute error up to which a pair is not updated", least=0, most=1e9)
+        float,
+        Is("absolute TD error above which planning updates a state-action pair", least=0, most=1e9),
     ] = 0.0001
 
 

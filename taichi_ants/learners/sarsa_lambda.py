@@ -16,8 +16,10 @@ from taichi_ants.task.constants import ROW
 class Traces(Hyperparameters):
     """The hyperparameters of SARSA(lambda); a new trace replaces the oldest if there is no room."""
 
-    trace_decay: Annotated[float, Is("lambda, factor on traces per step", least=0, most=1)] = 0.9
-    trace_length: Annotated[int, Is("largest number of traces", least=1, most=256)] = 32
+    trace_decay: Annotated[
+        float, Is("lambda: factor on traces per step, in addition to the discount", least=0, most=1)
+    ] = 0.9
+    trace_length: Annotated[int, Is("largest number of eligibility traces", least=1, most=256)] = 32
 
 
 @ti.func

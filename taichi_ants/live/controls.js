@@ -2,7 +2,7 @@
 
 const SLIDERS = {
   ants: "Ants", evaporation: "Trails evaporate", half_life: "Half-life of trails", diffusion: "Diffusion",
-  deposit: "Deposit", cap: "Largest trail level", slope: "Slope of trails", epsilon: "Epsilon", learning_rate: "Learning rate",
+  deposit: "Deposit", cap: "Largest trail level", slope: "Slope of trails", epsilon: "Exploration rate (epsilon)", learning_rate: "Learning rate",
 };
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const WORKS = { page: "page", gif: "GIF" };
@@ -100,8 +100,8 @@ class Controls {
       byId("world-name").innerHTML = options(Object.entries(choices.worlds));
       byId("task").innerHTML = options([...Object.entries(choices.tasks).map(([name, { words }]) => [name, words]), ["", "other settings"]]);
       byId("settings").innerHTML = this.fields();
-      byId("policy").innerHTML = `<optgroup label="Learn now">${options(Object.entries(choices.learners).map(([name, { words }]) => [`learn ${name}`, words]))}</optgroup>
-        <optgroup label="Follow a policy">${options([["by hand", "the trail-following policy"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, name.replaceAll("_", " ")])])}</optgroup>`;
+      byId("policy").innerHTML = `<optgroup label="Learn">${options(Object.entries(choices.learners).map(([name, { words }]) => [`learn ${name}`, words]))}</optgroup>
+        <optgroup label="Follow a fixed policy">${options([["by hand", "trail following"], ...Object.keys(choices.policies).map((name) => [`file ${name}`, name.replaceAll("_", " ")])])}</optgroup>`;
       byId("ants").max = choices.most.ants;
       [byId("size").min, byId("size").max] = choices.sizes;
       byId("map").value = MAP;
@@ -154,7 +154,7 @@ class Controls {
       }
     }
     for (const group of document.querySelectorAll("#settings fieldset")) group.hidden = !group.querySelector("label:not([hidden])");
-    const follows = policy === "by hand" ? "The ants follow the trail, with action values set by hand." : `The ants follow ${name}, and do not learn.`;
+    const follows = policy === "by hand" ? "The ants follow trails by a fixed rule, and do not learn." : `The ants follow ${name}, and do not learn.`;
     byId("policy-help").textContent = policy.startsWith("learn ") ? `The ants learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
   }
 
@@ -188,7 +188,7 @@ class Controls {
           : `<input type="number" ${about} step="${step}" min="${one.least ?? one.above ?? ""}" max="${one.most ?? ""}" ${one.optional ? 'placeholder="none"' : "required"}>`;
       html[group] = (html[group] ?? "") + `<label class="setting" title="${safe(one.help + (one.unit ? `, in ${one.unit}` : ""))}">${input} ${words}</label>`;
     });
-    return Object.entries(html).map(([group, inner]) => `<fieldset><legend>${safe(group.replaceAll("_", " "))}</legend>${inner}</fieldset>`).join("");
+    return Object.entries(html).map(([group, inner]) => `<fieldset><legend>${safe(group.split(".").at(-1).replace(/^./, (letter) => letter.toUpperCase()))}</legend>${inner}</fieldset>`).join("");
   }
 
   /* The values of the form by path, without hidden and empty fields. */
@@ -270,7 +270,7 @@ class Controls {
       }
     }
     this.live.viewer?.timeline.showSpeed();
-    byId("watchers").innerHTML = pages > 1 ? `${pages} pages<span> are watching</span>` : "";
+    byId("watchers").innerHTML = pages > 1 ? `${pages} pages<span> show this session</span>` : "";
   }
 
   /* Show the rates, which decay per episode, of the drawn frame. */
@@ -294,7 +294,7 @@ class Controls {
     for (const { kind, done, total } of works) {
       if (!this.works.has(kind)) this.addWork(kind, box);
       const part = this.works.get(kind), number = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
-      const words = kind === "kernels" ? "Preparing the kernels" : kind === "load" ? "Replaying" : `Making the ${WORKS[kind]}:`, bar = part.querySelector("progress");
+      const words = kind === "kernels" ? "Compiling the simulation" : kind === "load" ? "Replaying" : `Making the ${WORKS[kind]}:`, bar = part.querySelector("progress");
       part.querySelector("span").textContent = done ? `${words} ${number(done)} of ${number(total)} ticks` : `${words.replace(":", "")} …`;
       if (done) Object.assign(bar, { value: done, max: total });
       else bar.removeAttribute("value");
@@ -313,7 +313,7 @@ class Controls {
 
   addWork(kind, box) {
     const part = document.createElement("div");
-    part.innerHTML = `<span></span><progress aria-label="${{ load: "Replaying", kernels: "Preparing the kernels" }[kind] ?? WORKS[kind]}"></progress>`
+    part.innerHTML = `<span></span><progress aria-label="${{ load: "Replaying", kernels: "Compiling the simulation" }[kind] ?? WORKS[kind]}"></progress>`
       + (kind === "kernels" ? "" : '<button type="button" class="text-button">Cancel</button>');
     part.querySelector("button")?.addEventListener("click", () => this.live.ask("cancel", { kind }));
     box.append(part);

@@ -106,8 +106,8 @@ def checked(edit: object, interventions: Interventions) -> Edit:
     wanted, given = {"kind", *_FIELDS[kind]}, set(edit)
     if given != wanted:
         raise AntsError(
-            f"an edit of kind {kind!r} has {shown(sorted(map(str, given)))}; it must have "
-            f"{', '.join(sorted(wanted))}."
+            f"an edit of kind {kind!r} has the fields {shown(sorted(map(str, given)))}; it must "
+            f"have exactly {', '.join(sorted(wanted))}."
         )
     fields = {name: _checked(name, edit, interventions) for name in _FIELDS[kind]}
     return {"kind": kind, **fields}

@@ -177,4 +177,4 @@ def uploaded(content: bytes) -> Log:
 
 def _of_page(fault: object) -> str:
     what = str(fault).partition("; ")[0].rstrip(".").replace("'the loaded file'", "the loaded file")
-    return f"{what}; load a session that Save has made."
+    return f"{what}; load a file that Save session has written."

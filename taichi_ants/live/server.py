@@ -115,7 +115,7 @@ class Page:
             self.tell(frame)
 
     def has_seen(self, frames: int) -> bool:
-        """Return whether the page is behind and, with these frames, has drawn everything sent."""
+        """Return whether the page was behind and, with these frames, has drawn everything."""
         self.unseen = max(0, self.unseen - frames)
         return self.behind and self.unseen == 0
 
@@ -339,7 +339,9 @@ class Room:
                 self._works[LOAD] = Undoing(self.session)
             case "back":  # return to the session before the present one
                 if self._former is None:
-                    raise AntsError("there is no session before this one.")
+                    raise AntsError(
+                        "there is no session before this one to return to; continue with this one."
+                    )
                 self._begin(self._former, comes_back=True)
             case "begin":  # {"chosen": see `Choices.setup`}
                 self._begin(Session(self.choices.setup(request.get("chosen"))))

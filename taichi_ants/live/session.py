@@ -29,7 +29,7 @@ MOST_TICKS = 1_000_000_000
 MOST_EDITS = 10_000
 MOST_CELLS = 400_000  # cells in all edits together
 # Sessions within these limits fit into `most`, so reading a file takes little time and memory.
-_WRITER = "Session.save, or Save on its page,"
+_WRITER = "Session.save, or Save session on its page,"
 KIND = Kind("session", 3, _WRITER, most=5_000_000, most_lists=100_000)
 _PIECE = 0.02  # seconds of a piece of a replay
 _BETWEEN = 0.1  # seconds of simulation between snapshots, the longest replay of an undo
@@ -315,7 +315,7 @@ class Session:
         return one == two and self.interventions.state() == other.interventions.state()
 
     def undone(self) -> Iterator[Session]:
-        """Return a replay up to the last change, from the last snapshot; it yields as `replay`.
+        """Return an iterator like `replay` that ends before the last change; it uses a snapshot.
 
         This session does not change. AntsError if it has no changes.
         """
@@ -383,7 +383,7 @@ class Session:
     def colony_bytes(self) -> bytes:
         """Return the bytes of a file from which `Colony.load` resumes the colony.
 
-        Its later episodes begin with as many ants as this one, as those of the session do.
+        Its later episodes begin with the present number of ants, as in the session.
         """
         self.colony.worlds = (self.interventions.world(),)
         return bytes_of("colony.npz", self.colony.save)

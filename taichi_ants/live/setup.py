@@ -69,7 +69,8 @@ class Setup:
             settings = json.loads(files.to_json(dict(self.world_settings)))
         except (TypeError, ValueError, RecursionError):
             raise AntsError(
-                f"world_settings is {shown(self.world_settings)}; it must be JSON-compatible."
+                f"world_settings is {shown(self.world_settings)}; use only numbers, text, lists, "
+                "mappings, True, False and None."
             ) from None
         object.__setattr__(self, "world_settings", settings)
 
@@ -120,7 +121,7 @@ class Setup:
         return Colony(self.build_world(), self.task, training, self.seed, **options)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the setup, JSON-compatible; a policy of action values is only "table"."""
+        """Return the setup, JSON-compatible; a table of action values becomes the word "table"."""
         facts = {one.name: getattr(self, one.name) for one in fields(self)}
         policy = self.policy.as_dict() if isinstance(self.policy, TrainingConfig) else "table"
         settings = dict(self.world_settings)
@@ -136,7 +137,9 @@ class Setup:
         assert isinstance(facts, Mapping)
         known = [one.name for one in fields(cls)]
         for name in facts.keys() - known:
-            raise AntsError(f"a setup has no {shown(name)}; it has only {', '.join(known)}.")
+            raise AntsError(
+                f"{shown(name)} is not a field of a setup; choose one of {', '.join(known)}."
+            )
         policy: Any = facts.get("policy")
         try:
             policy = TrainingConfig(**policy) if policy != "table" or table is None else table

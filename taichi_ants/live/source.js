@@ -124,18 +124,20 @@ class Live {
     Object.assign(this, { session, choices, chosen, begins: header });
   }
 
-  /* The HTML of a page that plays the history, with only the viewer's scripts. */
+  /* The HTML of a page that plays the history, with only the viewer's scripts. Its policy allows
+     this script by its hash, like the policies of other pages, see viewer/page.py. */
   async recording() {
     const { history } = this.viewer, page = new DOMParser().parseFromString(PAGE, "text/html");
     const reader = new FileReader(), script = page.querySelector("script:not([type])");
     reader.readAsDataURL(await history.packed());
     await new Promise((done) => reader.addEventListener("load", done));
-    for (const part of page.querySelectorAll(".controls, .palette, .notices, meta[http-equiv]")) part.remove();
-    page.querySelector("[name=color-scheme]").insertAdjacentHTML("afterend", '<meta http-equiv="Content-Security-Policy"'
-      + ` content="default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:">`);
+    for (const part of page.querySelectorAll(".controls, .palette, .notices")) part.remove();
     page.title = history.header.title;
     page.querySelector("#recording").textContent = reader.result.split(",")[1];
     script.textContent = script.textContent.slice(0, script.textContent.indexOf(LIVE_SCRIPT));
+    const policy = page.querySelector("meta[http-equiv]"), text = new TextEncoder().encode(script.textContent);
+    const digest = btoa(String.fromCharCode(...new Uint8Array(await crypto.subtle.digest("SHA-256", text))));
+    policy.content = policy.content.replace(/script-src [^;]+/, `script-src 'sha256-${digest}'`).replace(/; connect-src.*/, "");
     return new Blob([`<!doctype html>\n${page.documentElement.outerHTML}`]).arrayBuffer();
   }
 

@@ -1,7 +1,7 @@
 /* Tools for mouse, touch and keys: look, draw, erase, move the queen. */
 
 const TOOLS = {
-  look: ["Look", "follow an ant, choose a cell, move the view", '<path d="M4.5 3 15 9.2l-4.7 1.1L8 15z"/>'],
+  look: ["Look", "follow an ant, select a cell, move the view", '<path d="M4.5 3 15 9.2l-4.7 1.1L8 15z"/>'],
   rock: ["Rock", "draw rock; ants in the way move aside", '<path class="fill-rock" d="M16.5 10l-3.2 5.6H6.7L3.5 10l3.2-5.6h6.6z"/>'],
   food: ["Food", "draw food; ants in the way move aside", '<g class="fill-food"><circle cx="10" cy="6.4" r="2.9"/><circle cx="6.6" cy="12.6" r="2.9"/><circle cx="13.4" cy="12.6" r="2.9"/></g>'],
   trail: ["Trail", "draw a trail", '<path class="line-trail" d="M3.5 15.5c5 0 1.5-7 6.5-7s2 6 6.5-4"/>'],
@@ -24,7 +24,7 @@ class Tools {
     bar.innerHTML = Object.entries(TOOLS).map(([name, [label, does, drawing]], number) =>
       `<button type="button" class="icon" data-tool="${name}" aria-pressed="false" aria-label="${label}: ${does}" title="${label}: ${does} (${number + 1})">
         <svg viewBox="0 0 20 20" aria-hidden="true">${drawing}</svg><span>${label}</span></button>`).join("")
-      + `<button type="button" class="icon" id="undo" disabled title="Undo: back to the moment before the last change (Ctrl+Z)">
+      + `<button type="button" class="icon" id="undo" disabled title="Undo: return to the moment before the last change (Ctrl+Z)">
         <svg viewBox="0 0 20 20" aria-hidden="true"><path d="M7.5 4.5 4 8l3.5 3.5M4.4 8h7.1a4.2 4.2 0 0 1 0 8.4H8"/></svg><span>Undo</span></button>`
       + `<label class="brush" title="Brush size ([ and ])"><span class="unseen">Brush size</span>
         <input type="range" id="brush" min="1" max="${MOST_RADIUS + 1}" value="1" step="1"></label>`;
@@ -37,7 +37,7 @@ class Tools {
     live.acts = { "[": () => this.setRadius(this.radius - 1), "]": () => this.setRadius(this.radius + 1) };
     Object.keys(TOOLS).forEach((name, number) => (live.acts[number + 1] = () => this.choose(name)));
     live.keys = [
-      ["1 2 3 4 5 6 7", Object.values(TOOLS).map(([label]) => label.toLowerCase()).join(", ")],
+      ["1 2 3 4 5 6 7", `choose a tool: ${Object.values(TOOLS).map(([label]) => label.toLowerCase()).join(", ")}`],
       ["[ ]", "smaller or larger brush"], ["Enter", "use the tool at the cell cursor"],
       ["Ctrl+Z", "undo the last change"],
     ];

@@ -93,8 +93,12 @@ class Dataset(Record):
                     f"must be from 0 to {size - 1}."
                 )
         chance = self.behaviour_probability
-        if not ((np.isnan(chance)) | ((chance > 0) & (chance <= 1))).all():
-            raise AntsError("behaviour_probability of a data set must be above 0 and at most 1.")
+        wrong = ~(np.isnan(chance) | ((chance > 0) & (chance <= 1)))
+        if wrong.any():
+            raise AntsError(
+                f"a behaviour_probability of a data set is {chance[wrong][0]:g}; it must be above "
+                "0 and at most 1, or nan if it is unknown."
+            )
         self._check_episodes()
 
     def _check_episodes(self) -> None:

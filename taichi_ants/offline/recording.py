@@ -113,7 +113,7 @@ def record_colony(
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
     checks.check_progress(progress)
     if len(dict.fromkeys(colony.worlds)) > 1:
-        raise AntsError("the colony has different worlds; record a separate colony for each world.")
+        raise AntsError("the worlds of the colony differ; record a separate colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}
     facts["training"] = colony.training.as_dict()
     pieces = []

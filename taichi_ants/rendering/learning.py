@@ -53,7 +53,7 @@ class Checkpoint:
         return f"after {count(self.episodes, 'episode')}" if self.episodes else "before learning"
 
     def account(self) -> np.ndarray:
-        """Return the reward earned up to each snapshot by source, int (len(episode), 5)."""
+        """Return the reward earned up to each snapshot, by `_SOURCES`, int (len(episode), 5)."""
         trace, events = self.episode.trace, self.episode.trace.events
         gave, took = events == Event.DELIVERED, events == Event.PICKED_UP
         failed = (events == Event.FAILED) | (events == Event.BLOCKED)
@@ -139,7 +139,9 @@ def _checked(
     task = checks.checked_task(Task() if task is None else task)
     listed = entries_of(checkpoints)
     if listed is None:
-        raise AntsError(f"checkpoints is {shown(checkpoints)}; it must be numbers of episodes.")
+        raise AntsError(
+            f"checkpoints is {shown(checkpoints)}; it must be a list of numbers of episodes."
+        )
     checkpoints = [whole("a checkpoint", checkpoint) for checkpoint in listed]
     if not checkpoints or checkpoints != sorted(set(checkpoints)) or checkpoints[0] < 0:
         raise AntsError(
@@ -168,9 +170,12 @@ def learning_frames(
     expect("checkpoints", checkpoints, list, tuple)
     for checkpoint in checkpoints:
         expect("a checkpoint", checkpoint, Checkpoint)
-    if len({checkpoint.episode.made.world for checkpoint in checkpoints}) != 1:
+    if not checkpoints:
+        raise AntsError("checkpoints is empty; give at least one checkpoint.")
+    worlds = len({checkpoint.episode.made.world for checkpoint in checkpoints})
+    if worlds > 1:
         raise AntsError(
-            "checkpoints is empty or mixes several worlds; give checkpoints of one world."
+            f"checkpoints has episodes in {worlds} worlds; give checkpoints of one world."
         )
     width, height = check_size(size)
     expect("title", title, str)

@@ -103,7 +103,7 @@ def line(p, x0, y0, x1, y1):
 
 @ti.func
 def hexagon(p):
-    """A flat-topped hexagon with corners on the unit circle."""
+    """Return the distance to a flat-topped hexagon with corners on the unit circle."""
     half_height = 0.8660254
     slanted = ti.abs(p.x) * half_height + ti.abs(p.y) * 0.5
     return ti.max(slanted, ti.abs(p.y)) - half_height
@@ -111,7 +111,7 @@ def hexagon(p):
 
 @ti.func
 def ant_body(p):
-    """Head, thorax and abdomen of an ant."""
+    """Return the distance to the head, thorax and abdomen of an ant."""
     head = ellipse(p, -0.37, 0.19, 0.17)
     thorax = ellipse(p, -0.06, 0.13, 0.20)
     abdomen = ellipse(p, 0.45, 0.27, 0.39)
@@ -120,7 +120,7 @@ def ant_body(p):
 
 @ti.func
 def ant_limbs(p):
-    """Six legs and two antennae, as lines without width."""
+    """Return the distance to six legs and two antennae, which are lines without width."""
     q = vec2(ti.abs(p.x), p.y)
     front = ti.min(line(q, 0.08, -0.16, 0.42, -0.34), line(q, 0.42, -0.34, 0.56, -0.66))
     middle = ti.min(line(q, 0.08, -0.06, 0.48, -0.02), line(q, 0.48, -0.02, 0.74, 0.20))
@@ -131,7 +131,7 @@ def ant_limbs(p):
 
 @ti.func
 def dart(p):
-    """A dart, the shape of ants in small cells."""
+    """Return the distance to a dart, the shape of ants in small cells."""
     q = vec2(ti.abs(p.x), p.y)
     side = q.dot(vec2(0.932, -0.362)) - 0.326  # from the tip (0, -0.9) to (0.67, 0.824)
     back = q.dot(vec2(-0.336, 0.942)) - 0.551  # from there to the notch (0, 0.585)
@@ -140,14 +140,14 @@ def dart(p):
 
 @ti.func
 def crumbs(p):
-    """Food: three crumbs."""
+    """Return the distance to three crumbs, the shape of food."""
     q = vec2(ti.abs(p.x), p.y)
     return ti.min(disc(p, 0.0, -0.36, 0.36), disc(q, 0.40, 0.30, 0.36))
 
 
 @ti.func
 def crown(p):
-    """The queen: a crown with three points, each with a bead."""
+    """Return the distance to the queen's crown, whose three points have a bead each."""
     q = vec2(ti.abs(p.x), p.y)
     # The right half, from the middle point (0, -0.5) down to (0.32, -0.02), up to (0.8, -0.28).
     top = ti.min(q.dot(vec2(0.832, -0.555)) - 0.277, q.dot(vec2(-0.476, -0.879)) + 0.135)
@@ -158,7 +158,7 @@ def crown(p):
 
 @ti.func
 def arrow(p):
-    """An arrow that points up."""
+    """Return the distance to an arrow that points up."""
     q = vec2(ti.abs(p.x), p.y)
     head = ti.max(q.dot(vec2(0.857, -0.515)) - 0.489, p.y - 0.05)
     shaft = ti.max(q.x - 0.2, ti.abs(p.y - 0.45) - 0.5)

@@ -70,7 +70,7 @@ def marks(
 
 
 def thing(places: npt.ArrayLike, hexagon: float, mark: Mark) -> np.ndarray:
-    """Return marks of food or queens in cells of the size `hexagon`."""
+    """Return marks of food or queens; cells have the radius `hexagon`, in pixels."""
     return marks(places, 0.72 * hexagon, mark, _COLOURS[mark])
 
 
@@ -94,7 +94,7 @@ def ants(
     radius: float | None = None,
     opacity: float = 1.0,
 ) -> np.ndarray:
-    """Return marks of ants (n,) in cells of the size `hexagon`, or of another radius in pixels."""
+    """Return marks of ants (n,) with `radius`; None means one for cells of the radius `hexagon`."""
     if hexagon < _DOTS_BELOW:
         colour = np.where(carries, _DOT_WITH_FOOD, colours.ANT)
         return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)

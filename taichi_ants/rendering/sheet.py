@@ -63,7 +63,7 @@ def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
 def clarity(values: np.ndarray, spread: float) -> float:
     """Return the gap between the two best action values as a share of the usual spread, 0 to 1.
 
-    As a share of the state's own values, every small gap would look like a clear choice.
+    Relative to the state's own values, every small gap would look like a clear choice.
     """
     *_, second, best = np.sort(values.astype(np.float64)).tolist()
     return min(1.0, (best - second) / spread)
@@ -72,7 +72,7 @@ def clarity(values: np.ndarray, spread: float) -> float:
 def learned(values: np.ndarray, spread: float) -> bool:
     """Return whether action values (5,) differ by 1 % of the table's `usual_spread` or more.
 
-    Below, the best action may just be the one that was tried least.
+    If they differ by less, the best action may just be the one that was tried least.
     """
     gap = float(np.ptp(values.astype(np.float64)))
     return gap > 0 and gap >= _HARDLY * spread

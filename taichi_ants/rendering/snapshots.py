@@ -63,7 +63,7 @@ def frames(
 
 @dataclass(frozen=True, eq=False)
 class Episode:
-    """Rollout 0 of a seed."""
+    """An episode in which an ant follows a policy: rollout 0 of a seed."""
 
     trace: Trace
     name: str  # in the panel
@@ -86,7 +86,7 @@ class Episode:
 
     @property
     def made(self) -> Made:
-        """World, task, policy and seed."""
+        """The world, task, policy and seed of the episode."""
         assert self.trace.made is not None  # `rollout` sets it
         return self.trace.made
 

@@ -169,16 +169,17 @@ def _checked(
     except TypeError:
         raise AntsError(f"frames is {shown(frames)}; it must be an iterable of arrays.") from None
     shape = None
-    for frame in coming:
+    for number, frame in enumerate(coming):
         _check_frame(frame, sides)
         shape = shape or frame.shape
         if frame.shape != shape:
             raise AntsError(
-                f"a frame has shape {frame.shape}, but the first has {shape}; all must be equal."
+                f"frame {number} has shape {frame.shape}, but frame 0 has {shape}; give all frames "
+                "the same shape."
             )
         yield frame
     if shape is None:
-        raise AntsError("there are no frames; an animation needs at least one.")
+        raise AntsError("frames is empty; give at least one frame.")
     for _ in range(more):
         yield frame
 

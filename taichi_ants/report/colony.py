@@ -44,7 +44,7 @@ def colony_page(
     seeds = seeds_in_words(rows[0].seeds)
     return fill(
         "colony.html",
-        title="When does a colony do more than its ants?",
+        title="Which rules and which training make a colony deliver more?",
         byline=f"{seeds}, {count(len(rows), 'condition')}, "
         f"{count(len(world_kinds), 'kind')} of world",
         seeds=seeds,

@@ -82,7 +82,7 @@ def what_is_seen(
             "rate / discount / epsilon / decay)"
         )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
-        words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Here: {whose}."
+        words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
         recording = play(record_episode, played(point, policy.q_values, seed), BEHAVIOURS[code])
         recorded.append((sentence(BEHAVIOURS[code]), words, recording))
         if code == DELIVERS:
@@ -112,7 +112,7 @@ def comparison_page(
     seeds = len(comparison.seeds)
     return fill(
         "comparison.html",
-        title="Which learner makes the better ant?",
+        title="Which learner trains the best ant?",
         byline=f"{count(seeds, 'seed')}, {count(len(comparison.rows), 'configuration')}, "
         f"{thousands(comparison.behaviours.size * comparison.episodes)} episodes of training, "
         f"world: {comparison.world}",

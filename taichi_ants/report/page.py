@@ -109,11 +109,11 @@ class Shown(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The effect and its interval; also those by the mean if its verdict differs."""
+        """The effect and its interval as text, also by the mean if that gives another verdict."""
         words, by_mean = _measured(self.finding, self.label, self.unit), self.finding.by_mean
         if by_mean and by_mean.verdict is not self.finding.verdict:
             told = _measured(by_mean, by_mean.contrast.label, self.unit)  # its contrast may differ
-            words += f"; by the mean {by_mean.verdict.value}: {told}"
+            words += f". With the mean instead of the IQM, {by_mean.verdict.value}: {told}"
         return words
 
     @property
@@ -186,8 +186,8 @@ def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
 class Statement(NamedTuple):
     """A row of a table that readers can sort and filter.
 
-    `place` is the second column: the section of the paper, or the world. `verdicts` has one for
-    each further column. Facts and findings are shown on demand.
+    `place` is the second column: the section of the paper, or the world. `verdicts` has the
+    verdict in each further column. Facts and findings are shown on demand.
     """
 
     text: str
@@ -205,7 +205,7 @@ KINDS = (
 
 
 class Statements(NamedTuple):
-    """A table of statements with a header for each column; `noun` is their name in the text."""
+    """A table of statements with a header for each column; `noun` is the word for them."""
 
     headers: Sequence[str]
     lines: Sequence[Statement]

@@ -97,7 +97,7 @@ def do_comparison(
 
 
 def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
-    """Compile and import all that a worker process needs to record and draw, before it has to."""
+    """Compile and import all that a worker process needs to record and draw, in advance."""
     load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
@@ -122,7 +122,7 @@ def measured(
         for point in {point.training.learner: point for point in study.points}.values():
             short = replace(point, episodes=1, max_steps=1, rollouts=1)
             reduce((short,), (0,), short.do((short,), (0,), None, lambda share: None, where))
-        return study.reduced(folder, reduce, **where, progress=progress)
+        return study.reduced(folder, reduce, progress, **where)
 
 
 def what_policies_do(point: RunPoint, seeds: Sequence[int], q_values: np.ndarray) -> Outcome:

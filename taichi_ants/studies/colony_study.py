@@ -70,7 +70,7 @@ def plan(
 ) -> Plan:
     """Return the conditions of some kinds of world, which are names in `WORLDS`.
 
-    `sizes` ascend; in worlds other than those of the training, there are as many ants as the last.
+    `sizes` are ascending; ants that act in another kind of world than they train in have the last.
     Epsilon decays to `EVALUATION_EPSILON` and the learning rate to a tenth in the first 70 % of the
     training episodes.
 

@@ -20,6 +20,14 @@ if TYPE_CHECKING:
     from taichi_ants import World
 
 EXIT_BAD_INPUT = 2
+# Help for options that several commands have.
+PLUGIN = "Python file that registers learners, observations or worlds"
+THREADS = "number of CPU threads (default: all)"
+# Names of worlds, because an import of their registry would import NumPy.
+WORLDS = (
+    "paper, open, far_piles, double_bridge, or the path of a map file; --world.SETTING changes a "
+    "setting of the world"
+)
 AGAIN = "Stopped; finished parts are saved. Run the same command again to resume."
 
 
@@ -46,7 +54,7 @@ class Parser(argparse.ArgumentParser):
     `about` is a module's docstring, whose first line is the description, or None (`python -OO`).
     """
 
-    open_settings: tuple[str, ...] = ()  # for example "world": accept any option --world.NAME
+    open_settings: tuple[str, ...] = ()  # for example "world": accept any option --world.SETTING
     own_settings: Container[str] = ()  # full names of settings that the command determines itself
     program: str | None = None  # the name in --help; None: the name of the script
 
@@ -67,7 +75,9 @@ class Parser(argparse.ArgumentParser):
         words = sys.argv[1:] if args is None else list(args)
         for before, word in zip(["", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
-                self.error(f"{word or before or 'the first argument'} is empty; leave it out")
+                after = f"the argument after {before!r}" if before else "the first argument"
+                name = word[:-1] or (before if before.startswith("--") else after)
+                self.error(f"{name} is empty; give a value or leave it out")
             self._add_setting(word.partition("=")[0])
         return super().parse_known_args(words, namespace)
 
@@ -89,9 +99,10 @@ class Parser(argparse.ArgumentParser):
 def add_common(parser: argparse.ArgumentParser) -> None:
     """Add the options of all commands that compute something."""
     add = parser.add_argument
-    add("--plugin", metavar="FILE", help="load learners, observations or worlds (.py)")
-    add("--threads", type=whole_number(1, 1024), metavar="N", help="CPU threads (default: all)")
-    add("--arch", choices=("cpu", "cuda"), default="cpu", help="run kernels on this processor")
+    add("--plugin", metavar="FILE", help=PLUGIN)
+    add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
+    arch = "processor of the simulation: cpu, or cuda for an NVIDIA GPU"
+    add("--arch", choices=("cpu", "cuda"), default="cpu", help=arch)
 
 
 def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) -> None:
@@ -99,7 +110,7 @@ def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) 
     add, place = parser.add_argument, f"results/{name}"
     default = f"{place}, with --quick {place}-quick" if quick else place
     add("--out", type=Path, metavar="FOLDER", help=f"write the results here (default: {default})")
-    add("--force", action="store_true", help="replace the results in FOLDER")
+    add("--force", action="store_true", help="replace finished results in FOLDER")
     add("--no-figures", action="store_true", help="skip figures and animations")
 
 
@@ -121,13 +132,6 @@ def whole_number(least: int | None = None, most: int | None = None) -> Callable[
 
     parse.__name__ = "whole number"  # for argparse's message about other text
     return parse
-
-
-# Help for --world. It lists names, because an import of the registry would import NumPy.
-WORLDS = (
-    "paper, open, far_piles, double_bridge, or the path of a map file; --world.NAME changes a "
-    "setting of the world"
-)
 
 
 def add_settings(parser: Parser, base: Settings) -> None:
@@ -162,7 +166,7 @@ def given_settings(settings: argparse.Namespace) -> dict[str, Any]:
 
 
 def given_world(settings: argparse.Namespace) -> World:
-    """Return the world of `--world` with the settings of `--world.NAME` options."""
+    """Return the world of `--world` with the settings of `--world.SETTING` options."""
     from taichi_ants import worlds
 
     given = given_settings(settings).get("world", {})

@@ -60,7 +60,10 @@ def stoppable(message: str = "Stopped.") -> Iterator[None]:
 
 @contextmanager
 def held() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns whether a signal came; delay up to two to the block's end."""
+    """Yield a function that returns whether a signal has come.
+
+    Up to two signals take effect only after the block; the third one takes effect at once.
+    """
     global _holds
     _holds = True
     try:

@@ -39,7 +39,7 @@ class Totals(NamedTuple):
 
 
 class Span(NamedTuple):
-    """A row of the file with a figure's numbers: the time between two totals."""
+    """A row of the .csv file of a figure: the ticks between two totals."""
 
     from_tick: int
     to_tick: int

@@ -36,7 +36,7 @@ def work_or_show(
     Args:
         settings: The command's `out`, `force`, `no_figures`, `plugin` and `arch`.
         determines: Everything else that determines the results.
-        work: A function of a folder for blocks and one for the results; it writes the report.
+        work: A function of two folders, for blocks and for results; it writes the report.
         leading: The argument of `ResultFolder`, whose errors are raised.
         page: A function that makes the page; a missing page is made again.
     """

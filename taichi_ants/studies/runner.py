@@ -149,7 +149,7 @@ class FixedPolicy:
 
 @dataclass(frozen=True)
 class ColonyPoint:
-    """A colony that learns, and is then evaluated without learning, with the minimum of epsilon.
+    """A colony that learns, and is then evaluated without learning, with its lowest epsilon.
 
     Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
     integer (seeds, rollouts), as in `ColonyEpisodes`; `q_values`, float32 (seeds, n_states, 5), if
@@ -362,23 +362,18 @@ class Study(Generic[PointKind]):
         return settings_of(self.points, self.seeds)
 
     def run(
-        self,
-        folder: Path,
-        threads: int | None = None,
-        arch: str | None = None,
-        progress: Progress = lambda share: None,
+        self, folder: Path, progress: Progress = lambda share: None, **where: Any
     ) -> dict[PointKind, Outcome]:
         """Return all outcomes; arguments and errors are those of `in_blocks`."""
-        order, done = self.in_order, self.in_blocks(folder, threads, arch, progress)
+        order, done = self.in_order, self.in_blocks(folder, progress, **where)
         return {order[place]: outcome for place, outcome in self._joined(done, range(len(order)))}
 
     def reduced(
         self,
         folder: Path,
         reduce: Callable[[Sequence[PointKind], Sequence[int], Outcome], Outcome],
-        threads: int | None = None,
-        arch: str | None = None,
         progress: Progress = lambda share: None,
+        **where: Any,
     ) -> dict[str, np.ndarray]:
         """Return numbers of each run, arrays (points, seeds) by name, without keeping outcomes.
 
@@ -387,7 +382,7 @@ class Study(Generic[PointKind]):
         """
         order = self.in_order
         found: dict[str, np.ndarray] = {}
-        for some, at, outcome in self.in_blocks(folder, threads, arch, progress):
+        for some, at, outcome in self.in_blocks(folder, progress, **where):
             for name, array in reduce(order[some], self.seeds[at], outcome).items():
                 shape = len(order), len(self.seeds)
                 found.setdefault(name, np.empty(shape, array.dtype))[some, at] = array
@@ -397,18 +392,14 @@ class Study(Generic[PointKind]):
         return {name: array[[place[one] for one in self.points]] for name, array in found.items()}
 
     def in_blocks(
-        self,
-        folder: Path,
-        threads: int | None = None,
-        arch: str | None = None,
-        progress: Progress = lambda share: None,
+        self, folder: Path, progress: Progress = lambda share: None, **where: Any
     ) -> Iterator[Block]:
         """Yield all blocks; compute and save those that the folder lacks.
 
         Args:
             folder: The folder of finished blocks of this study.
-            threads, arch: The arguments of `train`.
             progress: A function that is called with the finished share of the work.
+            where: The arguments `threads` and `arch` of `train`.
 
         Raises:
             AntsError: The disk is too small for all blocks, or an argument is not allowed.
@@ -430,7 +421,6 @@ class Study(Generic[PointKind]):
             learned = np.concatenate(tables[first.after])[at] if first.after else None
             share = first.weight * runs / total
             part = _part(progress, begun, share)
-            where = {"threads": threads, "arch": arch}
             do: Any = partial(first.do, points, seeds, learned, part, where)
             outcome = kept(_path(folder, number), settings_of(points, seeds), do)
             if first in befores:

@@ -118,10 +118,8 @@ class Sweep:
         own |= {"every": self.every} if self.every else {}
         return {**self.study.settings(), **own, "vary": self.settings}
 
-    def measured(
-        self, blocks: Path, threads: int | None, arch: str | None, progress: Progress
-    ) -> dict[str, np.ndarray]:
-        """Return each measure of each point and seed, float64 (points, seeds).
+    def measured(self, blocks: Path, progress: Progress, **where: Any) -> dict[str, np.ndarray]:
+        """Return each measure, float64 (points, seeds); arguments as of `Study.in_blocks`.
 
         The value of a registered measure is its mean over rollouts, at the last tick of each.
         """
@@ -137,7 +135,7 @@ class Sweep:
                 columns |= {name: found[name]} if name in found else _ends(arrays, name)
             return {name: array[None] for name, array in columns.items()}
 
-        return self.study.reduced(blocks, reduce, threads, arch, progress)
+        return self.study.reduced(blocks, reduce, progress, **where)
 
     def write_series(self, blocks: Path, folder: Path) -> None:
         """Write the series of the registered measures, a row for each value; read finished blocks.
@@ -170,10 +168,10 @@ class Sweep:
                         }
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
-        """Return the difference of each point to the one that differs only in `against`, by point.
+        """Return by point the finding on its difference from the point with the value `against`.
 
-        `values` is the first measure, float64 (points, seeds). Intervals hold at once within a
-        [vary].
+        `values` is the first measure, float64 (points, seeds). All intervals of a [vary] table hold
+        at the same time.
         """
         if self.against is None:
             return {}
@@ -191,7 +189,7 @@ class Sweep:
         return found
 
     def write(self, values: dict[str, np.ndarray], folder: Path, draws: bool) -> None:
-        """Write all results of `values`, from `measured`."""
+        """Write all results; `values` are those that `measured` returned."""
         first, columns = next(iter(values)), sweeps.columns_of(self.settings)
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
@@ -406,7 +404,7 @@ def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
     preset, drawn = given.pop("preset", "paper"), "seed" in given
     first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
     if checked_flag("world.per_seed", per_seed) and kind == "runs":
-        raise AntsError("world.per_seed is for colonies only; leave it out.")
+        raise AntsError('world.per_seed is true, but kind is "runs"; leave it out.')
     if per_seed or drawn:
         worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
     if not per_seed:

@@ -1,6 +1,6 @@
-"""A second process for calls that run in Python itself, such as drawing.
+"""A second process for work that Python code does, such as drawing.
 
-Threads of one process would take turns at such calls.
+Threads of one process would take turns at such work.
 """
 
 from __future__ import annotations

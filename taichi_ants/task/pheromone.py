@@ -39,7 +39,9 @@ class Pheromone(Settings, path="task.pheromone"):
       "strongest_under_carriers" also compares with trails under ants with food.
     """
 
-    evaporation: Annotated[Evaporation, Is("evaporation of trails")] = "linear"
+    evaporation: Annotated[
+        Evaporation, Is("decrease of trails per tick: by 1 (linear) or by a factor (exponential)")
+    ] = "linear"
     half_life: Annotated[
         float | None,
         Is("time in which a trail halves", unit="ticks", above=0, usual=50.0),
@@ -48,19 +50,34 @@ class Pheromone(Settings, path="task.pheromone"):
     diffusion: Annotated[
         float, Is("share of a trail that spreads to the six neighbours per tick", least=0, most=1)
     ] = 0.0
-    deposit: Annotated[Deposit, Is("rule for deposits of ants with food")] = "set"
+    deposit: Annotated[
+        Deposit,
+        Is(
+            "trail that ants with food lay: the cell's trail becomes level (set), grows by level "
+            "(add), or rises to level minus slope per tick since the pick-up (fading)"
+        ),
+    ] = "set"
     level: Annotated[
         int,
         Is("trail level of a new deposit", least=1, most=MAX_DEPOSIT),
         Is(unit="ticks of linear evaporation", only=("deposit", "set", "add", "fading")),
     ] = DEPOSIT_LEVEL
     cap: Annotated[
-        Level, Is("largest level to which deposits add up", usual=1000, only=("deposit", "add"))
+        Level, Is("largest level that deposits add up to", usual=1000, only=("deposit", "add"))
     ] = None
     slope: Annotated[
-        Level, Is("decrease of deposits per tick with food", usual=10, only=("deposit", "fading"))
+        Level,
+        Is("decrease of an ant's deposits per tick since its pick-up", usual=10),
+        Is(only=("deposit", "fading")),
     ] = None
-    view: Annotated[View, Is("trails that ants without food see as T")] = "half"
+    view: Annotated[
+        View,
+        Is(
+            "lowest level that ants without food see as T: half of the highest level in view "
+            "(half) or the highest itself (strongest), also counting trails under ants with food "
+            "(strongest_under_carriers)"
+        ),
+    ] = "half"
 
     @property
     def dense(self) -> bool:

@@ -37,7 +37,9 @@ class Traffic(Settings, path="task.traffic"):
     follow: Annotated[bool, Is("allow ants to enter a cell whose ant leaves in the same tick")] = (
         False
     )
-    carriers_first: Annotated[bool, Is("give carriers precedence over foragers for cells")] = False
+    carriers_first: Annotated[
+        bool, Is("let carriers win cells that foragers want too; requires swap or follow")
+    ] = False
     grant: Annotated[
         bool,
         Is(
@@ -98,7 +100,7 @@ class Task(Settings, path="task"):
     read all other settings as numbers.
     """
 
-    observation: Annotated[str, Is("observation of ants", choices=observations.names)] = "paper"
+    observation: Annotated[str, Is("observation of an ant", choices=observations.names)] = "paper"
     rewards: Annotated[Rewards, Is("reward of each event")] = field(default_factory=Rewards)
     pheromone: Annotated[Pheromone, Is("rules by which trails are laid, evaporate and spread")] = (
         field(default_factory=Pheromone)
@@ -108,10 +110,16 @@ class Task(Settings, path="task"):
     )
     turns_at_queen: Annotated[bool, Is("turn ants around after a delivery")] = False
     delivery: Annotated[
-        Delivery, Is("effect of a delivery; the update bootstraps only if it truncates")
+        Delivery,
+        Is(
+            "end of an ant's episode at a delivery: as in Gymnasium, updates bootstrap only if it "
+            "truncates"
+        ),
     ] = "terminates"
     evaporation_in_training: Annotated[bool, Is("evaporate trails while ants learn")] = False
-    evaporation_in_evaluation: Annotated[bool, Is("evaporate trails while no ant learns")] = True
+    evaporation_in_evaluation: Annotated[
+        bool, Is("evaporate trails while ants follow a fixed policy")
+    ] = True
     life: Annotated[Life, Is("changes of ants and food in colonies")] = field(default_factory=Life)
 
     @classmethod

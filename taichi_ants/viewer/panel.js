@@ -2,9 +2,10 @@
 
 const HOLDS = { [EMPTY]: "nothing", [OBSTACLE]: "a rock", [FOOD]: "food", [QUEEN]: "the queen" };
 const CAME = {
-  ENTERED_EMPTY: "enters an empty cell", BLOCKED: "is blocked", PICKED_UP: "picks up food",
-  DELIVERED: "delivers food to the queen", FAILED: "fails", PUSHED: "is pushed aside",
+  ENTERED_EMPTY: "It enters an empty cell", BLOCKED: "It is blocked", PICKED_UP: "It picks up food",
+  DELIVERED: "It delivers food to the queen", FAILED: "The action fails", PUSHED: "It is pushed aside",
 };
+const WHY = { best: () => "highest value", tie: ({ ties }) => `one of ${ties} equal values`, explored: () => "at random" };
 const LETTERS = {
   E: "empty", O: "obstacle", T: "trail", S: "nearer to the queen", F: "food", Q: "queen",
 };
@@ -81,7 +82,7 @@ class Panel {
     if (followed < 0) return;
     const ant = this.history.ant(moment, followed);
     const buttons = button("ant-before", "Previous ant (P)", "before") + button("ant-after", "Next ant (N)", "after")
-      + button("ant-aim", "Keep it centred (F)", "aim", `aria-pressed="${aims}"`)
+      + button("ant-aim", "Keep this ant centred (F)", "aim", `aria-pressed="${aims}"`)
       + button("ant-close", "Stop following (Esc)", "close");
     const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "no food"}</span>` : "";
     const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>`;
@@ -155,19 +156,18 @@ class Panel {
     const { header, live } = this.history, act = ant.act;
     if (ant.past) return this.storyOf(ant.past, '<span class="label">In the last tick:</span>');
     if (!act) {
-      const late = this.history.length === 1 ? "This page was opened later. Its steps appear from the next tick."
-        : "Steps are too fast to show. Slow down, or pause and step.";
+      const late = this.history.length === 1 ? "This page opened after the last tick. Actions appear from the next tick."
+        : "At this speed, actions are not shown. Reduce the speed, or pause and advance by one tick.";
       const early = ant.tick === 0 ? "It has not acted yet." : late;
       const words = live ? early : "The recording ends here.";
       return `<div class="story"><span class="label">${words}</span></div>`;
     }
-    const why = { best: "the best", tie: `a tie of ${act.ties}`, explored: "explored" }[act.why];
-    const better = ant.loaded ? "moves nearer to the queen" : "enters a trail";
+    const better = ant.loaded ? "It moves nearer to the queen" : "It enters a trail";
     const came = CAME[act.event] || better;
     const action = header.actions[act.action], worth = { 1: "up", "-1": "down" }[Math.sign(act.reward)] ?? "";
     const lines = [
-      `Chooses <b>${action}</b> <span class="why ${act.why}">${why}</span>`,
-      `It ${came}, reward <span class="reward ${worth}">${signed(act.reward, 0)}</span>`,
+      `Chooses <b>${action}</b> <span class="why ${act.why}">${WHY[act.why](act)}</span>`,
+      `${came}, reward <span class="reward ${worth}">${signed(act.reward, 0)}</span>`,
     ];
     if (header.learns) {
       const digits = digitsFor(act.before, act.after), { task, rest } = this.history.stateName(ant.state);
@@ -191,9 +191,9 @@ class Panel {
     const wanting = history.wanting(moment, cell).map(({ number, action, event }) =>
       `${link(number)} (${history.header.actions[action]}${["BLOCKED", "FAILED"].includes(event) ? ", failed" : ""})`);
     const lines = [
-      ["holds", ants.length ? ants.map(link).join(", ") : HOLDS[ground[cell]] ?? "?"],
+      ["contains", ants.length ? ants.map(link).join(", ") : HOLDS[ground[cell]] ?? "?"],
       ["trail", `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.strongest}`],
-      ["wanted by", wanting.join(", ") || "nobody"],
+      ["next actions", wanting.join(", ") || "none"],
     ];
     card.innerHTML = `<div class="head"><h2>Cell (${history.grid.cube(cell).join(", ")})</h2>`
       + `${button("cell-close", "Close", "close")}</div><dl class="list">`
@@ -208,7 +208,7 @@ class Panel {
     if (!ant) return said;
     const { task, rest } = this.history.stateName(ant.state);
     said += ` Ant ${followed}: ${task} ${rest}.`;
-    if (ant.act) said += ` Chooses ${this.history.header.actions[ant.act.action]}, ${ant.act.why}, reward ${ant.act.reward}.`;
+    if (ant.act) said += ` Chooses ${this.history.header.actions[ant.act.action]}, ${WHY[ant.act.why](ant.act)}, reward ${ant.act.reward}.`;
     return said;
   }
 
@@ -220,7 +220,7 @@ class Panel {
     const samples = [0, 64, 128, 192, 255].map((i) => `rgb(${this.stage.ramp[i].join(" ")})`);
     const bodies = [false, true].map((loaded) => `<svg viewBox="-1 -1 2 2" aria-hidden="true">${antShape(loaded)}</svg>`);
     byId("legend").innerHTML = [
-      `${bodies[0]}ant`, `${bodies[1]}with food`, `${cell("var(--food-floor)", drawing("food", CRUMBS))}food`,
+      `${bodies[0]}ant`, `${bodies[1]}ant with food`, `${cell("var(--food-floor)", drawing("food", CRUMBS))}food`,
       `${cell("var(--queen-floor)", drawing("queen", CROWN))}queen`, `${cell("var(--rock)")}rock`,
       '<span class="ramp"></span>trail',
     ].map((item) => `<li>${item}</li>`).join("");

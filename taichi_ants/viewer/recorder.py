@@ -321,8 +321,8 @@ def record_trace(trace: Trace, title: str = "") -> Recording:
     made = trace.made
     if made is None:
         raise AntsError(
-            "the trace does not say how it was made, so it cannot be replayed; use a trace of "
-            "rollout or trace_training."
+            "the trace does not contain its world and settings, so it cannot be replayed; use a "
+            "trace of rollout or trace_training."
         )
     expect("title", title, str)
     if made.config is None:

@@ -3,7 +3,7 @@
 /* Name, name if there are several episodes, key of a frame or a point, digits. */
 const CURVES = [
   ["delivered", "delivered in total", "delivered", 0],
-  ["return", "return by episode", "returns", 0],
+  ["return", "return per episode", "returns", 0],
   ["epsilon", "epsilon", "epsilon", 3],
 ];
 const SLOWEST = 0.5, FASTEST = 200; // ticks/s
@@ -146,9 +146,9 @@ class Timeline {
     this.speed.style.setProperty("--filled", `${this.speed.value}%`);
     const unlimited = this.history.live && speed >= fastest;
     const pace = speed * this.ticksAMoment;
-    const shown = unlimited ? "fastest" : `${pace < 3 ? pace.toFixed(1) : Math.round(pace)} / s`;
+    const shown = unlimited ? "fastest" : `${pace < 3 ? pace.toFixed(1) : Math.round(pace)} ticks/s`;
     byId("speed-value").textContent = shown;
-    this.speed.setAttribute("aria-valuetext", unlimited ? "as fast as possible" : `${shown.split(" ")[0]} ticks/s`);
+    this.speed.setAttribute("aria-valuetext", unlimited ? "as fast as possible" : shown);
   }
 
   /* Draw the events and the curves of the history so far. */

@@ -14,7 +14,7 @@ const KEYS = [
   ["U I O J K L", "move the cell cursor to one of its six neighbours"],
   ["Enter", "follow the ant at the cursor (when the world has the focus)"],
   ["T", "switch between light and dark"],
-  ["Esc", "stop following; close"],
+  ["Esc", "stop following the ant, or close the cell"],
   ["?", "show this help"],
 ];
 const CURSOR = { u: 5, i: 0, o: 1, j: 4, k: 3, l: 2 }; // headings, in the layout of the keys
@@ -78,8 +78,8 @@ class Viewer {
     }, signal);
     this.timeline = new Timeline(this.history, this.player, signal);
     if (this.source.live) document.querySelector(".about summary").textContent = "About this session";
-    byId("hint").textContent = matchMedia("(hover: none)").matches ? "Tap an ant to follow it, or a cell to inspect it."
-      : "Click an ant to follow it, or a cell to inspect it. Press ? for all keys.";
+    byId("hint").textContent = matchMedia("(hover: none)").matches ? "Tap an ant to follow it or a cell to inspect it."
+      : "Click an ant to follow it or a cell to inspect it. Press ? for all keys.";
     byId("keys").innerHTML = [...(this.source.keys ?? []), ...KEYS].map(([keys, does]) =>
       `<dt>${keys.split(" ").map((key) => `<kbd>${key}</kbd>`).join(" ")}</dt><dd>${does}</dd>`).join("");
     this.listen();

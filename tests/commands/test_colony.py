@@ -89,7 +89,7 @@ def test_all_files_are_there(finished):
     assert len(out.splitlines()) <= 42
     assert out.splitlines()[-1] == "out/report.html"
     assert "Deliveries per 1000 ticks of 3 ants" in report
-    assert "2 seeds, too few for a verdict, exploration rate 0.01; in brackets: 0." in report
+    assert "2 seeds, too few for a verdict, exploration rate 0.01; in brackets: without" in report
     assert "What does each rule add?" in report
     page = (folder / "report.html").read_text("utf-8")
     assert (
@@ -201,7 +201,7 @@ def test_quick_has_a_folder_of_its_own():
 def test_other_arenas_are_the_only_difference_and_their_order_is_none(
     capsys, tmp_path, monkeypatch
 ):
-    def stop(study, blocks, *more):
+    def stop(study, blocks, *more, **where):
         (blocks / "0.npz").touch()
         raise KeyboardInterrupt
 
@@ -264,11 +264,11 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         ),
         (
             ["live", "--frame-interval", 2],
-            "--frame-interval requires an animation; give --render",
+            "--frame-interval requires an animation, but --render is missing; name a .gif",
         ),
         (
             ["live", "--render", "a.PNG", "--frame-interval", 2],
-            "--frame-interval requires an animation",
+            "--frame-interval requires an animation, but --render is a.PNG",
         ),
         (
             ["live", "--task.pheromone.cap", 5],
@@ -325,7 +325,7 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
         (
             ["live", "--policy", "x", "--task.observation", "paper"],
-            "the policy determines --task.observation",
+            "--task.observation has no effect with --policy",
         ),
         (
             ["live", "--task.observation", "nose"],

@@ -52,7 +52,7 @@ def sweep_of(seeds, folder):
     file = folder / f"{seeds}.toml"
     file.write_text(SWEEP.replace("SEEDS", str(seeds)))
     asked = read_sweep(file)
-    return lambda blocks: asked.measured(blocks, None, None, lambda share: None)
+    return lambda blocks: asked.measured(blocks, lambda share: None)
 
 
 def comparison_of(seeds, folder):

@@ -195,7 +195,11 @@ WRONG = {
     "seed twice": ("[7, 2, 5]", "[7, 7]", ["seeds contains 7 more than once"]),
     "world": ("[task]", '[world]\npreset = "mars"\n[task]', ["'mars'", "open, paper"]),
     "world's": ("[task]", "[world]\nranges = [9, 9, 9]\n[task]", ["is not a setting of the"]),
-    "per seed": ("[task]", "[world]\nper_seed = true\n[task]", ["per_seed", "colonies only"]),
+    "per seed": (
+        "[task]",
+        "[world]\nper_seed = true\n[task]",
+        ["per_seed is true", 'kind is "runs"'],
+    ),
     "per seed?": ("[task]", "[world]\nper_seed = 1\n[task]", ["per_seed is 1", "True or False"]),
     "observation": ("[task]", '[task]\nobservation = "all"', ["'all'", "paper"]),
     "learner": ('"sarsa"', '"salsa"', ["'salsa'", "sarsa"]),

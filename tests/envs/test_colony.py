@@ -12,6 +12,7 @@ from random_rewards import random_rewards
 from same_colonies import assert_equal
 
 from taichi_ants.envs.colony import ColonyWorlds
+from taichi_ants.envs.vector import Arguments
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.task.events import Event
@@ -23,10 +24,9 @@ SUCCESSES = (Event.ENTERED_EMPTY, Event.ENTERED_LURE, Event.PICKED_UP, Event.DEL
 
 def several(drawn: RandomColony) -> ColonyWorlds:
     population = drawn.population
-    return ColonyWorlds(
-        *(drawn.world, N_WORLDS, drawn.task, population["ants"], population["start"]),
-        *(population["capacity"], 30, "index", None, None),
-    )
+    given = Arguments(drawn.world, 30, "index", None, None)
+    which = population["ants"], population["start"], population["capacity"]
+    return ColonyWorlds(N_WORLDS, drawn.task, given, *which)
 
 
 def plain_one(worlds: ColonyWorlds, seed: int) -> ReferenceColony:
@@ -115,7 +115,7 @@ def test_each_ant_of_each_world_at_every_tick(rules):
 
 def test_what_the_mask_allows_succeeds_where_an_ant_is_alone():
     """And what it forbids fails."""
-    worlds = ColonyWorlds(paper(), 1, None, 1, "spread", None, 100, "index", None, None)
+    worlds = ColonyWorlds(1, None, Arguments(paper(), 100, "index", None, None), 1, "spread")
     seen = np.zeros((2, N_ACTIONS), int)
     rng = np.random.default_rng(4)
     worlds.begin(np.ones(1, bool), [0])
@@ -134,7 +134,7 @@ def test_what_the_mask_allows_succeeds_where_an_ant_is_alone():
 
 
 def test_worlds_that_are_stopped_stand_still_until_they_begin_again():
-    worlds = ColonyWorlds(paper(), 2, None, 5, "nest", None, 3, "index", None, None)
+    worlds = ColonyWorlds(2, None, Arguments(paper(), 3, "index", None, None), 5, "nest")
     worlds.begin(np.ones(2, bool), [1, 2])
     actions = np.ones((2, 5), int)
     worlds.step(actions)
@@ -155,12 +155,12 @@ def test_evaporation_is_that_of_training_unless_it_is_given():
     """A trail of level 2 on a cell that nobody enters."""
     world = World((4, 4, 4), (0, 0, 0), [(3, 0, 0)], trails=[((0, 3, 0), 2)])
     for given, left in ((None, 2), (False, 2), (True, 1)):
-        worlds = ColonyWorlds(world, 1, None, 1, "nest", None, 9, "index", given, None)
+        worlds = ColonyWorlds(1, None, Arguments(world, 9, "index", given, None), 1, "nest")
         worlds.begin(np.ones(1, bool), [0])
         worlds.step(np.full((1, 1), GIVE))
         assert worlds.colony.snapshot().trail.max() == left
     falls = replace(worlds.colony.task, evaporation_in_training=True)
-    worlds = ColonyWorlds(world, 1, falls, 1, "nest", None, 9, "index", None, None)
+    worlds = ColonyWorlds(1, falls, Arguments(world, 9, "index", None, None), 1, "nest")
     worlds.begin(np.ones(1, bool), [0])
     worlds.step(np.full((1, 1), GIVE))
     assert worlds.colony.snapshot().trail.max() == 1

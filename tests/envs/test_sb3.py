@@ -106,7 +106,7 @@ def test_what_sb3_asks_of_single_environments() -> None:
     assert envs.render().shape == (2 * 720, 2 * 1280, 3)
     envs.set_attr("note", 1)
     assert envs.get_attr("note", 0) == [1]
-    with pytest.raises(AntsError, match=r"indices is \[0\]; the environments are one object"):
+    with pytest.raises(AntsError, match=r"indices is \[0\]; all environments share"):
         envs.set_attr("note", 2, indices=[0])
     with pytest.raises(AntsError, match="method_name is 'reset'"):
         envs.env_method("reset")

@@ -326,7 +326,7 @@ def test_what_csv_holds_is_read_as_numbers_and_text(tmp_path: Path) -> None:
 @pytest.mark.parametrize("text", ["", "a,b\n1\n", "a,b\n1,2,3\n", 'a\n"' + "x" * 200_000 + '"\n'])
 def test_a_file_that_is_not_a_table_is_named(text: str, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(AntsError, match=r"a\.csv' is not a table; name another file\."):
+    with pytest.raises(AntsError, match=r"a\.csv' is not a table \(CSV\); name another file\."):
         files.read_csv(tmp_path / "a.csv")
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Page, started
+from browser import Page, assert_policy_holds, started
 from command_lines import crowding
 from rooms import CHOSEN, Guest, running
 
@@ -181,7 +181,7 @@ def test_an_ant_is_followed_and_explained(page, room):
     page.tab.click("#play")
     wait(page, "!live.running && viewer.history.frames.at(-1).acts.length === 0")
     if page.read("viewer.history.frames.at(-1).tick"):
-        assert "too fast to show" in page.text("#ant")
+        assert "At this speed, actions are not shown." in page.text("#ant")
 
 
 @pytest.mark.parametrize("how", ["mouse", "keyboard"])
@@ -228,7 +228,7 @@ def test_each_tool_changes_the_world_of_the_engine(page, room, how):
     assert ground()[free] == QUEEN
     page.press("1")
     page.click_cell(here)
-    assert "holds food" in page.text("#cell")
+    assert "contains food" in page.text("#cell")
 
 
 def test_a_change_is_undone_and_the_session_before_comes_back(page, room):
@@ -610,7 +610,7 @@ def test_pages_look_on_together(page, browser, room):
     edits(room, 1)
     assert_same(late, room)
     assert_same(page, room)
-    wait(page, "document.querySelector('#watchers').innerText === '2 pages are watching'")
+    wait(page, "document.querySelector('#watchers').innerText === '2 pages show this session'")
     page.tab.click("#play")
     wait(late, "live.running && viewer.player.playing")
     late.tab.click("#play")
@@ -755,6 +755,7 @@ def test_a_page_keeps_what_it_has_when_the_server_is_killed(browser, shared, tmp
     with page.tab.expect_download() as got:
         page.tab.click("#keep")
     got.value.save_as(tmp_path / "kept.html")
+    assert_policy_holds(browser, tmp_path / "kept.html")
     first, length = page.read("[viewer.history.first, viewer.history.length]")
     kept = Page(browser, tmp_path / "kept.html")
     assert kept.read("viewer.history.length") == length - first
@@ -835,7 +836,7 @@ def test_curves_are_over_time_and_a_late_page_has_them(page, browser, room):
         assert one.tab.get_attribute("#time", "max") == str(session.ticks)
         assert one.tab.get_attribute("#time", "min") == "0"
         names = one.tab.locator(".curve .label span").all_inner_texts()
-        assert names == ["delivered in total", "return by episode", "epsilon"]
+        assert names == ["delivered in total", "return per episode", "epsilon"]
         assert "delivered this episode" in one.text("#now")
         lines = [
             [float(point.split()[0]) for point in line.removesuffix("h0").lstrip("M").split("L")]

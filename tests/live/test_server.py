@@ -457,7 +457,7 @@ def test_a_session_is_saved_and_loaded(room):
         guest.socket.send(saved[:-200] + b"\0" * 200)
         words = guest.until("error")["words"]
         assert words.startswith("the loaded file is damaged")
-        assert words.endswith("; load a session that Save has made.")
+        assert words.endswith("; load a file that Save session has written.")
         assert state_of(room) == before
 
 
@@ -546,7 +546,9 @@ def state_after(guest: Guest, room, ticks: int) -> object:
 def test_the_first_session_has_none_before_it(shared):
     with running(shared.choices) as one, Guest(one) as guest:
         guest.ask("back")
-        assert guest.until("error")["words"] == "there is no session before this one."
+        assert guest.until("error")["words"] == (
+            "there is no session before this one to return to; continue with this one."
+        )
 
 
 def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
@@ -594,7 +596,7 @@ def test_a_file_that_would_hold_the_server_is_refused_at_once(room, name, tmp_pa
         words = guest.until("error")["words"]
         assert time.monotonic() - began < 1.0 * crowding()
     assert ATTACKS[name][1] in words
-    assert words.endswith("; load a session that Save has made.")
+    assert words.endswith("; load a file that Save session has written.")
     assert "\n" not in words
     assert state_of(room) == before
     with pytest.raises(AntsError, match=ATTACKS[name][1]):  # as --session does

@@ -50,7 +50,7 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("snapshot", lambda wrong: Scene(WORLD.grid).draw(wrong)),
         ("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong)),
     ],
-    "Snapshot": [("snapshot", of(Scene(WORLD.grid).draw))],
+    "Snapshot": [("snapshot", lambda wrong: Scene(WORLD.grid).draw(wrong))],
     "Checkpoint": [("a checkpoint", lambda wrong: next(rendering.learning_frames([wrong])))],
     "Status": [("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong))],
     "at_start": [("world", of(at_start))],

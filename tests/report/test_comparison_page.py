@@ -47,7 +47,8 @@ def test_the_mean_is_told_with_its_own_difference(page: str) -> None:
     for findings in results().audit.values():
         for one in findings.values():
             if one.by_mean and one.by_mean.verdict is not one.verdict:
-                words = f"by the mean {one.by_mean.verdict.value}: {one.by_mean.contrast.label}: "
+                verdict, label = one.by_mean.verdict.value, one.by_mean.contrast.label
+                words = f"With the mean instead of the IQM, {verdict}: {label}: "
                 told += escape(words) in page
     assert told > 0
 

@@ -73,9 +73,10 @@ def test_what_was_given_is_told_even_where_it_is_the_default(parser):
         (["--rates", "1", "x"], "--rates: 'x' is not a number"),
         (["--rates"], "--rates: expected at least one argument"),
         (["--siz", "3"], "unrecognized arguments: --siz 3"),
-        (["--size", ""], "--size is empty; leave it out"),
-        (["--size="], "--size= is empty; leave it out"),
-        (["", "--loud"], "the first argument is empty; leave it out"),
+        (["--size", ""], "--size is empty; give a value or leave it out"),
+        (["--size="], "--size is empty; give a value or leave it out"),
+        (["", "--loud"], "the first argument is empty; give a value or leave it out"),
+        (["a", ""], "the argument after 'a' is empty; give a value or leave it out"),
         (["a\nb"], "unrecognized arguments: a b"),
     ],
 )

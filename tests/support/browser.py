@@ -90,3 +90,19 @@ class Page:
     def close(self) -> None:
         self.context.close()
         assert not self.faults
+
+
+def assert_policy_holds(browser: Any, path: Path) -> None:
+    """The page in a file runs its own script, and no script that somebody has added to it."""
+    evil = path.with_name("evil.html")
+    added = "<script>document.title = 'evil'</script></main>"
+    evil.write_text(path.read_text(encoding="utf-8").replace("</main>", added), encoding="utf-8")
+    for file, refused in ((path, 0), (evil, 1)):
+        faults, context = [], browser.new_context(offline=True)
+        tab = context.new_page()
+        tab.on("console", lambda message, faults=faults: faults.append(message.text))
+        tab.goto(file.as_uri())
+        tab.locator("#now dd").first.wait_for()
+        assert tab.title() != "evil"
+        context.close()
+        assert len(faults) == refused

@@ -212,5 +212,5 @@ def test_what_cannot_be_recorded_says_why():
         record_episode(None)
     trace = rollout(worlds.paper(), trail_follower())
     object.__setattr__(trace, "made", None)
-    with pytest.raises(AntsError, match="does not say how it was made"):
+    with pytest.raises(AntsError, match="does not contain its world and settings"):
         record_trace(trace)

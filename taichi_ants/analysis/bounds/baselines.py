@@ -32,7 +32,7 @@ class Baseline(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Its name and discount, for example "optimal policy, discount 0.9"."""
+        """The name and the discount, for example "optimal policy, discount 0.9"."""
         discount = "" if self.discount is None else f", discount {self.discount:g}"
         return self.baseline + discount
 

@@ -57,7 +57,10 @@ class EpisodeBounds:
     def __init__(self, world: World, task: Task) -> None:
         changes = task.evaporation_in_training and task.pheromone.evaporation != "none"
         if changes or task.pheromone.diffusion:
-            raise AntsError("exact bounds require training without evaporation and diffusion.")
+            raise AntsError(
+                "trails evaporate or spread in training, but exact bounds require constant trails; "
+                "set `task.evaporation_in_training` to False and `task.pheromone.diffusion` to 0."
+            )
         around = look_around(world)
         cells, headings = world.start(seed=0)
         cell = int(np.searchsorted(around.cells, cells[0]))
@@ -139,8 +142,8 @@ class EpisodeBounds:
         """
         if not 0 <= discount < 1:
             raise AntsError(
-                f"the discount is {shown(discount)}, but must be at least 0 and below 1: with "
-                "others, the return without step limit may be unbounded and no policy optimal."
+                f"the discount is {shown(discount)}; it must be at least 0 and below 1, because "
+                "otherwise the return without a step limit may be unbounded."
             )
         from scipy.sparse import eye_array
         from scipy.sparse.linalg import spsolve

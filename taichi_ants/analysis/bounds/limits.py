@@ -103,7 +103,7 @@ def _pushes(around: Surroundings) -> list[np.ndarray]:
 
 
 def least_mean_cycle(lengths: np.ndarray) -> float:
-    """Return the least mean length of an edge over all cycles, from lengths float (n, n) or inf."""
+    """Return the smallest mean edge length of a cycle; missing edges (n, n) have the length inf."""
     mean, walks = np.inf, lengths  # the shortest walks of k edges, from each node to each
     for k in range(1, len(lengths) + 1):
         mean = min(mean, float(walks.diagonal().min()) / k)

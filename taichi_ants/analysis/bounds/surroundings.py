@@ -1,6 +1,6 @@
 """The surroundings of a lone ant in each of its possible states.
 
-A cell here is an index in 0..n-1 into the n cells that an ant can ever enter, and the index of a
+Cells are numbered from 0 to n - 1; they are the n cells that an ant can ever enter. The index of a
 state is heading * n + cell.
 """
 
@@ -17,7 +17,7 @@ from taichi_ants.worlds.world import World
 
 @dataclass(frozen=True)
 class Surroundings:
-    """The neighbours of each cell that an ant can ever enter, arrays (6, n) by heading."""
+    """The neighbours of the n cells that an ant can enter, arrays (6, n) by heading."""
 
     cells: np.ndarray  # int64 (n,): flat indices
     neighbours: np.ndarray  # int32: index of the cell, -1 if no ant can ever enter it
@@ -73,6 +73,6 @@ def look_around(world: World) -> Surroundings:
 
 
 def in_view(ahead: np.ndarray) -> np.ndarray:
-    """Return (6, n), by direction of a neighbour, as (3, 6 n), by position in view and state."""
+    """Return values of neighbours (6, n) as those of the cells in view (3, 6 n), by state."""
     turned = [np.roll(ahead, turn, axis=0) for turn in (1, 0, -1)]
     return np.stack(turned).reshape(3, -1)

@@ -120,10 +120,12 @@ _RISING = study.PAPER, study.A, study.BC, study.ABC, study.QUEUES
 _MAIN = study.PAPER, study.ABC, study.QUEUES
 _MEASURES = "deliveries", "per_ant"
 FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
-    "rules": partial(_dots, "What each rule adds", _each(study.RULES, study.JOINT)),
+    "rules": partial(_dots, "Effect of each rule", _each(study.RULES, study.JOINT)),
     "scaling": partial(
-        _lines, "More ants: what a colony delivers", _each(_RISING, study.JOINT), _MEASURES
+        _lines, "Deliveries by the number of ants", _each(_RISING, study.JOINT), _MEASURES
     ),
-    "training": partial(_dots, "With how many ants to train", _each(_MAIN[:2], *_LEARNED)),
-    "elsewhere": partial(_dots, "Trained in open worlds, in others", _each(_MAIN, study.ABROAD)),
+    "training": partial(_dots, "Number of ants in training", _each(_MAIN[:2], *_LEARNED)),
+    "elsewhere": partial(
+        _dots, "Trained in open worlds, evaluated in others", _each(_MAIN, study.ABROAD)
+    ),
 }

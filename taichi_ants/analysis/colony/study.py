@@ -1,6 +1,6 @@
 """The conditions, measures and contrasts of the colony's study; `series.toml` lists the contrasts.
 
-A condition is a number of ants of a design (rules and a training regime) in one kind of world. A
+A condition is a design (rules and a training regime), a number of ants, and a kind of world. A
 seed gives all conditions of a kind of world the same world, so they are paired. Except for the
 paper's world, ants have not been trained in the worlds in which they are evaluated.
 """
@@ -138,7 +138,7 @@ class Series:
         question: The question that the series helps to answer.
         statement: A statement that is true if the differences are above 0.
         measure: A name in `MEASURES`.
-        against: Compare with the same number of ants, or with each smaller number.
+        against: "same" compares equal numbers of ants, "smaller" each number with all smaller ones.
         least: The fewest ants for "same". With one ant, all regimes and some rules are the same.
         main: Whether it is one of the main findings.
     """
@@ -182,9 +182,10 @@ Judged = dict[tuple[str, Series], dict[Sizes, Finding]]
 
 
 def judge_all(measured: Measured) -> Judged:
-    """Return the findings on all contrasts; those of a question and kind of world hold at once.
+    """Return the findings on all contrasts.
 
-    With fewer than `LEAST_SEEDS` seeds, the verdict is "too few seeds".
+    All intervals of a question and a kind of world hold at the same time. With fewer than
+    `LEAST_SEEDS` seeds, the verdict is "too few seeds".
     """
     judged: Judged = {}
     for world_kind in dict.fromkeys(one.world_kind for one in measured):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -11,7 +10,8 @@ import numpy as np
 from taichi_ants.analysis.colony import study
 from taichi_ants.analysis.colony.study import Condition, Design, Judged, Measured, Series, Sizes
 from taichi_ants.analysis.findings import Finding, Verdict, seeds_in_words, weakest
-from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of, seed_rows
+from taichi_ants.analysis.statistics import Estimator
+from taichi_ants.analysis.sweeps import centre_columns, centres_of, seed_rows
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
@@ -21,6 +21,7 @@ from taichi_ants.analysis.tables import (
     number,
     percent,
     sentence,
+    tally,
 )
 from taichi_ants.errors import count
 
@@ -79,7 +80,7 @@ def condition_rows(measured: Measured) -> list[ConditionRow]:
 
 
 def difference_rows(judged: Judged) -> list[dict[str, Any]]:
-    """Return the rows of differences.csv; intervals of a question and a world hold at once."""
+    """Return the rows of differences.csv, with the intervals of `study.judge_all`."""
     return [
         {
             "world_kind": world_kind,
@@ -176,7 +177,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             line.append(figure(best.estimates["bound"].mean) + range_)
         cells.append(["Mean bound, right of way [range]", *line])
     title = f"{sentence(study.MEASURES['deliveries'])} of {count(largest, 'ant')}"
-    note = f"{_basis(rows)}; in brackets: 0. %: share of each world's bound."
+    note = f"{_basis(rows)}; in brackets: without exploration; %: share of the world's bound."
     return Table(title, ("", *_headers(shown)), cells, [note] if cells else [])
 
 
@@ -219,20 +220,18 @@ def _compared(
 
 
 def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
-    """Return deliveries at a glance, the main findings, and the number of statements that hold."""
+    """Return tables of deliveries and of the main findings, and the number of true statements."""
     seen = glance(rows)
     world_kinds = {one.condition.world_kind for one in rows}
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
     lines = ["Statements about the largest colonies"]
     for question in study.QUESTIONS:
-        verdicts = Counter(
+        verdicts = tally(
             of_largest(findings).verdict.value
             for (_, series), findings in judged.items()
             if series.question == question
         )
-        if verdicts:
-            words = ", ".join(f"{n} {verdict}" for verdict, n in verdicts.most_common())
-            lines.append(f"  {question} {words}")
+        lines += [f"  {question} {verdicts}"] if verdicts else []
     return [
         f"{conditions}, {seeds_in_words(rows[0].seeds)}.",
         *([seen] if seen.rows else means(rows)),
@@ -242,7 +241,7 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 
 
 def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
-    """Return the finding on the largest colony; of several, the strongest objection."""
+    """Return the finding on the largest colony; of several, the one that objects most."""
     return _of_size(findings, max(ants for ants, _ in findings))
 
 

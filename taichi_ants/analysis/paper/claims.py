@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -13,7 +12,7 @@ from taichi_ants.analysis.paper import quantities
 from taichi_ants.analysis.paper.comparison import Comparison
 from taichi_ants.analysis.paper.published import VARIANTS
 from taichi_ants.analysis.paper.quantities import Quantity, grids_of
-from taichi_ants.analysis.tables import Block, Table, interval, markdown, number, sentence
+from taichi_ants.analysis.tables import Block, Table, interval, markdown, number, sentence, tally
 from taichi_ants.files import tomllib
 
 
@@ -136,12 +135,10 @@ def claims_rows(audit: Audit) -> list[dict[str, Any]]:
 
 def tallies(audit: Audit) -> list[str]:
     """Return a line for each delivery setting, with the number of claims by verdict."""
-    lines = []
-    for setting in next(iter(audit.values())):
-        counted = Counter(findings[setting].verdict.value for findings in audit.values())
-        numbers = ", ".join(f"{n} {verdict}" for verdict, n in counted.most_common())
-        lines.append(f"{setting}: {numbers}")
-    return lines
+    return [
+        f"{setting}: {tally(findings[setting].verdict.value for findings in audit.values())}"
+        for setting in next(iter(audit.values()))
+    ]
 
 
 def headlines(audit: Audit) -> Table:

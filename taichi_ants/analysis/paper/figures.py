@@ -88,7 +88,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
                 if name != "deliveries":
                     axis.fill_between(at, low, high, color=colours[variant], alpha=0.15, lw=0)
         for (axis, *_), (name, label) in zip(axes, CURVES.items(), strict=True):
-            axis.set_ylabel(f"{label} of an episode")
+            axis.set_ylabel(f"{label} per episode")
             if name == "steps":
                 style.logarithmic(axis.yaxis, (1, 2, 5))
             if name == "deliveries":  # a share, for which an axis of few hundredths would mislead
@@ -110,7 +110,7 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
             f"{FIGURE_1.epsilon_decay:g}. The paper's figure 1 names no configuration; this one "
             "occurs\ntwice in its table 2."
         )
-        style.frame(figure, "Learning", words, style.legend_entries(axes.flat))
+        style.frame(figure, "Learning curves", words, style.legend_entries(axes.flat))
     return figure
 
 
@@ -141,7 +141,7 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
         axes[0].set_ylabel("Return (reward per episode, last 50)")
         style.frame(
             figure,
-            "Return against deliveries in training, and what the final policies do",
+            "Return and deliveries in training, and behaviour of the final policies",
             f"World: {comparison.world}. A mark is a run: "
             f"{count(len(comparison.rows), 'configuration')}, "
             f"{count(len(comparison.seeds), 'seed')} each. Its shape and colour show\nthe "

@@ -34,7 +34,7 @@ Outcome = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Measure:
-    """A number of a run."""
+    """A measure of a single run, such as the mean return of its last 50 episodes."""
 
     words: str
     unit: str

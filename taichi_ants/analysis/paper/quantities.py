@@ -57,7 +57,7 @@ def pairs(grid: np.ndarray, factor: str) -> np.ndarray:
 
 
 class Read(NamedTuple):
-    """A way to read a value per seed: `values(grids, measure, learner)`, and its name in tables."""
+    """A function `values(grids, measure, learner)` of a value per seed, and its name in tables."""
 
     words: str
     values: Callable[[Grids, str, Variant], np.ndarray]
@@ -186,7 +186,10 @@ def _quantity(
 
 
 def share_above(measure: str, first: Variant, second: Variant, sign: int = 1) -> Quantity:
-    """Return the share of configurations with the first above (-1: below); ties count by half."""
+    """Return the share of configurations in which the first learner is above the second.
+
+    With `sign` -1, it is the share in which it is below. Ties count by half.
+    """
 
     def share(grids: Grids) -> np.ndarray:
         signs = np.sign(grids(measure, first) - grids(measure, second))

@@ -21,7 +21,7 @@ from taichi_ants.analysis.paper.table2 import (
     summarise_behaviours,
     table2,
 )
-from taichi_ants.analysis.sweeps import Estimator
+from taichi_ants.analysis.statistics import Estimator
 from taichi_ants.analysis.tables import (
     MISSING,
     Block,
@@ -40,7 +40,7 @@ MOST_LINES = 12  # of the table in the report of one screen
 # With fewer, a note warns about intervals of means; docs/statistics.md has their coverage.
 FEW_SEEDS = 50
 APART = "!"  # marks a mean outside of the interval of the IQM
-MIXED = "+ the runs do different things, so their mean describes no run."
+MIXED = "+ the runs behave in different ways, so their mean describes none of them."
 
 
 class Results(NamedTuple):
@@ -78,7 +78,7 @@ def heading(comparison: Comparison) -> list[Block]:
     sizes = (
         f"{count(len(comparison.rows), 'configuration')}, {count(len(comparison.seeds), 'seed')}, "
         f"{count(comparison.episodes, 'episode')} of at most {comparison.max_steps} steps, "
-        f"{count(comparison.rollouts, 'greedy rollout')} a run."
+        f"{count(comparison.rollouts, 'greedy rollout')} per run."
     )
     task = comparison.task
     training, greedy = (
@@ -188,7 +188,7 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
         notes.append(f"{APART} outliers pull the mean out of the interval of the IQM.")
     if beside:
         notes += [
-            "Paper: its table 2. Its steps may be of all episodes or of the last 50.",
+            "Paper: its table 2, whose steps may be of all episodes or of the last 50.",
             "Below: percentage of best runs below the paper's number.",
         ]
     if 1 < seeds < FEW_SEEDS:
@@ -210,7 +210,7 @@ def _notes(lines: Sequence[Line], seeds: int, beside: bool) -> list[str]:
 
 def greedy_table(lines: Sequence[Line]) -> Table:
     """Return a table of the greedy rollouts of the final policies."""
-    headers = ("Learner", "Delivery", "Return\nmean", "IQM", "Steps\nmean", "IQM", "Food\nmean")
+    means = ("Return\nmean", "IQM", "Steps\nmean", "IQM", "Deliveries\nmean")
     rows = []
     for line in lines:
         gains, steps, food = (
@@ -220,7 +220,8 @@ def greedy_table(lines: Sequence[Line]) -> Table:
         rows.append([line.label, line.delivery, *both, number(food.mean, 2)])
     low, high = GREEDY_STEPS
     note = f"The paper, in its world: a return of about {GREEDY_RETURN} in {low} to {high} steps."
-    return Table("Greedy evaluation, configurations as above", headers, rows, [note], 2)
+    title = "Greedy evaluation, configurations as above"
+    return Table(title, ("Learner", "Delivery", *means), rows, [note], 2)
 
 
 def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans]) -> Table:
@@ -240,9 +241,9 @@ def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans])
     notes = (
         "Each policy is followed greedily once, with evaporation as in training.",
         *(f"{one}: {words}." for one, words in zip(BEHAVIOURS, DEFINITIONS, strict=True)),
-        "If that episode has no delivery, its second half decides.",
-        "Return: mean of the last 50 training episodes, of the episode that is followed, and of "
-        "the greedy evaluation. summary.csv has the counts of all configurations.",
+        "An episode without a delivery is classified by its second half.",
+        "Return in training: mean of the last 50 episodes; followed: of the classified episode; "
+        "greedy: of the greedy evaluation. summary.csv has the counts of all configurations.",
     )
     title = "Behaviour, in the configurations above"
     return Table(title, headers, rows, notes, text_columns=3)

@@ -16,8 +16,8 @@ from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
 from taichi_ants.analysis.paper.comparison import Comparison, Row, Variant
 from taichi_ants.analysis.paper.measures import MEASURES
 from taichi_ants.analysis.paper.published import TABLE_2, PaperRow
-from taichi_ants.analysis.statistics import RANDOM_SEED, interquartile_mean
-from taichi_ants.analysis.sweeps import Estimator, centre_columns, centres_of
+from taichi_ants.analysis.statistics import RANDOM_SEED, Estimator, interquartile_mean
+from taichi_ants.analysis.sweeps import centre_columns, centres_of
 
 DRAWS = 20_000
 # Measures in table 2. The paper has one number of steps, which can be read in two ways.
@@ -59,7 +59,7 @@ def summarise(comparison: Comparison) -> list[Summary]:
 
 
 class BehaviourMeans(NamedTuple):
-    """A row of behaviours.csv: the runs of a configuration with one behaviour."""
+    """A row of behaviours.csv: means over the runs of a configuration that show one behaviour."""
 
     row: Row
     behaviour: int
@@ -107,7 +107,10 @@ def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> i
 def best_of(
     comparison: Comparison, delivery: str, variant: Variant, draws: int = DRAWS
 ) -> dict[str, np.ndarray]:
-    """Return `FIGURES` of the best configuration, one run each, float64 (draws,) by name."""
+    """Return `FIGURES` of the best run if each configuration runs once, float64 (draws,) by name.
+
+    Each draw takes a random seed for each configuration.
+    """
     rows = np.array(comparison.positions(delivery, variant))
     random = np.random.default_rng(RANDOM_SEED)
     seeds = random.integers(0, len(comparison.seeds), size=(draws, len(rows)))

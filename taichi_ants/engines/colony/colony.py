@@ -12,7 +12,7 @@ from taichi_ants import checks
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState, checked_worlds
 from taichi_ants.engines.colony.stepping import Stepper
-from taichi_ants.errors import AntsError, array_of, checked_whole, entries_of, shown
+from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown
 from taichi_ants.measures.measure import Measure
 from taichi_ants.measures.series import Recorder
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
@@ -43,9 +43,9 @@ class Colony(ColonyState):
             alone. Requires one ant and no births.
         sharing: "shared" for one table per world, for learners with a TD error; "independent" for
             one table and memory per slot; "frozen" for no learning.
-        q_values: Initial action values, float (n_states, 5), (W, n_states, 5) or, without sharing,
-            (W, slots, n_states, 5). None: the initial value of `training`. Required for sharing
-            "frozen" with a `training`.
+        q_values: Initial action values, float (n_states, 5), (W, n_states, 5) or, if sharing is
+            "independent", (W, slots, n_states, 5). None: the initial value of `training`. Required
+            for sharing "frozen" with a `training`.
         threads, arch: As in `train`.
         schedule: "by_world" distributes worlds to threads, "by_chunk" groups of ants; None chooses
             by size. Both give the same numbers, with ants stored in different orders.
@@ -93,17 +93,22 @@ class Colony(ColonyState):
         """
         which = array_of("which", which)
         if which.dtype != bool or which.shape != (len(self.seeds),):
-            raise AntsError(f"which is {shown(which)}; give a bool for each of the worlds.")
+            raise AntsError(
+                f"which is {shown(which)}; give a bool for each of the {len(self.seeds)} worlds."
+            )
         if seeds is None:
             self.keep_streams(which)
         else:
             listed = entries_of(seeds)
             if listed is None:
-                raise AntsError(f"seeds is {shown(seeds)}; give a seed for each of these worlds.")
+                raise AntsError(f"seeds is {shown(seeds)}; give a list of one seed per world.")
             checked = [seed for one in listed for seed in checks.checked_seeds(one)]
             if len(checked) != np.count_nonzero(which):
-                n = np.count_nonzero(which)
-                raise AntsError(f"there are {len(checked)} seeds for {n} worlds; give {n}.")
+                n = int(np.count_nonzero(which))
+                raise AntsError(
+                    f"there are {count(len(checked), 'seed')} for {count(n, 'world')}; give "
+                    f"{count(n, 'seed')}."
+                )
             self.reseed(which, checked)
         self.begin(which)
         self._stepper.launch(self, "begin_phases")
@@ -134,8 +139,8 @@ class Colony(ColonyState):
         self.check_begun()
         if not self.is_given_actions:
             raise AntsError(
-                "the ants of this colony choose actions by its training; call tick instead, or "
-                'make a colony with training=None and sharing="frozen".'
+                "the ants of this colony choose their own actions; call tick instead, or make a "
+                'colony with training=None and sharing="frozen".'
             )
         given, shape = array_of("actions", actions), (len(self.seeds), self.capacity)
         if given.dtype.kind not in "iu" or given.shape != shape:

@@ -292,7 +292,10 @@ class Interventions:
                 f"{count(int(room), 'free cell')}; leave more cells free."
             )
         if self.colony.learns and not (start == FOOD).any():
-            raise AntsError("this would remove the last food, but ants learn from it; leave some.")
+            raise AntsError(
+                "this change would remove the last food item, but ants that learn need at least 1; "
+                "leave one."
+            )
         self._start, self._changed = start, True
 
     def _change_food_sources(self, cells: np.ndarray, what: int) -> None:

@@ -176,8 +176,8 @@ class ColonyState:
         (self.training,) = checks.checked_configs(training)
         if not self.learns and q_values is None and not self.is_given_actions:
             raise AntsError(
-                "sharing is 'frozen', but q_values is None; these ants do not learn, so give the "
-                "action values that they follow."
+                "sharing is 'frozen', but q_values is None; give the action values that the ants "
+                "follow, because they do not learn."
             )
         if self.learner:
             checks.check_sharing(self.learner, sharing)
@@ -553,8 +553,8 @@ class ColonyState:
             if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
                 raise AntsError(
                     f"q_values has shape {q_values.shape}; give ({form}), ({n_worlds}, {form}) for "
-                    f"one table per world, or without sharing ({n_worlds}, {slots}, {form}) for "
-                    "one table per slot."
+                    f"one table per world, or with independent ants ({n_worlds}, {slots}, {form}) "
+                    "for one table per slot."
                 )
             given = q_values.reshape(*leading, *[1] * (2 - len(leading)), 1, n_states, N_ACTIONS)
             q[..., :N_ACTIONS] = given
@@ -687,8 +687,12 @@ def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -
     given = entries_of(world) or [world] * n_seeds
     worlds = tuple(checks.checked_world(one, learns) for one in given)
     if len(worlds) != n_seeds:
-        raise AntsError(f"there are {len(worlds)} worlds for {n_seeds} seeds; give one per seed.")
+        raise AntsError(
+            f"there are {len(worlds)} worlds for {n_seeds} seeds; give one world per seed."
+        )
     ranges = {world.ranges for world in worlds}
     if len(ranges) > 1:
-        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must have the same.")
+        raise AntsError(
+            f"the worlds have the ranges {sorted(ranges)}; give worlds of equal ranges."
+        )
     return worlds

@@ -229,7 +229,7 @@ def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
 
 @ti.func
 def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
-    """Do the action of an ant, as far as it has won: move, pick up, deliver, deposit."""
+    """Do the action of an ant: move or pick up if it has won, or deliver; and deposit."""
     base, clock = w * c.size, tick * c.evaporates
     action, percept = trait(c.action, ant), trait(c.percept, ant)
     cell, wanted = c.cell[ant], c.want[ant]

@@ -173,7 +173,8 @@ def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int =
     most = MAX_TABLE_ROWS // task.n_states if learns else MAX_ROLLOUT_STEPS
     if capacity > most:
         raise AntsError(
-            f"episodes * max_steps is {capacity}; a trace has at most {most} steps, so reduce them."
+            f"episodes * max_steps is {capacity}; a trace has at most {most} steps, so reduce one "
+            "of them."
         )
     checks.checked_world(world)
     runtime.start()

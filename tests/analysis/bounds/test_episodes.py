@@ -235,7 +235,7 @@ def test_a_discount_out_of_range_is_refused(discount: float) -> None:
     [Task(evaporation_in_training=True), Task(pheromone=Pheromone(diffusion=0.1))],
 )
 def test_trails_that_change_are_refused(task: Task) -> None:
-    with pytest.raises(AntsError, match="without evaporation"):
+    with pytest.raises(AntsError, match="bounds require constant trails"):
         EpisodeBounds(paper(), task)
 
 

@@ -130,7 +130,7 @@ def test_few_hundredths_of_deliveries_do_not_look_like_much(comparison: Made) ->
     always = remeasured(replace(comparison, arrays={**comparison.arrays, "deliveries": ones}))
     figure = learning_curves(always, BASELINES)
     low, high = figure.axes[-1].get_ylim()
-    assert figure.axes[-2].get_ylabel() == "Deliveries of an episode"
+    assert figure.axes[-2].get_ylabel() == "Deliveries per episode"
     assert low <= 0.9
     assert 1 < high < 1.05
 

@@ -201,7 +201,7 @@ def some_circle(comparison: Comparison) -> Comparison:
 def test_means_of_runs_that_do_different_things_are_marked(comparison: Comparison) -> None:
     circling = some_circle(comparison)
     text = table2_markdown(circling, lines_of(circling))
-    assert "+ the runs do different things, so their mean describes no run" in text
+    assert "+ the runs behave in different ways, so their mean describes none of them" in text
     assert text.count("| Dyna-Q (p3) + | terminates |") == 5
     assert text.count(" + |") == 5
     assert "+ the runs" not in table2_markdown(comparison, lines_of(comparison))

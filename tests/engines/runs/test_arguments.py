@@ -81,7 +81,7 @@ BAD_SEEDS = [
     (2**64, f"seeds contains {2**64}; a seed must fit into 64 bits"),
     ([-(2**63) - 1], f"seeds contains {-(2**63) - 1}"),
     ([4, 5, 4], "seeds contains 4 more than once"),
-    ([-1, 2**64 - 1], f"seeds contains {2**64 - 1} more than once; they must differ"),
+    ([-1, 2**64 - 1], f"seeds contains {2**64 - 1} more than once; give seeds that differ"),
 ]
 
 
@@ -112,13 +112,12 @@ def test_seeds_of_tables():
     assert checked_seeds_for(4, ()).tolist() == [4]
     assert checked_seeds_for(4, (2, 3)).tolist() == [4] * 6
     assert checked_seeds_for([1, 2, 3], (2, 3)).tolist() == [1, 2, 3, 1, 2, 3]
-    for shape in ((), (2,), (3, 2)):
-        says(
-            f"there are 3 seeds for tables of leading shape {shape}",
-            checked_seeds_for,
-            [1, 2, 3],
-            shape,
-        )
+    for shape, words in {
+        (): "one table; give 1 seed.",
+        (2,): "2 tables; give 1 seed or 2 seeds.",
+        (3, 2): "3 x 2 tables; give 1 seed or 2 seeds.",
+    }.items():
+        says(f"there are 3 seeds for {words}", checked_seeds_for, [1, 2, 3], shape)
 
 
 NO_COUNTS = [(0, "0"), (-1, "-1"), (1.0, "1.0"), ("1", "'1'"), (None, "None"), (True, "True")]
