@@ -102,7 +102,7 @@ def test_a_resumed_sweep_writes_the_same_series(sweep, tmp_path):
     blocks.mkdir()
     texts = []
     for _ in range(2):
-        asked.measured(blocks, 1, "cpu", lambda share: None)
+        asked.measured(blocks, lambda share: None, threads=1)
         asked.write_series(blocks, tmp_path)
         texts.append((tmp_path / "series.csv").read_bytes())
         sorted(blocks.iterdir())[0].unlink()
