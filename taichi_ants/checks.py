@@ -15,6 +15,7 @@ from taichi_ants.errors import (
     check_one_of,
     checked_flag,
     checked_whole,
+    count,
     entries_of,
     expect,
     shown,
@@ -32,9 +33,18 @@ if TYPE_CHECKING:
 MAX_ANTS = 1 << 24
 
 
-def checked_world(world: World, learns: bool = False) -> World:
-    """Return the world; AntsError if it is not a World or, with `learns`, has no food."""
+def checked_world(world: World, learns: bool = False, several: bool = False) -> World:
+    """Return the world; AntsError if it is not a World or, with `learns`, has no food.
+
+    Only colonies (`several`) can have several nests or kinds of food.
+    """
     expect("world", world, World)
+    if not several and (world.n_nests > 1 or world.n_food_kinds > 1):
+        raise AntsError(
+            f"the world has {count(world.n_nests, 'nest')} and "
+            f"{count(world.n_food_kinds, 'kind')} of food; only colonies support several, so use "
+            "a Colony."
+        )
     if learns and not len(world.foods):
         raise AntsError("the world has no food, so ants cannot learn in it; add food.")
     return world
@@ -52,6 +62,11 @@ def checked_runs_task(task: Task | None) -> Task:
     if task.life.changes:
         raise AntsError(
             f"life of the task is {task.life}; only colonies support it, so use a Colony."
+        )
+    if task.foods:
+        raise AntsError(
+            f"foods of the task are {', '.join(task.foods)}; only colonies support kinds of food, "
+            "so use a Colony."
         )
     if task.pheromone.dense:
         raise AntsError(

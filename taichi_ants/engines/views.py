@@ -27,6 +27,7 @@ def view_type(observation: Observation, dense: bool) -> Any:
         levels=ti.types.vector(n, level),
         strongest=level,
         ants=of_cells,
+        strangers=of_cells,
         nearer=of_cells,
         own_level=level,
     )

@@ -282,7 +282,8 @@ class Study(Generic[PointKind]):
                 )
             starts = [*zip(several, self.seeds, strict=False), *((one, 0) for one in pool or ())]
             for one, seed in starts:
-                checks.checked_world(one, learns=True).start(seed, ants)
+                of_colony = isinstance(self.points[0], ColonyPoint)
+                checks.checked_world(one, learns=True, several=of_colony).start(seed, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:

@@ -125,13 +125,13 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
         raise AntsError(f"{source} has no cells; draw cells with {_ALLOWED}.")
     queens = [one for one in drawn if one.mark in QUEENS]
     for nest, mark in enumerate(QUEENS):
-        one, *more = [one for one in queens if one.mark == mark] or [None]
-        if one is None and (nest == 0 or any(late.mark > mark for late in queens)):
+        several = [one for one in queens if one.mark == mark]
+        if not several and (nest == 0 or any(late.mark > mark for late in queens)):
             missing = "queen" if nest == 0 else f"queen {mark}"
             raise AntsError(f"{source} has no {missing}; draw one cell as {mark}.")
-        if more:
+        if len(several) > 1:
             raise AntsError(
-                f"{more[0].found(source)} a second time; draw the queen of each nest once, as "
+                f"{several[1].found(source)} a second time; draw the queen of each nest once, as "
                 f"{', '.join(QUEENS)}."
             )
     return DEFAULT_TRAIL_LEVEL if level is None else level, drawn

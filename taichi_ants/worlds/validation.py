@@ -7,11 +7,8 @@ import numpy as np
 from taichi_ants.errors import AntsError, count, entries_of, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import FAR, MAX_ARRAY_CELLS, AxialGrid
-from taichi_ants.task.constants import MAX_TRAIL_LEVEL
+from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, MAX_TRAIL_LEVEL
 
-# A queen and an ant carry the number of their nest in three bits, of which 0 means no ant.
-MAX_NESTS = 7
-MAX_FOOD_KINDS = 8
 _STANDS = ("nothing", "the queen", "a food item", "an obstacle")
 
 

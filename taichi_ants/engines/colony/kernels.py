@@ -56,6 +56,10 @@ class Features(NamedTuple):
     traffic: Traffic
     ants_change: bool
     food_changes: bool
+    n_nests: int
+    n_kinds: int
+    has_foods: bool
+    has_loads: bool
 
 
 class Variant:
@@ -69,6 +73,10 @@ class Variant:
         self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
+        self.n_nests, self.n_kinds = features.n_nests, features.n_kinds
+        self.has_foods, self.has_loads = features.has_foods, features.has_loads
+        # Whether deliveries are counted by nest and kind.
+        self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
@@ -82,7 +90,10 @@ class Variant:
         if self.together:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
-        self.n_pairs = observation.n_states * ROW  # state-action pairs, and unused numbers
+        self.n_numbers = (
+            observation.n_states * ROW
+        )  # state-action pairs of a table, and unused ones
+        self.n_pairs = self.n_numbers * self.n_nests  # of all tables that ants of a world share
         self.sees_percept = observation.name == "paper"  # the percept is the state index
         # Whether the cell of an ant must show that the ant carries food.
         self.sees_ants = not self.sees_percept or self.view == "strongest_under_carriers"

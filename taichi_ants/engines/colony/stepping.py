@@ -130,6 +130,10 @@ class Stepper:
             traffic=task.traffic,
             ants_change=state.ants_change,
             food_changes=state.food_changes,
+            n_nests=state.n_nests,
+            n_kinds=state.n_kinds,
+            has_foods=bool(task.foods),
+            has_loads=task.has_loads,
         )
         variant = kernels.variant(features)
         if name == "ticks":
