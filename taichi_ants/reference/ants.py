@@ -28,6 +28,8 @@ class Ant:
         number: 0 .. n - 1 for the initial ants; n, n + 1, ... for ants born in the episode.
         age: Ticks since the ant was born, if there is a lifespan.
         carried: Ticks since the ant picked up its food.
+        nest: The number of its nest.
+        kind: The kind of the last food that it picked up.
         percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
         action, event, reward: The last ones; -1, NONE and 0 before the first tick.
@@ -48,6 +50,8 @@ class Ant:
     event: Event = Event.NONE
     reward: int = 0
     chosen: int | None = None
+    nest: int = 0
+    kind: int = 0
 
 
 @dataclass(kw_only=True, slots=True)
@@ -78,6 +82,7 @@ class Transition:
     next_action: int | None
     terminated: bool
     truncated: bool
+    nest: int = 0
     td_error: np.float32 | None = None
 
     @property
@@ -95,20 +100,36 @@ def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tup
     listed = [((x, y, z), heading) for x, y, z, heading in world.ants.tolist()]
     if n <= len(listed):
         return listed[:n]
-    taken = {world.queen, *listed_cells(world.foods), *listed_cells(world.obstacles)}
+    queens = listed_cells(world.queens)
+    taken = {*queens, *listed_cells(world.foods), *listed_cells(world.obstacles)}
     taken |= {cell for cell, _ in listed}
-    order = start_order(world, world.queen, seed, where)
-    free = [cell for cell in order if cell not in taken]
+    orders = [iter(start_order(world, queen, seed, where)) for queen in queens]
     missing = n - len(listed)
+    free: list[Cell] = []
+    for number in range(len(listed), n):  # each ant takes the first free cell of its nest
+        order = orders[nest_of(world, number)]
+        cell = next((cell for cell in order if cell not in taken), None)
+        if cell is not None:
+            free.append(cell)
+            taken.add(cell)
     if missing > len(free):
         raise AntsError(
-            f"n is {n}; the world lists {len(listed)} ants and has {len(free)} free cells; "
+            f"n is {n}; the world lists {len(listed)} ants and has too few free cells; "
             "choose fewer ants or a larger world."
         )
     return listed + [
         (cell, pick(stream_state(seed, STREAM_START_HEADING, ant) >> 32, N_HEADINGS))
         for ant, cell in enumerate(free[:missing], start=len(listed))
     ]
+
+
+def nest_of(world: World, number: int) -> int:
+    """Return the nest of an ant that starts: for a listed ant the nearest queen's, else in turn."""
+    queens = listed_cells(world.queens)
+    if number >= len(world.ants):
+        return number % len(queens)
+    x, y, z, _ = world.ants[number].tolist()
+    return min(range(len(queens)), key=lambda nest: distance((x, y, z), queens[nest]))
 
 
 def start_order(world: World, queen: Cell, seed: int, where: str) -> list[Cell]:

@@ -39,13 +39,20 @@ def strongest_in_view(world: WorldState, ant: Ant) -> Level:
     return max((world.trail.level(cell) for cell in counting), default=0)
 
 
+def nestmate(world: WorldState, ant: Ant, cell: Cell) -> Ant | None:
+    """Return the ant on a cell if it is of the same nest; ants of other nests are obstacles."""
+    other = world.ants.get(cell)
+    return other if other is not None and other.nest == ant.nest else None
+
+
 def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
     """Return whether a cell is better for an ant than its own.
 
     A better cell is nearer to the queen for a carrier, and has a stronger trail for a forager.
     """
     if ant.carries:
-        return distance(cell, world.queen) < distance(ant.cell, world.queen)
+        queen = world.queens[ant.nest]
+        return distance(cell, queen) < distance(ant.cell, queen)
     return bool(world.trail.level(cell) > world.trail.level(ant.cell))
 
 
@@ -57,6 +64,8 @@ def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -
 
 def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
     content = world.content(cell)
+    if content == QUEEN and cell != world.queens[ant.nest]:
+        return SEES_OBSTACLE
     if content == (QUEEN if ant.carries else FOOD):
         return SEES_GOAL
     if content != EMPTY:  # also the queen for foragers, and food for carriers
@@ -89,7 +98,7 @@ def more_cells(turns: tuple[int, ...], world: WorldState, ant: Ant) -> int:
 def ants_seen(world: WorldState, ant: Ant) -> int:
     """Return the state index of the load and the cells ahead; other ants have their own code."""
     codes = [
-        ANOTHER_ANT if cell in world.ants else code
+        ANOTHER_ANT if nestmate(world, ant, cell) else code
         for cell, code in zip(cells_in_view(ant), codes_in_view(world, ant), strict=True)
     ]
     return _number([ant.carries, *codes], 5)
@@ -120,7 +129,7 @@ def crowd(queue: bool, world: WorldState, ant: Ant) -> int:
     """
     codes = codes_in_view(world, ant)
     for side, cell in enumerate(cells_in_view(ant)):
-        there = world.ants.get(cell)
+        there = nestmate(world, ant, cell)
         if there is None:
             continue
         better = is_better(world, ant, cell)

@@ -12,7 +12,9 @@ from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, n
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
-    from taichi_ants.task import Pheromone
+    from collections.abc import Sequence
+
+    from taichi_ants.task import Food, Pheromone
     from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
@@ -93,16 +95,37 @@ class WorldState:
     cells to ants.
     """
 
-    def __init__(self, world: World, pheromone: Pheromone) -> None:
-        self._ranges = world.ranges
-        self.queen: Cell = world.queen
+    def __init__(self, world: World, pheromone: Pheromone, foods: Sequence[Food] = ()) -> None:
+        self._ranges, self.foods = world.ranges, foods
+        self.queens: list[Cell] = listed_cells(world.queens)
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
-        self.ground[self.queen] = QUEEN
+        self.ground.update(dict.fromkeys(self.queens, QUEEN))
         self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
+        # The kind of the food in a cell, and its loads.
+        self.kinds = dict.fromkeys(listed_cells(world.foods), 0)
+        self.kinds.update(zip(self.kinds, world.food_kinds.tolist(), strict=False))
+        self.loads = {cell: self.full(kind) for cell, kind in self.kinds.items()}
         self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
         self.ants: dict[Cell, Ant] = {}
         self.pheromone = pheromone
         self.trail = Trail(world, pheromone)
+
+    @property
+    def queen(self) -> Cell:
+        """The queen of the first nest."""
+        return self.queens[0]
+
+    @queen.setter
+    def queen(self, cell: Cell) -> None:
+        self.queens[0] = cell
+
+    def full(self, kind: int) -> int:
+        """Return the number of loads in a full cell of a kind of food."""
+        return self.foods[kind].loads if self.foods else 1
+
+    def put_food(self, cell: Cell, kind: int, loads: int) -> None:
+        """Put food on a cell."""
+        self.ground[cell], self.kinds[cell], self.loads[cell] = FOOD, kind, loads
 
     def content(self, cell: Cell) -> int:
         """Return the content of a cell: its ground, or OBSTACLE for an ant or the outside."""

@@ -134,7 +134,7 @@ class SumRow(IntEnum):
 
 # In `ground`, the lower four bits of a cell are its ground, see `task.constants`. The upper four
 # mark an ant on it: 7 minus its nest, plus 8 if it carries food and others can see that.
-ANT_STANDS, STANDS_WITH_FOOD = 7, 15
+ANT_STANDS = 7
 ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
 
 # The number of slots from which threads share a world: a single world, and each of many.

@@ -2,7 +2,6 @@
 
 import taichi as ti
 
-from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.rules import pheromone
 
@@ -25,7 +24,7 @@ def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
     """Return the trail of a cell as it counts for the strongest one, 0 if it does not count."""
     level = level_in_view(c, v, place, clock)
     if ti.static(v.view == "strongest_under_carriers"):
-        carrier = c.ground[place] >> 4 == STANDS_WITH_FOOD
+        carrier = c.ground[place] >> 7 == 1  # of any nest
         level = ti.select(carrier, level_of(c, v, place, clock), level)
     return level
 
