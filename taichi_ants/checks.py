@@ -65,8 +65,7 @@ def checked_runs_task(task: Task | None) -> Task:
         )
     if task.foods:
         raise AntsError(
-            f"foods of the task are {', '.join(task.foods)}; only colonies support kinds of food, "
-            "so use a Colony."
+            f"`task.foods` is {', '.join(task.foods)}; only colonies support it, so use a Colony."
         )
     if task.pheromone.dense:
         raise AntsError(

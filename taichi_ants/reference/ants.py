@@ -9,7 +9,13 @@ import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
-from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells
+from taichi_ants.reference.geometry import (
+    Cell,
+    distance,
+    existing_cells,
+    listed_cells,
+    queens_of,
+)
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.events import Event
 
@@ -94,38 +100,34 @@ def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tup
     """Return the start cell and heading of n ants; AntsError if the world has too few free cells.
 
     The ants listed by the world are first. The seed decides the headings of the others, and the
-    order in which they take free cells: those nearest to the queen first if `where` is "nest",
-    cells anywhere if it is "spread".
+    order in which they take free cells: those nearest to their queen first if `where` is "nest",
+    cells anywhere if it is "spread". Ants take cells in turn, by number.
     """
     listed = [((x, y, z), heading) for x, y, z, heading in world.ants.tolist()]
     if n <= len(listed):
         return listed[:n]
-    queens = listed_cells(world.queens)
+    queens = queens_of(world)
     taken = {*queens, *listed_cells(world.foods), *listed_cells(world.obstacles)}
     taken |= {cell for cell, _ in listed}
     orders = [iter(start_order(world, queen, seed, where)) for queen in queens]
     missing = n - len(listed)
-    free: list[Cell] = []
-    for number in range(len(listed), n):  # each ant takes the first free cell of its nest
-        order = orders[nest_of(world, number)]
-        cell = next((cell for cell in order if cell not in taken), None)
-        if cell is not None:
-            free.append(cell)
-            taken.add(cell)
-    if missing > len(free):
+    n_free = len(set(existing_cells(world.ranges)) - taken)
+    if missing > n_free:
         raise AntsError(
-            f"n is {n}; the world lists {len(listed)} ants and has too few free cells; "
+            f"n is {n}; the world lists {len(listed)} ants and has {n_free} free cells; "
             "choose fewer ants or a larger world."
         )
-    return listed + [
-        (cell, pick(stream_state(seed, STREAM_START_HEADING, ant) >> 32, N_HEADINGS))
-        for ant, cell in enumerate(free[:missing], start=len(listed))
-    ]
+    for number in range(len(listed), n):
+        cell = next(cell for cell in orders[nest_of(world, number)] if cell not in taken)
+        taken.add(cell)
+        heading = pick(stream_state(seed, STREAM_START_HEADING, number) >> 32, N_HEADINGS)
+        listed.append((cell, heading))
+    return listed
 
 
 def nest_of(world: World, number: int) -> int:
     """Return the nest of an ant that starts: for a listed ant the nearest queen's, else in turn."""
-    queens = listed_cells(world.queens)
+    queens = queens_of(world)
     if number >= len(world.ants):
         return number % len(queens)
     x, y, z, _ = world.ants[number].tolist()

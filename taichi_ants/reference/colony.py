@@ -22,7 +22,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference.actions import carry_out, choose_action, intend
 from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
 from taichi_ants.reference.food_sources import FoodSources
-from taichi_ants.reference.geometry import Cell, neighbour
+from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.observations import OBSERVATIONS, observe
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
@@ -107,7 +107,7 @@ class ReferenceColony:
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         make = partial(LEARNERS[training.learner], training, task.n_states)
-        nests = world.n_nests if sharing != "independent" else 1
+        nests = len(queens_of(world)) if sharing != "independent" else 1
         tables = [None] * nests if q_values is None else [q_values] * nests
         if nests > 1 and q_values is not None and q_values.ndim == 3:
             tables = list(q_values)
@@ -198,9 +198,9 @@ class ReferenceColony:
             intents.append(intend(self.world, ant, action, traffic))
         carry_out(self.world, intents, tick, self.task)
         for intent in intents:
-            if intent.ant.event is Event.PICKED_UP and intent.target is not None:
-                if self.world.ground[intent.target] == EMPTY:  # the last load
-                    self.food_sources.taken(intent.target, tick)
+            picked = intent.target if intent.ant.event is Event.PICKED_UP else None
+            if picked is not None and self.world.ground[picked] == EMPTY:  # its last load
+                self.food_sources.taken(picked, tick)
         self.world.trail.tick()
         self._count(acting)
         if self.task.life.births:

@@ -8,7 +8,13 @@ import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, neighbour
+from taichi_ants.reference.geometry import (
+    Cell,
+    existing_cells,
+    listed_cells,
+    neighbour,
+    queens_of,
+)
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
@@ -97,7 +103,7 @@ class WorldState:
 
     def __init__(self, world: World, pheromone: Pheromone, foods: Sequence[Food] = ()) -> None:
         self._ranges, self.foods = world.ranges, foods
-        self.queens: list[Cell] = listed_cells(world.queens)
+        self.queens: list[Cell] = queens_of(world)
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
         self.ground.update(dict.fromkeys(self.queens, QUEEN))
         self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))

@@ -459,7 +459,11 @@ def world_facts(world: World) -> dict[str, Any]:
         numbers[name] = len(array)
         digest.update(repr(array.shape).encode())
         digest.update(array.tobytes())
+    for more in (world.other_queens, world.food_kinds):  # empty in most worlds
+        digest.update(more.tobytes())
     where = {"ranges": list(world.ranges), "queen": list(world.queen)}
+    if world.n_nests > 1:
+        where["queens"] = world.queens.tolist()
     return {**where, **numbers, "sha256": digest.hexdigest()}
 
 

@@ -90,9 +90,7 @@ class Variant:
         if self.together:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
-        self.n_numbers = (
-            observation.n_states * ROW
-        )  # state-action pairs of a table, and unused ones
+        self.n_numbers = observation.n_states * ROW  # of a table: state-action pairs, and unused
         self.n_pairs = self.n_numbers * self.n_nests  # of all tables that ants of a world share
         self.sees_percept = observation.name == "paper"  # the percept is the state index
         # Whether the cell of an ant must show that the ant carries food.

@@ -144,10 +144,8 @@ def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         if c.age[ant] >= c.lifespan:
             put(c.stage, ant, Stage.DYING)
             tally(c, Tally.DEATHS, chunk, 1)
-            left_behind, place = (
-                ti.select(trait(c.carries, ant) == 1, FOOD, EMPTY),
-                w * c.size + c.cell[ant],
-            )
+            left_behind = ti.select(trait(c.carries, ant) == 1, FOOD, EMPTY)
+            place = w * c.size + c.cell[ant]
             c.ground[place] = ti.cast(left_behind, ti.u8)
             if left_behind == FOOD:
                 if ti.static(v.n_kinds > 1):

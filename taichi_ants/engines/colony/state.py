@@ -72,7 +72,7 @@ class ColonyEpisodes(Record):
     """Results of episodes, arrays of shape (episodes, worlds).
 
     `first_delivery` is -1 if there was none; `blocked` counts failed moves, `living` ants at the
-    end; `deliveries_apart` has deliveries by nest and kind of food, (episodes, worlds, nests,
+    end. `deliveries_apart` has deliveries by nest and kind of food, (episodes, worlds, nests,
     kinds). Returns, moves and blocked are int64, all others int32.
     """
 
@@ -87,6 +87,16 @@ class ColonyEpisodes(Record):
     regrown: np.ndarray
     living: np.ndarray
     deliveries_apart: np.ndarray
+
+    @property
+    def nest_deliveries(self) -> np.ndarray:
+        """Deliveries by nest, (episodes, worlds, nests)."""
+        return self.deliveries_apart.sum(axis=3, dtype=np.int32)
+
+    @property
+    def food_deliveries(self) -> np.ndarray:
+        """Deliveries by kind of food, (episodes, worlds, kinds)."""
+        return self.deliveries_apart.sum(axis=2, dtype=np.int32)
 
 
 def column(name: str) -> property:
@@ -455,7 +465,7 @@ class ColonyState:
             # The start cells and headings of ants, by world and number.
             "start_cells": cells,
             "start_headings": np.array([headings for _, headings in starts], np.int8),
-            "start_nests": nests.astype(np.int8),
+            "start_nests": nests[:, : n * (self.n_nests > 1)].astype(np.int8),
             # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
             # The clock at which a cell's trail has evaporated; if dense, its level.
@@ -566,7 +576,7 @@ class ColonyState:
     def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
         """Return the tables of all worlds or slots, with `q_values` or the initial value."""
         n_worlds, slots, n_states = len(self.seeds), self.owners, self.task.n_states
-        own = slots > 1
+        own = self.one_a_slot or slots > 1
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
@@ -712,7 +722,7 @@ def _closer_to_each(world: World) -> np.ndarray:
 
 
 def _food_numbers(task: Task) -> np.ndarray:
-    """Return the numbers of the kinds of food, int32 (FoodRow, kinds); -1 is no regrowth."""
+    """Return the settings of the kinds of food, int32 (FoodRow, kinds)."""
     kinds = task.foods.values()
     numbers = np.zeros((len(FoodRow), max(1, len(kinds))), np.int32)
     for k, food in enumerate(kinds):
