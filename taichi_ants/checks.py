@@ -28,6 +28,7 @@ from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.world import STARTS, World
 
 if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
     from taichi_ants.learners.learner import Learner
 
 MAX_ANTS = 1 << 24
@@ -54,6 +55,15 @@ def checked_task(task: Task) -> Task:
     """Return the task; AntsError if it is not a Task."""
     expect("task", task, Task)
     return task
+
+
+def check_one_nest(colony: Colony, who: str) -> None:
+    """Raise AntsError if a colony has several nests or kinds of food, which `who` cannot have."""
+    if colony.n_nests > 1 or colony.task.foods:
+        raise AntsError(
+            f"the colony has several nests, or `task.foods`; {who} supports one nest and no "
+            "`task.foods`."
+        )
 
 
 def checked_runs_task(task: Task | None) -> Task:

@@ -48,6 +48,7 @@ from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import Start, World
 
 State = TypeVar("State", bound="ColonyState")
@@ -174,7 +175,11 @@ class ColonyState:
         worlds = checked_worlds(world, len(self.seeds), self.learns)
 
         self.one_a_slot = sharing == "independent" or (
-            not self.learns and table is not None and table.ndim == 4
+            # Frozen tables by slot; those by nest have another length, see `owners`.
+            not self.learns
+            and table is not None
+            and table.ndim == 4
+            and (worlds[0].n_nests == 1 or table.shape[1] != worlds[0].n_nests)
         )
         life = self.task.life
         self.ants_change = life.births or life.lifespan is not None
@@ -292,6 +297,17 @@ class ColonyState:
         if self.n_nests == 1:
             return np.zeros((len(self.seeds), self.capacity), np.int32)
         return self.arrays["nest"].reshape(len(self.seeds), -1).astype(np.int32)
+
+    @property
+    def rewards(self) -> np.ndarray:
+        """The reward of the last action of the ant in each slot, int32 (W, capacity)."""
+        rewards = self.task.rewards.by_event()[self.events]
+        if self.task.foods:
+            kinds = self.arrays["kind"].reshape(rewards.shape) if self.n_kinds > 1 else 0
+            picked_up, delivered = self.arrays["food_numbers"][:2, kinds]
+            rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
+            rewards = np.where(self.events == Event.DELIVERED, delivered, rewards)
+        return rewards
 
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""

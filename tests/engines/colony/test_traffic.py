@@ -16,7 +16,7 @@ from taichi_ants.engines.colony.layout import ANT_GROUND
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Pheromone, Rewards, Task, Traffic
-from taichi_ants.task.constants import FORWARD, GIVE, OBSTACLE, PICK_UP, RIGHT
+from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP, RIGHT
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
 BEYOND = (9, 3, 0)  # the queen at the end of the row: +1 for each step along it with food
