@@ -44,7 +44,7 @@ MUTATIONS = [
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),
-    ("engines/colony/steps.py", "(ground == QUEEN) & (place != queen)", "ground == FORWARD", NESTS),
+    ("engines/colony/steps.py", "(place != queen)", "(place < 0)", NESTS),
     ("engines/colony/steps.py", "left = c.loads[place] - 1", "left = c.loads[place] - 2", NESTS),
     ("engines/colony/life.py", "put(c.nest, ant, nest)", "put(c.nest, ant, 0)", COLONY),
     (
