@@ -25,6 +25,7 @@ TIMEOUT = 300.0  # seconds; a mutation that makes tests take longer counts as no
 RUNS = "tests/engines/runs/test_against_reference.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
+NESTS = "tests/engines/colony/test_nests.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -60,6 +61,15 @@ MUTATIONS = [
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),
+    ("engines/colony/steps.py", "(place != queen)", "(place < 0)", NESTS),
+    ("engines/colony/steps.py", "left = c.loads[place] - 1", "left = c.loads[place] - 2", NESTS),
+    ("engines/colony/life.py", "put(c.nest, ant, nest)", "put(c.nest, ant, 0)", COLONY),
+    (
+        "engines/colony/life.py",
+        "c.kind_of[place] = ti.cast(trait(c.kind, ant), ti.u8)",
+        "pass",
+        COLONY,
+    ),
     ("task/rules/conflicts.py", "loaded > other_loaded or", "loaded < other_loaded or", TRAFFIC),
     ("task/rules/conflicts.py", "stays = had_ant(", "stays = not had_ant(", TRAFFIC),
     ("task/rules/conflicts.py", "(WINS | TAKES_FOOD) == WINS", "WINS == WINS", TRAFFIC),

@@ -15,6 +15,7 @@ from taichi_ants.errors import (
     check_one_of,
     checked_flag,
     checked_whole,
+    count,
     entries_of,
     expect,
     shown,
@@ -28,14 +29,24 @@ from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.worlds.world import STARTS, World
 
 if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
     from taichi_ants.learners.learner import Learner
 
 MAX_ANTS = 1 << 24
 
 
-def checked_world(world: World, learns: bool = False) -> World:
-    """Return the world; AntsError if it is not a World or, with `learns`, has no food."""
+def checked_world(world: World, learns: bool = False, several: bool = False) -> World:
+    """Return the world; AntsError if it is not a World or, with `learns`, has no food.
+
+    Only colonies (`several`) can have several nests or kinds of food.
+    """
     expect("world", world, World)
+    if not several and (world.n_nests > 1 or world.n_food_kinds > 1):
+        raise AntsError(
+            f"the world has {count(world.n_nests, 'nest')} and "
+            f"{count(world.n_food_kinds, 'kind')} of food; only colonies support several, so use "
+            "a Colony."
+        )
     if learns and not len(world.foods):
         raise AntsError("the world has no food, so ants cannot learn in it; add food.")
     return world
@@ -47,12 +58,25 @@ def checked_task(task: Task) -> Task:
     return task
 
 
+def check_one_nest(colony: Colony, who: str) -> None:
+    """Raise AntsError if a colony has several nests or kinds of food, which `who` cannot have."""
+    if colony.n_nests > 1 or colony.task.foods:
+        raise AntsError(
+            f"the colony has several nests, or `task.foods`; {who} supports one nest and no "
+            "`task.foods`."
+        )
+
+
 def checked_runs_task(task: Task | None) -> Task:
     """Return the task, by default the paper's; AntsError if runs of one ant cannot have it."""
     task = checked_task(Task() if task is None else task)
     if task.life.changes:
         raise AntsError(
             f"life of the task is {task.life}; only colonies support it, so use a Colony."
+        )
+    if task.foods:
+        raise AntsError(
+            f"`task.foods` is {', '.join(task.foods)}; only colonies support it, so use a Colony."
         )
     if task.pheromone.dense:
         raise AntsError(

@@ -34,6 +34,7 @@ def view_type(observation: Observation, dense: bool, reads_dense: tuple[bool, ..
         levels=ti.types.vector(n, level),
         strongest=level,
         ants=of_cells,
+        strangers=of_cells,
         nearer=of_cells,
         own_level=level,
         **read,

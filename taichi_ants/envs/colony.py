@@ -83,7 +83,7 @@ class ColonyWorlds(Ants):
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
         events = np.where(self.acted, colony.events, Event.NONE)
-        self.rewards = colony.task.rewards.by_event()[events].astype(np.float64)
+        self.rewards = np.where(self.acted, colony.rewards, 0).astype(np.float64)
         self.events = events.astype(np.int64)
 
     @property

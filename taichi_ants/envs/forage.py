@@ -26,8 +26,8 @@ METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "ansi"], "render_fps":
 _GROUNDS = {
     EMPTY: text_map.EMPTY,
     OBSTACLE: text_map.OBSTACLE,
-    FOOD: text_map.FOOD,
-    QUEEN: text_map.QUEEN,
+    FOOD: text_map.FOODS[0],
+    QUEEN: text_map.QUEENS[0],
 }
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)

@@ -110,6 +110,7 @@ def record_colony(
         AntsError: An argument is not allowed, or the colony has different worlds.
     """
     expect("colony", colony, Colony)
+    checks.check_one_nest(colony, "record_colony")
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
     checks.check_progress(progress)

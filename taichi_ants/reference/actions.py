@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, neighbour
-from taichi_ants.reference.observations import is_better
+from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import (
@@ -82,7 +82,7 @@ def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent
         return Intent(ant, action, heading, neighbour(ant.cell, heading))
     heading = (ant.heading + action - 1) % N_HEADINGS
     target = neighbour(ant.cell, heading)
-    if traffic.shared and target in world.ants:
+    if traffic.shared and nestmate(world, ant, target):
         return Intent(ant, action, heading, target, lured=is_better(world, ant, target))
     if codes[action] not in (SEES_EMPTY, SEES_LURE):
         return Intent(ant, action, heading)
@@ -169,7 +169,10 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
             event = _move(world, intent, entered.get(slot))
         else:
             event = _handle(world, intent, slot in winning, task)
-        ant.event, ant.reward = event, getattr(task.rewards, PAID[event])
+        paid = getattr(task.rewards, PAID[event])
+        if world.foods and event in (Event.PICKED_UP, Event.DELIVERED):
+            paid = getattr(world.foods[ant.kind], PAID[event])
+        ant.event, ant.reward = event, paid
         for name, trail in world.fields.items():
             for cell in _marked(task.fields[name].laid, intent, start, had_food):
                 trail.deposit(cell, ant.carried)
@@ -220,7 +223,10 @@ def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
             ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.DELIVERED
     if intent.action == PICK_UP and wins and intent.target is not None:
-        world.ground[intent.target] = EMPTY
+        ant.kind = world.kinds[intent.target]
+        world.loads[intent.target] -= 1
+        if world.loads[intent.target] == 0:
+            world.ground[intent.target] = EMPTY
         world.trail.deposit(intent.target, 0)
         world.trail.deposit(ant.cell, 0)
         ant.carries, ant.carried = True, 0

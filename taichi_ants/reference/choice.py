@@ -15,7 +15,7 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.numbers import exponential, power
-from taichi_ants.reference.observations import is_better
+from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import (
@@ -87,7 +87,7 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
         misread = side - 1 in ant.misread
         nearer[side] = seen[side] == SEES_LURE
         enters = seen[side] in (SEES_EMPTY, SEES_LURE)
-        if cell in world.ants and not misread and traffic.shared:
+        if nestmate(world, ant, cell) and not misread and traffic.shared:
             enters = ant.carries or traffic.follow
             nearer[side] = ant.carries and is_better(world, ant, cell)
         if enters:

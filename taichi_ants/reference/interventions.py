@@ -58,6 +58,7 @@ class Interventions:
                 continue
             world.ground[cell] = self._start[cell] = what
             if what == FOOD:
+                world.put_food(cell, 0, 1)
                 self.colony.food_sources.give(cell)
             else:
                 self.colony.food_sources.end(cell)

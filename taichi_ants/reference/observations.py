@@ -42,6 +42,12 @@ def strongest_in_view(world: WorldState, ant: Ant) -> Level:
     return max((trail.level(cell) for cell in counting), default=0)
 
 
+def nestmate(world: WorldState, ant: Ant, cell: Cell) -> Ant | None:
+    """Return the ant on a cell if it is of the same nest; ants of other nests are obstacles."""
+    other = world.ants.get(cell)
+    return other if other is not None and other.nest == ant.nest else None
+
+
 def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
     """Return whether a cell is better for an ant than its own.
 
@@ -49,7 +55,8 @@ def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
     ant's cue for other ants.
     """
     if world.has_compass(ant):
-        return distance(cell, world.queen) < distance(ant.cell, world.queen)
+        queen = world.queens[ant.nest]
+        return distance(cell, queen) < distance(ant.cell, queen)
     trail = world.cue(ant)
     return bool(trail.level(cell) > trail.level(ant.cell))
 
@@ -62,6 +69,8 @@ def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -
 
 def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
     content = world.content(cell)
+    if content == QUEEN and cell != world.queens[ant.nest]:
+        return SEES_OBSTACLE
     if content == (QUEEN if ant.carries else FOOD):
         return SEES_GOAL
     if content != EMPTY:  # also the queen for foragers, and food for carriers
@@ -89,9 +98,9 @@ def codes_seen(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> l
 
 
 def ants_in_view(world: WorldState, ant: Ant) -> list[Ant | None]:
-    """Return the ant that the ant sees on each cell ahead; it sees none on cells it misreads."""
+    """Return the nestmate that the ant sees on each cell ahead, but not on cells it misreads."""
     return [
-        None if turn in ant.misread else world.ants.get(cell)
+        None if turn in ant.misread else nestmate(world, ant, cell)
         for turn, cell in zip(AHEAD, cells_in_view(ant), strict=True)
     ]
 

@@ -9,11 +9,19 @@ import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, neighbour
+from taichi_ants.reference.geometry import (
+    Cell,
+    existing_cells,
+    listed_cells,
+    neighbour,
+    queens_of,
+)
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
-    from taichi_ants.task import Field, Pheromone
+    from collections.abc import Sequence
+
+    from taichi_ants.task import Field, Food, Pheromone
     from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
@@ -102,12 +110,17 @@ class WorldState:
         fields: Mapping[str, Field] | None = None,
         outbound: str = "trail",
         homing: str = "compass",
+        foods: Sequence[Food] = (),
     ) -> None:
-        self._ranges = world.ranges
-        self.queen: Cell = world.queen
+        self._ranges, self.foods = world.ranges, foods
+        self.queens: list[Cell] = queens_of(world)
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
-        self.ground[self.queen] = QUEEN
+        self.ground.update(dict.fromkeys(self.queens, QUEEN))
         self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
+        # The kind of the food in a cell, and its loads.
+        self.kinds = dict.fromkeys(listed_cells(world.foods), 0)
+        self.kinds.update(zip(self.kinds, world.food_kinds.tolist(), strict=False))
+        self.loads = {cell: self.full(kind) for cell, kind in self.kinds.items()}
         self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
         self.ants: dict[Cell, Ant] = {}
         self.pheromone = pheromone
@@ -127,6 +140,23 @@ class WorldState:
     def pheromone_named(self, name: str) -> Trail:
         """Return the trail, or a further field."""
         return self.trail if name == "trail" else self.fields[name]
+
+    @property
+    def queen(self) -> Cell:
+        """The queen of the first nest."""
+        return self.queens[0]
+
+    @queen.setter
+    def queen(self, cell: Cell) -> None:
+        self.queens[0] = cell
+
+    def full(self, kind: int) -> int:
+        """Return the number of loads in a full cell of a kind of food."""
+        return self.foods[kind].loads if self.foods else 1
+
+    def put_food(self, cell: Cell, kind: int, loads: int) -> None:
+        """Put food on a cell."""
+        self.ground[cell], self.kinds[cell], self.loads[cell] = FOOD, kind, loads
 
     def content(self, cell: Cell) -> int:
         """Return the content of a cell: its ground, or OBSTACLE for an ant or the outside."""

@@ -189,6 +189,8 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
     # All lines together do not fit into the panel.
     lines = [lines[0], lines[3], ("ant", str(follow))]
     slot, table = int(slots[order[0]]), colony.q_values[0]
+    if not colony.one_a_slot and colony.n_nests > 1:
+        table = table[colony.nests[0, slot]]
     state = int(colony.states[0, slot])
     q_values = (table[slot] if colony.one_a_slot else table)[state]
     return snapshot, _status_of(colony.task.sees, state, q_values, None, table, lines)

@@ -339,7 +339,8 @@ class Study(Generic[PointKind]):
                 )
             starts = [*zip(several, self.seeds, strict=False), *((one, 0) for one in pool or ())]
             for one, seed in starts:
-                checks.checked_world(one, learns=True).start(seed, ants)
+                of_colony = isinstance(self.points[0], ColonyPoint)
+                checks.checked_world(one, learns=True, several=of_colony).start(seed, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:
@@ -508,7 +509,11 @@ def world_facts(world: World) -> dict[str, Any]:
         numbers[name] = len(array)
         digest.update(repr(array.shape).encode())
         digest.update(array.tobytes())
+    for more in (world.other_queens, world.food_kinds):  # empty in most worlds
+        digest.update(more.tobytes())
     where = {"ranges": list(world.ranges), "queen": list(world.queen)}
+    if world.n_nests > 1:
+        where["queens"] = world.queens.tolist()
     return {**where, **numbers, "sha256": digest.hexdigest()}
 
 

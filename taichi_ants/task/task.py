@@ -10,8 +10,9 @@ from taichi_ants.errors import AntsError, shown
 from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.choice import Choice, Noise
-from taichi_ants.task.constants import MAX_STEPS
+from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL, Field
+from taichi_ants.task.food import Food
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -140,11 +141,42 @@ class Task(Settings, path="task"):
     noise: Annotated[Noise, Is("failures of actions and observations")] = field(
         default_factory=Noise
     )
+    foods: Annotated[
+        Named[Food], Is("kinds of food, in the order of their numbers in worlds; colonies only")
+    ] = field(default_factory=Named)
 
     def __post_init__(self) -> None:
         self.check()
         self._check_choice()
         self._check_fields()
+        self._check_foods()
+
+    def _check_foods(self) -> None:
+        if len(self.foods) > MAX_FOOD_KINDS:
+            raise AntsError(
+                f"`task.foods` has {len(self.foods)} kinds; at most {MAX_FOOD_KINDS} are allowed."
+            )
+        if self.foods and self.life.regrowth is not None:
+            raise AntsError(
+                f"`task.life.regrowth` is {self.life.regrowth}; with `task.foods`, set the "
+                "regrowth of each kind instead."
+            )
+        if self.life.wander and (len(self.foods) > 1 or self.has_loads):
+            raise AntsError(
+                f"`task.life.wander` is {self.life.wander}; only food of one kind with one load in "
+                "a cell can wander, so leave it out."
+            )
+
+    @property
+    def has_loads(self) -> bool:
+        """Whether a cell can have more than one load of food."""
+        return any(food.loads > 1 for food in self.foods.values())
+
+    @property
+    def food_changes(self) -> bool:
+        """Whether food grows back or wanders."""
+        grows = any(food.regrowth is not None for food in self.foods.values())
+        return self.life.regrowth is not None or self.life.wander is not None or grows
 
     @classmethod
     def named(cls) -> Mapping[str, Task]:

@@ -16,7 +16,7 @@ from same_colonies import assert_equal
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
 from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.engines.colony.layout import Stage, WorldRow
+from taichi_ants.engines.colony.layout import NestRow, Stage, WorldRow
 from taichi_ants.live import edits
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
@@ -47,7 +47,8 @@ def assert_sound(interventions: Interventions) -> None:
     assert (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all()
     bare = colony.snapshot().ground
     assert (arrays["walls"] == (bare == OBSTACLE)).all()
-    assert np.flatnonzero(bare == QUEEN).tolist() == [world[WorldRow.QUEEN_CELL]]
+    queens = colony.arrays["nests"][NestRow.QUEEN_CELL].tolist()
+    assert np.flatnonzero(bare == QUEEN).tolist() == queens
     assert colony.snapshot().trail[bare == OBSTACLE].sum() == 0
     later = interventions.world()
     assert (later.closer() == arrays["closer"]).all()

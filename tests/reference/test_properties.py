@@ -58,7 +58,7 @@ def test_food_is_conserved(seed):
         there = len(foods_of(colony)) + carried + record.deliveries
         assert there == len(drawn.world.foods) + record.regrown
         if drawn.task.life.births:
-            assert record.births + colony.store == record.deliveries
+            assert record.births + sum(colony.stores) == record.deliveries
         else:
             assert record.births == 0
 

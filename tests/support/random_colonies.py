@@ -11,7 +11,7 @@ from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
 from taichi_ants.engines.colony.state import SHARINGS
-from taichi_ants.task import Field, Life, Pheromone, Rewards, Task, observations
+from taichi_ants.task import Field, Food, Life, Pheromone, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY, GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds import World
 from taichi_ants.worlds.world import STARTS
@@ -92,6 +92,37 @@ def random_colony(
         sharing=sharing,
         q_values=forager(observation) if given else None,
     )
+
+
+def with_nests(drawn: RandomColony, seed: int, nests: int, kinds: int, loads: bool) -> RandomColony:
+    """Return a random colony in a world with more queens, kinds of food, and loads in cells.
+
+    A world that is too small for so many queens has fewer. Food of several kinds does not wander.
+    """
+    rng = np.random.default_rng([seed, 3])
+    world, life = drawn.world, drawn.task.life
+    ants, taken = drawn.population["ants"], world.grid.index(world.ants[:, :3])
+    free = np.setdiff1d(np.flatnonzero(world.ground() == EMPTY), taken)
+    more = min(nests - 1, len(free) - 1, max(0, len(free) + len(taken) - ants))
+    queens = world.grid.cells(rng.permutation(free)[:more])
+    foods = {
+        f"kind_{k}": Food(
+            pick_up=int(rng.integers(-2, 9)),
+            deliver=int(rng.integers(-2, 30)),
+            loads=int(rng.integers(1, 5)) if loads else 1,
+            regrowth=int(rng.choice([0, 1, 4])) if rng.random() < 0.7 else None,
+        )
+        for k in range(kinds)
+    }
+    several = kinds > 1 or loads
+    life = replace(life, regrowth=None, wander=None if several else life.wander)
+    world = replace(
+        world,
+        other_queens=queens,
+        food_kinds=rng.integers(0, kinds, len(world.foods)),
+        trails=world.trails,
+    )
+    return replace(drawn, world=world, task=replace(drawn.task, foods=foods, life=life))
 
 
 def forager(observation: str = "paper") -> np.ndarray:

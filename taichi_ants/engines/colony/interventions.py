@@ -21,6 +21,7 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     FoodSourceRow,
+    NestRow,
     Stage,
     WorldRow,
     array_of,
@@ -70,6 +71,11 @@ class Interventions:
             )
         self.colony, self.ants = colony, colony.ants
         (self._first,) = colony.worlds
+        if colony.n_nests > 1 or colony.task.foods:
+            raise AntsError(
+                "the colony has several nests or kinds of food, which interventions do not "
+                "support yet; use one of each."
+            )
         self._start = self._first.ground()
         self._stream = Stream(colony.seeds[0], STREAM_INTERVENTION)
         self._changed = False  # whether the start of the next episode differs from the present one
@@ -132,12 +138,12 @@ class Interventions:
                 f"the queen cannot move to cell {tuple(grid.cells(cell).tolist())}, because it is "
                 "not empty; choose an empty cell."
             )
-        old = arrays["worlds"][WorldRow.QUEEN_CELL, 0]
+        old = arrays["nests"][NestRow.QUEEN_CELL, 0]
         start = self._start.copy()
         start[old], start[cell] = EMPTY, QUEEN
         self._begin_with(start)
         arrays["ground"][old], arrays["ground"][cell] = EMPTY, QUEEN
-        arrays["worlds"][WorldRow.QUEEN_CELL, 0] = cell
+        arrays["nests"][NestRow.QUEEN_CELL, 0] = cell
         arrays["closer"][:] = World(grid.ranges, grid.cells(cell).tolist()).closer()
         self._change_food_sources(np.array([cell]), QUEEN)
         self.colony.observe()
@@ -229,7 +235,7 @@ class Interventions:
             # The order in which ants would start there.
             grid = colony.grid
             words = stream_state(colony.seeds[0], STREAM_START_CELL, grid.number(grid.cells(free)))
-            queen = grid.cells(colony.arrays["worlds"][WorldRow.QUEEN_CELL, 0])
+            queen = grid.cells(colony.arrays["nests"][NestRow.QUEEN_CELL, 0])
             far = grid.distances(tuple(queen.tolist()))[free]
             order = np.lexsort((words, far * (colony.start == "nest")))
             self.add_ants(free[order[:missing]])
@@ -340,7 +346,7 @@ class Interventions:
                 taken[here[0]] = -1
         _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
         colony.n_food_sources = max(len(at), int(np.count_nonzero(self._start == FOOD)))
-        sources = [np.array([at, taken, pile], int).reshape(3, -1)]
+        sources = [np.array([at, taken, pile, [0] * len(at)], int).reshape(4, -1)]
         arrays |= food_sources.arrays(
             sources, arrays["worlds"], colony.n_food_sources, colony.grid.size
         )

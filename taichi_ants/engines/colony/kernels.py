@@ -62,6 +62,10 @@ class Features(NamedTuple):
     traffic: Traffic
     ants_change: bool
     food_changes: bool
+    n_nests: int = 1
+    n_kinds: int = 1
+    has_foods: bool = False
+    has_loads: bool = False
     choice: str = "greedy"
     slips: bool = False
     misreads: bool = False
@@ -84,6 +88,10 @@ class Variant:
         self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
+        self.n_nests, self.n_kinds = features.n_nests, features.n_kinds
+        self.has_foods, self.has_loads = features.has_foods, features.has_loads
+        # Whether deliveries are counted by nest and kind.
+        self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
         self.learner = None if learner is None else checked_plugin(learner)
@@ -98,17 +106,18 @@ class Variant:
         if self.together:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
-        self.n_pairs = observation.n_states * ROW  # state-action pairs, and unused numbers
+        self.n_numbers = observation.n_states * ROW  # of a table: state-action pairs, and unused
+        self.n_pairs = self.n_numbers * self.n_nests  # of all tables that ants of a world share
         self.is_papers = observation.name == "paper"
         # The percept is the state index, unless ants misread cells.
         self.sees_percept = self.is_papers and not self.misreads
         # Whether the cell of an ant must show that the ant carries food.
         under_carriers = any(features.views[cue] == "strongest_under_carriers" for cue in cues)
         self.sees_ants = not self.is_papers or under_carriers
+        sees_dense = any(features.dense[cue] for cue in cues)
+        self.level_type = ti.f32 if sees_dense else ti.i32
         if not self.is_papers:
             self.encode = views.encode_function(observation)
-            sees_dense = any(features.dense[cue] for cue in cues)
-            self.level_type = ti.f32 if sees_dense else ti.i32
             reads_dense = tuple(features.dense[number] for number in self.reads)
             self.view_type = views.view_type(observation, sees_dense, reads_dense)
 

@@ -18,8 +18,11 @@ from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     BYTE_COLUMNS,
     INTEGER_COLUMNS,
+    NESTS_BY_KINDS,
     TALLY_WIDTH,
     TOTALS,
+    FoodRow,
+    NestRow,
     Order,
     Stage,
     SumRow,
@@ -35,6 +38,7 @@ from taichi_ants.errors import (
     check_array,
     check_one_of,
     checked_whole,
+    count,
     entries_of,
     shown,
 )
@@ -46,7 +50,8 @@ from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.measures.series import Series
 from taichi_ants.measures.tidy import Measured, Tidy, seed_array
 from taichi_ants.task import Pheromone, Task
-from taichi_ants.task.constants import EMPTY, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import Start, World
 
@@ -74,8 +79,9 @@ class ColonyEpisodes(Record, Tidy):
     """Results of episodes, arrays of shape (episodes, worlds).
 
     `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
-    with food of all delivered loads, `living` ants at the end. Returns, moves, blocked and carried
-    are int64, all others int32. `seeds` has the seed of each world. `series` has the values of the
+    with food of all delivered loads, `living` ants at the end. `deliveries_apart` has deliveries by
+    nest and kind of food, (episodes, worlds, nests, kinds). Returns, moves, blocked and carried are
+    int64, all others int32. `seeds` has the seed of each world. `series` has the values of the
     measures that you asked `Colony.run` for, else None.
     """
 
@@ -90,12 +96,24 @@ class ColonyEpisodes(Record, Tidy):
     deaths: np.ndarray
     regrown: np.ndarray
     living: np.ndarray
+    deliveries_apart: np.ndarray
     seeds: tuple[int, ...] = ()
     series: Series | None = field(default=None, repr=False)
 
+    @property
+    def nest_deliveries(self) -> np.ndarray:
+        """Deliveries by nest, (episodes, worlds, nests)."""
+        return self.deliveries_apart.sum(axis=3, dtype=np.int32)
+
+    @property
+    def food_deliveries(self) -> np.ndarray:
+        """Deliveries by kind of food, (episodes, worlds, kinds)."""
+        return self.deliveries_apart.sum(axis=2, dtype=np.int32)
+
     def counts(self) -> Arrays:
-        """Return the arrays of all counts by name."""
-        return {name: array for name, array in vars(self).items() if isinstance(array, np.ndarray)}
+        """Return the arrays of all counts of worlds by name."""
+        arrays = (one for one in vars(self).items() if isinstance(one[1], np.ndarray))
+        return {name: array for name, array in arrays if array.ndim == 2}
 
     def measured(self) -> Measured:
         """Return the values of the measures, or all counts if `Colony.run` was asked for none."""
@@ -141,6 +159,8 @@ class ColonyState:
         one_a_slot: Whether each slot has its own table of action values, not each world.
         ants_change: Whether ants are born or die.
         food_changes: Whether food grows back or wanders.
+        n_nests: The number of nests in each world.
+        n_kinds: The number of kinds of food in the task, at least 1.
         memory: The size of the learner's memory for each table.
         pheromone: The pheromone of the task, with or without evaporation.
         fields: The further pheromones of the task by name, with or without evaporation.
@@ -202,11 +222,16 @@ class ColonyState:
         worlds = checked_worlds(world, len(self.seeds), self.learns)
 
         self.one_a_slot = sharing == "independent" or (
-            not self.learns and table is not None and table.ndim == 4
+            # Frozen tables by slot; those by nest have another length, see `owners`.
+            not self.learns
+            and table is not None
+            and table.ndim == 4
+            and (worlds[0].n_nests == 1 or table.shape[1] != worlds[0].n_nests)
         )
         life = self.task.life
         self.ants_change = life.births or life.lifespan is not None
-        self.food_changes = life.regrowth is not None or life.wander is not None
+        self.food_changes = self.task.food_changes
+        self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(self.task.foods))
         self.set_pheromones(self.task)
         self.memory = Memory()
         if self.learner and (self.one_a_slot or self.plans_together):
@@ -301,7 +326,7 @@ class ColonyState:
     @property
     def occupied(self) -> np.ndarray:
         """Whether an ant is on each cell, bool (W, grid.size)."""
-        return self.arrays["ground"].reshape(len(self.seeds), -1) >= ANT_GROUND
+        return self.arrays["ground"].reshape(len(self.seeds), -1) >> 4 != 0
 
     @property
     def update_weights(self) -> np.ndarray:
@@ -315,16 +340,49 @@ class ColonyState:
 
     @property
     def q_values(self) -> np.ndarray:
-        """The action values, float32 (W, n_states, 5), by slot (W, slots, n_states, 5); a copy."""
-        n = self.capacity if self.one_a_slot else 1
+        """The action values, float32 (W, n_states, 5); a copy.
+
+        With a table for each slot (W, slots, n_states, 5), and with several nests that share tables
+        (W, nests, n_states, 5).
+        """
+        n = self.owners
         tables = self.arrays["q"].reshape(len(self.seeds), n, -1, self.task.n_states, ROW)
         tables = tables[:, :, 0, :, :N_ACTIONS]
-        return (tables if self.one_a_slot else tables[:, 0]).copy()
+        return (tables if self.one_a_slot or n > 1 else tables[:, 0]).copy()
+
+    @property
+    def owners(self) -> int:
+        """The number of tables in each world: one for each slot, or for each nest."""
+        return self.capacity if self.one_a_slot else self.n_nests
+
+    @property
+    def nests(self) -> np.ndarray:
+        """The nest of the last ant in each slot, int32 (W, capacity)."""
+        if self.n_nests == 1:
+            return np.zeros((len(self.seeds), self.capacity), np.int32)
+        return self.arrays["nest"].reshape(len(self.seeds), -1).astype(np.int32)
+
+    @property
+    def rewards(self) -> np.ndarray:
+        """The reward of the last action of the ant in each slot, int32 (W, capacity)."""
+        rewards = self.task.rewards.by_event()[self.events]
+        if self.task.foods:
+            kinds = self.arrays["kind"].reshape(rewards.shape) if self.n_kinds > 1 else 0
+            picked_up, delivered = self.arrays["food_numbers"][:2, kinds]
+            rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
+            rewards = np.where(self.events == Event.DELIVERED, delivered, rewards)
+        return rewards
 
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
-        counts: dict[str, Any] = {n: one[None].copy() for n, one in self._counts().items()}
+        if self.n_nests * self.n_kinds == 1:
+            apart = self.deliveries.astype(np.int32)
+        else:
+            apart = self.arrays["deliveries_apart"]
+        apart = apart.reshape(-1, self.n_nests, self.n_kinds)
+        every = {**self._counts(), "deliveries_apart": apart}
+        counts: dict[str, Any] = {name: one[None].copy() for name, one in every.items()}
         return ColonyEpisodes(**counts, seeds=self.seeds)
 
     def _counts(self) -> Arrays:
@@ -399,6 +457,17 @@ class ColonyState:
 
     def lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
+        for world in worlds:
+            if world.n_nests != self.n_nests:
+                raise AntsError(
+                    f"a world has {count(world.n_nests, 'nest')}, but another one {self.n_nests}; "
+                    "all worlds of a colony must have the same number."
+                )
+            if world.n_food_kinds > self.n_kinds:
+                raise AntsError(
+                    f"the world has {count(world.n_food_kinds, 'kind')} of food, but the task "
+                    f"{self.n_kinds}; add the others to `task.foods`."
+                )
         self.worlds, self.grid = worlds, worlds[0].grid
         most = max(len(world.foods) for world in worlds)
         self.make_room_for_food(most if self.food_changes else 0)
@@ -481,7 +550,9 @@ class ColonyState:
         ]
         cells = np.stack([cells for cells, _ in starts])
         ground = self._of_each(World.ground)
-        np.put_along_axis(ground, cells.astype(np.int64), ANT_GROUND, axis=1)
+        nests = np.stack([world.nests_of(n) for world in worlds])
+        marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
+        np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
         levels = self._of_each(World.trail_levels)
         levels = levels if levels.any() else levels[:, :1].copy()  # all cells are equal
         rows = np.zeros((len(WorldRow), len(worlds)), np.int32)
@@ -489,12 +560,14 @@ class ColonyState:
         for row in (WorldRow.TOP, WorldRow.FIRST_VACANT, WorldRow.LIVING, WorldRow.NEXT_NUMBER):
             rows[row] = n
         rows[WorldRow.FIRST_DELIVERY] = -1
-        rows[WorldRow.QUEEN_CELL] = [int(self.grid.index(world.queen)) for world in worlds]
+        of_nests = np.zeros((len(NestRow), len(worlds) * self.n_nests), np.int32)
+        of_nests[NestRow.QUEEN_CELL] = [one for w in worlds for one in self.grid.index(w.queens)]
         foods = [food_sources.at_start(world) for world in worlds] if self.n_food_sources else []
         return {
             # The start cells and headings of ants, by world and number.
             "start_cells": cells,
             "start_headings": np.array([headings for _, headings in starts], np.int8),
+            "start_nests": nests[:, : n * (self.n_nests > 1)].astype(np.int8),
             # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
             # The clock at which a cell's trail has evaporated; if dense, its level.
@@ -507,9 +580,26 @@ class ColonyState:
                 for number, field in enumerate(self.fields.values(), start=1)
             },
             "worlds": rows,
+            "nests": of_nests,
+            **self._foods_at_start(ground),
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, self.n_food_sources, self.grid.size),
+        }
+
+    def _foods_at_start(self, ground: np.ndarray) -> Arrays:
+        """Return the kind of the food in each cell, its loads, and deliveries by nest and kind.
+
+        Arrays that a kernel does not need are tiny. `ground` is (W, grid.size).
+        """
+        kinds = self._of_each(World.kinds_by_cell)
+        loads = np.array([food.loads for food in self.task.foods.values()] or [1], np.int32)
+        here = np.where(ground == FOOD, loads[kinds], 0).astype(np.int32)
+        apart = len(self.worlds) * self.n_nests * self.n_kinds
+        return {
+            "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
+            "loads": here.reshape(-1) if self.task.has_loads else np.zeros(1, np.int32),
+            "deliveries_apart": np.zeros(apart, np.int32),
         }
 
     def _of_episode(self) -> Arrays:
@@ -524,6 +614,10 @@ class ColonyState:
             unused.add("age")
         if not self.draws_ahead:
             unused.add("next_action")
+        if self.n_nests == 1:
+            unused.add("nest")
+        if self.n_kinds == 1:
+            unused.add("kind")
         made = {
             **{name: array.copy() for name, array in self._at_start().items()},
             "trail": np.zeros(1 if dense else cells, np.int32),
@@ -560,13 +654,15 @@ class ColonyState:
         n = self.at_start["start_cells"].shape[1]
         column["cell"][which, :n] = self.at_start["start_cells"][which]
         column["heading"][which, :n] = self.at_start["start_headings"][which]
+        if "nest" in column:
+            column["nest"][which, :n] = self.at_start["start_nests"][which]
         column["number"][which, :n] = np.arange(n)
         column["stage"][which, :n] = Stage.LIVING
 
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
         """Return the arrays that last through all episodes."""
         slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
-        owners = n_worlds * (slots if self.one_a_slot else 1)
+        owners = n_worlds * self.owners
         sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)
         if owners * max(sizes) > _MOST_NUMBERS:
             raise AntsError(
@@ -597,8 +693,8 @@ class ColonyState:
 
     def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
         """Return the tables of all worlds or slots, with `q_values` or the initial value."""
-        n_worlds, own = len(self.seeds), self.one_a_slot
-        slots, n_states = self.capacity if own else 1, self.task.n_states
+        n_worlds, slots, n_states = len(self.seeds), self.owners, self.task.n_states
+        own = self.one_a_slot or slots > 1
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
@@ -606,8 +702,8 @@ class ColonyState:
             if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
                 raise AntsError(
                     f"q_values has shape {q_values.shape}; give ({form}), ({n_worlds}, {form}) for "
-                    f"one table per world, or with independent ants ({n_worlds}, {slots}, {form}) "
-                    "for one table per slot."
+                    f"one table per world, or ({n_worlds}, {slots}, {form}) for one table per slot "
+                    "or nest."
                 )
             given = q_values.reshape(*leading, *[1] * (2 - len(leading)), 1, n_states, N_ACTIONS)
             q[..., :N_ACTIONS] = given
@@ -616,17 +712,19 @@ class ColonyState:
     def _constants(self) -> Arrays:
         """Return constants of worlds and settings, and scratch arrays of a tick."""
         chunks = len(self.seeds) * self.chunks
-        pairs = self.task.n_states * ROW if self.sharing == "shared" else 0
+        tables = self.n_nests if self.sharing == "shared" else 0
+        pairs = self.task.n_states * ROW * tables
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
             # By cell: a bit for each heading that leads nearer to the queen.
-            "closer": self._of_each(World.closer).reshape(-1),
+            "closer": self._of_each(_closer_to_each).reshape(-1),
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
             "rewards": self.task.rewards.by_event(),
             "choice": self.task.choice.numbers(),
+            "food_numbers": _food_numbers(self.task),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
             # By n: the weight of the mean of n errors in an update; see `set_learning_rate`.
             "weights": np.zeros(2, np.float32),
@@ -641,6 +739,7 @@ class ColonyState:
             "orders": np.zeros(len(Order), np.int32),
             "barrier": np.zeros(24, np.int64),  # see `kernels.wait_for_all`
             "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),
+            "delivered": np.zeros(chunks * NESTS_BY_KINDS, np.int32),  # by nest and kind
             # By chunk and pair: fixed-point sums of TD errors, the last error, and `SumRow`.
             "sums": np.zeros(sums, np.int64),
             "errors": np.zeros(sums, np.float32),
@@ -741,10 +840,25 @@ class ColonyState:
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
 
 
+def _closer_to_each(world: World) -> np.ndarray:
+    """Return `World.closer` of all nests, uint8 (nests, grid.size)."""
+    return np.stack([world.closer(nest) for nest in range(world.n_nests)])
+
+
+def _food_numbers(task: Task) -> np.ndarray:
+    """Return the settings of the kinds of food, int32 (FoodRow, kinds)."""
+    kinds = task.foods.values()
+    numbers = np.zeros((len(FoodRow), max(1, len(kinds))), np.int32)
+    for k, food in enumerate(kinds):
+        grows = -1 if food.regrowth is None else food.regrowth
+        numbers[:, k] = food.pick_up, food.deliver, food.loads, grows
+    return numbers
+
+
 def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:
     """Return one world per seed; AntsError if their number is wrong or their ranges differ."""
     given = entries_of(world) or [world] * n_seeds
-    worlds = tuple(checks.checked_world(one, learns) for one in given)
+    worlds = tuple(checks.checked_world(one, learns, several=True) for one in given)
     if len(worlds) != n_seeds:
         raise AntsError(
             f"there are {len(worlds)} worlds for {n_seeds} seeds; give one world per seed."

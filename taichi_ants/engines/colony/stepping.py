@@ -141,6 +141,10 @@ class Stepper:
             choice=task.choice.rule,
             slips=task.noise.slip > 0,
             misreads=task.noise.misread > 0,
+            n_nests=state.n_nests,
+            n_kinds=state.n_kinds,
+            has_foods=bool(task.foods),
+            has_loads=task.has_loads,
         )
         variant = kernels.variant(features)
         if name == "ticks":

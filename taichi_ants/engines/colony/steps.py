@@ -19,8 +19,11 @@ from taichi.math import popcnt
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
+    NESTS_BY_KINDS,
     TALLY_WIDTH,
+    FoodRow,
     FoodSourceRow,
+    NestRow,
     Tally,
     WorldRow,
 )
@@ -41,8 +44,8 @@ from taichi_ants.task.constants import (
     LEFT,
     OBSTACLE,
     PICK_UP,
+    QUEEN,
     RIGHT,
-    ROW,
     SEES_LURE,
 )
 from taichi_ants.task.events import Event
@@ -115,12 +118,13 @@ def see(c: ti.template(), v: ti.template(), w, ant, tick):
     left = here + step_towards(c.compass, heading, LEFT)
     forward = here + step_towards(c.compass, heading, FORWARD)
     right = here + step_towards(c.compass, heading, RIGHT)
-    ground_left, ground_forward = looks_of(c.ground[left]), looks_of(c.ground[forward])
-    ground_right = looks_of(c.ground[right])
+    queen = own_queen(c, v, w, ant)
+    ground_left, ground_forward = looks_of(c, v, left, queen), looks_of(c, v, forward, queen)
+    ground_right = looks_of(c, v, right, queen)
     percept = 0
     if trait(c.carries, ant) == 1:
         if ti.static(v.has_compass):
-            nearer = vision.nearer_from(c.closer[here], heading)
+            nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
             percept = vision.percept_carrying(ground_left, ground_forward, ground_right, nearer)
         else:
             homing = ti.static(v.field(c, v.homing))
@@ -190,20 +194,26 @@ def strongest_cue(c: ti.template(), v: ti.template(), carries, here, heading, ti
 def view_around(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the view of an ant."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    nearer, carries = vision.nearer_from(c.closer[here], heading), trait(c.carries, ant)
+    nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+    carries, queen = trait(c.carries, ant), own_queen(c, v, w, ant)
     view = v.view_type(carries=carries, own_level=cue_level(c, v, carries, here, tick))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
         place = here + step_around(c.compass, heading, cells[k])
-        standable = (looks_of(c.ground[place]) == EMPTY) | (c.ground[place] >= ANT_GROUND)
+        held = ti.cast(c.ground[place] >> 4, ti.i32)  # 0 without an ant
+        standable = (c.ground[place] & 15 == EMPTY) | (held != 0)
         view.levels[k] = ti.select(standable, cue_level(c, v, carries, place, tick), 0)
         # 0 without an ant, 1 with a forager, 2 with a carrier.
-        view.ants[k] = (ti.cast(c.ground[place] >> 4, ti.i32) + 1) >> 3
+        view.ants[k] = (held + 1) >> 3
+        if ti.static(v.n_nests > 1):
+            ours = held & ANT_STANDS == ANT_STANDS - nest_of(c, v, ant)
+            view.ants[k] = ti.select(ours, 1 + (held >> 3), 0)
+            view.strangers[k] = ti.cast((held != 0) & (not ours), ti.i32)
         if ti.static(v.has_compass):
             view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
         else:
             view.nearer[k] = ti.cast(view.levels[k] > view.own_level, ti.i32)
-        view.codes[k] = looks_of(c.ground[place])
+        view.codes[k] = looks_of(c, v, place, queen)
         read_fields(c, v, view, k, place, standable, tick)
     read_own_levels(c, v, view, here, tick)
     view.strongest = strongest_cue(c, v, carries, here, heading, tick)
@@ -242,15 +252,62 @@ def read_own_levels(c: ti.template(), v: ti.template(), view: ti.template(), her
 
 
 @ti.func
-def looks_of(ground):
-    """Return the ground of a cell, without the mark of the ant on it: u8 -> i32."""
-    return ti.cast(ground & 15, ti.i32)
+def looks_of(c: ti.template(), v: ti.template(), place, queen):
+    """Return the ground of a cell, i32, as an ant sees it whose queen is on the cell `queen`.
+
+    Ants, and the queens of other nests, look like obstacles.
+    """
+    ground = ti.cast(c.ground[place] & 15, ti.i32)
+    if ti.static(v.n_nests > 1):
+        ground = ti.select((ground == QUEEN) & (place != queen), OBSTACLE, ground)
+    return ground
+
+
+@ti.func
+def nest_of(c: ti.template(), v: ti.template(), ant):
+    """Return the nest of an ant."""
+    nest = 0
+    if ti.static(v.n_nests > 1):
+        nest = trait(c.nest, ant)
+    return nest
+
+
+@ti.func
+def holds_nestmate(c: ti.template(), v: ti.template(), ant, place):
+    """Return whether an ant of the same nest is on a cell; others are obstacles."""
+    held = ti.cast(c.ground[place] >> 4, ti.i32)
+    holds = held != 0
+    if ti.static(v.n_nests > 1):
+        holds = held & ANT_STANDS == ANT_STANDS - nest_of(c, v, ant)
+    return holds
+
+
+@ti.func
+def own_queen(c: ti.template(), v: ti.template(), w, ant):
+    """Return the place of an ant's queen in `ground`; -1 with one nest, which needs none."""
+    queen = -1
+    if ti.static(v.n_nests > 1):
+        column = w * v.n_nests + nest_of(c, v, ant)
+        queen = w * c.size + c.nests[NestRow.QUEEN_CELL, column]
+    return queen
+
+
+@ti.func
+def own_map(c: ti.template(), v: ti.template(), w, ant):
+    """Return the place of an ant's cell in the map of its nest in `closer`."""
+    return (w * v.n_nests + nest_of(c, v, ant)) * c.size + c.cell[ant]
 
 
 @ti.func
 def table_of(c: ti.template(), v: ti.template(), owner):
     """Return the start of the tables of an ant, or of a world whose ants share a table."""
-    return owner * c.tables * (v.observation.n_states * ROW)
+    return owner * c.tables * v.n_numbers
+
+
+@ti.func
+def owner_of(c: ti.template(), v: ti.template(), w, ant):
+    """Return the owner of the table by which an ant chooses: its slot, or its world and nest."""
+    return ant if ti.static(v.own_tables) else w * v.n_nests + nest_of(c, v, ant)
 
 
 @ti.func
@@ -260,7 +317,7 @@ def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state)
     if ti.static(v.choice == "deneubourg"):
         action = draw_cell(c, v, w, ant, state, bits)
     else:
-        table = table_of(c, v, ant if ti.static(v.own_tables) else w)
+        table = table_of(c, v, owner_of(c, v, w, ant))
         values = values_of(c.q, table, state)
         if ti.static(v.choice == "softmax"):
             action = choose_softly(values, bits, c.explore_below, c.choice[0])
@@ -280,7 +337,7 @@ def draw_cell(c: ti.template(), v: ti.template(), w, ant, state, bits):
     percept, heading, carries = trait(c.percept, ant), trait(c.heading, ant), trait(c.carries, ant)
     here = w * c.size + c.cell[ant]
     tick = c.worlds[WorldRow.TICKS, w]
-    nearer = vision.nearer_from(c.closer[here], heading)
+    nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
     codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
     weights = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
     for i in ti.static((LEFT, FORWARD, RIGHT)):
@@ -291,7 +348,7 @@ def draw_cell(c: ti.template(), v: ti.template(), w, ant, state, bits):
         opens[i] = ti.cast(is_open(code), ti.i32)
         nears[i] = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(v.has_compass))
         if ti.static(v.traffic.shared):
-            if is_true & (c.ground[place] >= ANT_GROUND):
+            if is_true & holds_nestmate(c, v, ant, place):
                 opens[i] = 1 if ti.static(v.traffic.follow) else carries
                 nears[i] = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(v.has_compass))
         level = cue_level(c, v, carries, place, tick)
@@ -334,7 +391,7 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     ahead = cell + step_towards(c.compass, heading, FORWARD)
     enters = is_open(vision.code_in_view(percept, ti.min(action, RIGHT)))
     if ti.static(v.traffic.shared):
-        enters = enters | (c.ground[w * c.size + ahead] >> 4 != 0)
+        enters = enters | holds_nestmate(c, v, ant, w * c.size + ahead)
     enters = enters & (action <= RIGHT)
     wanted = ti.select(enters, ahead, cell)
     mark = ti.select(enters, conflicts.ENTER + heading, v.idle)
@@ -386,7 +443,8 @@ def event_of(c: ti.template(), v: ti.template(), base, ant, tick):
         better = is_stronger(ti.static(v.field(c, v.outbound)), ahead, here, tick)
         if trait(c.carries, ant) == 1:
             if ti.static(v.has_compass):
-                better = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
+                closer = ti.cast(c.closer[own_map(c, v, base // c.size, ant)], ti.i32)
+                better = closer >> trait(c.heading, ant) & 1 == 1
             else:
                 better = is_stronger(ti.static(v.field(c, v.homing)), ahead, here, tick)
         event = ti.select(better, Event.ENTERED_LURE, Event.ENTERED_EMPTY)
@@ -437,13 +495,13 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             put(c.carries, ant, 0)
             put(c.heading, ant, heading_after_delivery(heading, c.turns_at_queen))
             tally(c, Tally.DELIVERIES, chunk, 1)
+            count_apart(c, v, ant, chunk)
         c.carried[ant] = carried + 1
     elif takes:
         event, carries = ti.cast(Event.PICKED_UP, ti.i32), 1
         put(c.carries, ant, 1)
         c.carried[ant] = 1
-        c.ground[base + wanted] = EMPTY
-        take_from_source(c, base + wanted, tick)
+        take_load(c, v, ant, base + wanted, tick)
         deposit(trail, base + wanted, tick, 0)
         deposit(trail, base + cell, tick, 0)
         put(c.heading, ant, turn_round(heading))
@@ -455,20 +513,60 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         if c.counts_without_food == 1:
             c.carried[ant] = age + 1
     ground = ANT_GROUND
-    if ti.static(v.sees_ants):
-        ground = OBSTACLE | (ANT_STANDS << 4) + (carries << 7)
+    if ti.static(v.sees_ants or v.n_nests > 1):
+        ground = OBSTACLE | ((ANT_STANDS - nest_of(c, v, ant)) << 4) + (carries << 7)
     c.ground[base + goes] = ti.cast(ground, ti.u8)
     c.cell[ant] = goes
     put(c.event, ant, event)
     tally(c, Tally.MOVES, chunk, ti.cast(moves, ti.i32))
     tally(c, Tally.BLOCKED, chunk, ti.cast(moves & (not enters), ti.i32))
-    tally(c, Tally.RETURNS, chunk, c.rewards[event])
+    tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
 
 
 @ti.func
 def tally(c: ti.template(), state, chunk, n):
     """Add n to a tally of a chunk, which one thread processes; `+=` would be atomic and slower."""
     c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
+
+
+@ti.func
+def count_apart(c: ti.template(), v: ti.template(), ant, chunk):
+    """Count a delivery by nest and kind of food, if there are several."""
+    if ti.static(v.counts_apart):
+        place = chunk * NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
+        if ti.static(v.n_kinds > 1):
+            place += trait(c.kind, ant)
+        c.delivered[place] = c.delivered[place] + 1
+
+
+@ti.func
+def reward_of(c: ti.template(), v: ti.template(), ant):
+    """Return the reward of the last event of an ant, i32."""
+    event = trait(c.event, ant)
+    reward = c.rewards[event]
+    if ti.static(v.has_foods):
+        if (event == Event.PICKED_UP) | (event == Event.DELIVERED):
+            kind = 0
+            if ti.static(v.n_kinds > 1):
+                kind = trait(c.kind, ant)
+            reward = c.food_numbers[FoodRow.PICK_UP, kind]
+            if event == Event.DELIVERED:
+                reward = c.food_numbers[FoodRow.DELIVER, kind]
+    return reward
+
+
+@ti.func
+def take_load(c: ti.template(), v: ti.template(), ant, place, tick):
+    """Take a load of food from a cell, which becomes empty with its last load."""
+    left = 0
+    if ti.static(v.n_kinds > 1):
+        put(c.kind, ant, ti.cast(c.kind_of[place], ti.i32))
+    if ti.static(v.has_loads):
+        left = c.loads[place] - 1
+        c.loads[place] = left
+    if left == 0:
+        c.ground[place] = EMPTY
+        take_from_source(c, place, tick)
 
 
 @ti.func

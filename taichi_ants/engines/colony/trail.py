@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import taichi as ti
 
-from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD, array_of
+from taichi_ants.engines.colony.layout import array_of
 from taichi_ants.task.constants import EMPTY, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import Occasion
@@ -76,7 +76,7 @@ def level_that_counts(c: ti.template(), field: ti.template(), place, tick):
     """Return the level of a cell as it counts for the strongest one, 0 if it does not count."""
     level = level_in_view(c, field, place, tick)
     if ti.static(field.under_carriers):
-        carrier = c.ground[place] >> 4 == STANDS_WITH_FOOD
+        carrier = c.ground[place] >> 7 == 1  # of any nest
         level = ti.select(carrier, level_of(field, place, tick), level)
     return level
 

@@ -41,6 +41,7 @@ class Observation:
     - `codes` (k): 0 E, 1 O, 2 T or S, 3 F or Q, relative to the strongest trail ahead.
     - `levels` (k): The trail level if the cell is empty or has an ant on it, else 0.
     - `ants` (k): 0 for no ant, 1 for an ant without food, 2 for an ant with food.
+    - `strangers` (k): 1 if an ant of another nest is on the cell, where `ants` is 0.
     - `nearer` (k): 1 if the cell is nearer to the queen than the ant's own.
     - `strongest`: The level of the strongest trail ahead; `own_level`: the ant's own cell.
     - `NAME` (k), for each NAME in `reads`: The level of this field, like `levels`; `own_NAME`: that
@@ -218,6 +219,7 @@ def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
             levels=_Vector(levels),
             strongest=strongest,
             ants=_Vector(ants[n]),
+            strangers=_Vector((ants[n] == 0) & (ground[n] == OBSTACLE) & (trails[n] > 1)),
             nearer=_Vector(nearer[n]),
             own_level=trail[0],
             **{name: _Vector(np.roll(levels, 1 + r)) for r, name in enumerate(observation.reads)},

@@ -51,7 +51,8 @@ def misread_view(view: ti.template(), observation: ti.template(), random_state, 
     for k in ti.static(range(len(observation.cells))):
         code, after = misread_code(view.codes[k], after, misread_below)
         if code != view.codes[k]:
-            view.codes[k], view.levels[k], view.ants[k], view.nearer[k] = code, 0, 0, 0
+            view.codes[k], view.levels[k], view.nearer[k] = code, 0, 0
+            view.ants[k], view.strangers[k] = 0, 0
     left, forward, right = ti.static(observation.ahead)
     view.percept = state_index(
         view.carries, view.codes[left], view.codes[forward], view.codes[right]

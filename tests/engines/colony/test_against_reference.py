@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from random_choices import NOISE
-from random_colonies import RandomColony, random_colony
+from random_colonies import RandomColony, random_colony, with_nests
 from random_rewards import random_rewards
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
 from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.observations import OBSERVATIONS, cells_in_view
 from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.observations import registry
 
@@ -169,6 +170,76 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
     assert (happened >= [not rarely, 3, 3, 1 if rarely else 2, 12]).all(), happened
 
 
+# Learner, sharing, observation, dense, traffic, view; nests, kinds of food, several loads.
+NESTS = [
+    ("q_learning", "shared", "paper", False, "blocking", "half", 2, 1, False),
+    ("dyna_q", "shared", "queues", False, "following", "strongest_under_carriers", 3, 2, True),
+    ("sarsa", "shared", "ants", True, "right_of_way", "strongest", 2, 3, False),
+    ("sarsa_lambda", "independent", "ants_seen", False, "blocking", "half", 4, 1, True),
+    ("q_learning", "frozen", "strangers", False, "right_of_way", "half", 2, 2, True),
+]
+QUICK_NESTS = [
+    one if k in (1, 4) else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(NESTS)
+]
+
+
+def with_strangers(view):
+    """The load, and for each cell ahead 0, 1 for an ant of the nest, or 2 for one of another."""
+    index = view.carries
+    for k in range(3):
+        code = 2 * view.strangers[k]
+        if view.ants[k] != 0:
+            code = 1
+        index = 3 * index + code
+    return index
+
+
+@pytest.mark.parametrize("kernel", QUICK_NESTS, ids=str)
+def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers):
+    """Deliveries by nest and kind, loads, regrowth, births by nest: two episodes each."""
+    learner, sharing, observation, dense, traffic, view, nests, kinds, loads = kernel
+    happened = np.zeros(5, dtype=int)
+    for seed in range(60):
+        drawn = random_colony(
+            seed,
+            sharing=sharing,
+            learner=learner,
+            observation="paper" if observation == "strangers" else observation,
+            dense=dense,
+            traffic=traffic,
+            view=view,
+            changes=True,
+        )
+        drawn = with_nests(drawn, seed, nests, kinds, loads)
+        if observation == "strangers":
+            table = np.random.default_rng(seed).random((54, 5)).astype(np.float32)
+            drawn = replace(drawn, task=replace(drawn.task, observation="strangers"))
+            drawn = replace(drawn, q_values=table)
+        if drawn.world.n_nests != nests:
+            continue  # kernels are compiled for a number of nests
+        colony, plain = both(drawn)
+        for ticks in (13, 9):
+            colony.begin_episode(ticks)
+            plain.begin_episode()
+            assert_equal(colony, plain)
+            for tick in range(ticks):
+                if not plain.over:
+                    colony.tick()
+                    plain.tick(last=tick == ticks - 1)
+                    assert_equal(colony, plain)
+            colony.end_episode()
+            plain.end_episode()
+            record, nests_of = plain.records[-1], [nest for nest, _ in plain.records[-1].apart]
+            happened += [
+                record.births > 0,
+                record.deaths > 0,
+                record.regrown > 0,
+                record.deliveries > 0,
+                max(nests_of, default=0) > 0,
+            ]
+    assert (happened >= [1, 3, 3, 2, 1]).all(), happened
+
+
 def test_each_learner_and_observation_is_compared():
     assert {kernel[0] for kernel in KERNELS} == set(learners.registry.BUILT_IN)
     assert {kernel[2] for kernel in KERNELS} == set(observations.names())
@@ -179,6 +250,23 @@ def crowd(view):
     index = 0
     for k in range(6):
         index = 3 * index + view.ants[k]
+    return index
+
+
+@pytest.fixture
+def seen_strangers(monkeypatch):
+    """The observation, registered for one test."""
+    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+    monkeypatch.setitem(OBSERVATIONS, "strangers", strangers_seen)
+    return observations.register(Observation("strangers", 54, with_strangers))
+
+
+def strangers_seen(world, ant):
+    """The observation in plain Python."""
+    index = int(ant.carries)
+    for cell in cells_in_view(ant):
+        other = world.ants.get(cell)
+        index = 3 * index + (0 if other is None else 1 + (other.nest != ant.nest))
     return index
 
 
