@@ -73,9 +73,9 @@ class Pheromone(Settings, path="task.pheromone"):
     view: Annotated[
         View,
         Is(
-            "lowest level that ants without food see as T: half of the highest level in view "
-            "(half) or the highest itself (strongest), also counting trails under ants with food "
-            "(strongest_under_carriers)"
+            "trails that ants without food see as T: those with at least half of the highest level "
+            "in view (half), or with the highest (strongest); strongest_under_carriers also counts "
+            "trails under ants with food"
         ),
     ] = "half"
 
