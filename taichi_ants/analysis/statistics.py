@@ -144,7 +144,7 @@ def _rows(values: np.ndarray) -> np.ndarray:
 def student_interval(
     values: np.ndarray, level: float = 0.95, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return Student's t interval of the mean over seeds, or Tukey and McLaughlin's of the IQM."""
+    """Return Student's t interval of the mean over seeds; with `iqm`, Tukey and McLaughlin's."""
     from scipy.special import stdtrit
 
     values = _rows(values)

@@ -130,7 +130,7 @@ class AxialGrid:
         return inside.reshape(-1)
 
     def axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return q, int32 (1, width), and r, int32 (height, 1), of the array in two dimensions."""
+        """Return q of each column, int32 (1, width), and r of each row, int32 (height, 1)."""
         z = self.ranges[2]
         q = np.arange(-z, self.width - z, dtype=np.int32)
         r = np.arange(-z, self.height - z, dtype=np.int32)

@@ -178,7 +178,7 @@ class Session:
         return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
 
     def leap(self, n: int) -> bytes:
-        """Return a frame of changes after n more steps, possibly through several episodes.
+        """Return a frame of all changes after running n more steps, which may span episodes.
 
         The frame does not have the actions of ants.
         """

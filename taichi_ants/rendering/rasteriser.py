@@ -94,7 +94,7 @@ def ants(
     radius: float | None = None,
     opacity: float = 1.0,
 ) -> np.ndarray:
-    """Return marks of ants (n,) with `radius`; None means one for cells of the radius `hexagon`."""
+    """Return marks (n,) of ants. The default of `radius` suits cells of the radius `hexagon`."""
     if hexagon < _DOTS_BELOW:
         colour = np.where(carries, _DOT_WITH_FOOD, colours.ANT)
         return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)

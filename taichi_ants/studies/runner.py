@@ -234,7 +234,10 @@ class ColonyPoint:
         progress: Progress,
         where: Mapping[str, Any],
     ) -> Outcome:
-        """Return the outcome of a point, arrays (1, seeds, ...); `learned` has `after`'s tables."""
+        """Return the outcome of the one point in `points`, arrays (1, seeds, ...).
+
+        `learned` has the tables of the point `after`, from which learning starts.
+        """
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
         tables: Any = learned

@@ -62,9 +62,9 @@ class Sweep:
     Attributes:
         study: The points over the seeds, in the order of `settings`.
         settings: The settings that vary, for each point of the study.
-        grids: The slices of `settings` from each [vary].
+        grids: For each [vary] table of the file, the slice of `settings` that it defines.
         measures: Names of measures; the figure shows the first.
-        against: The setting and its value with which all others are compared.
+        against: A setting and the value of it with which all its other values are compared.
         margin: The largest difference in the first measure that is too small to matter.
     """
 

@@ -65,7 +65,7 @@ class Progress:
             self._before = self.ticks
 
     def news(self) -> list[Point]:
-        """Return the points since the last call."""
+        """Return the points of the curves that were added since the last call."""
         new, self._new = self._new, []
         return new
 

@@ -143,7 +143,7 @@ def _basis(rows: Sequence[ConditionRow]) -> str:
 
 
 def glance(rows: Sequence[ConditionRow]) -> Table:
-    """Return a table of deliveries of the largest colonies: designs down, kinds of world across."""
+    """Return deliveries of the largest colonies: a row per design, a column per kind of world."""
     sizes = [one.condition.ants for one in rows if one.condition.regime != study.ABROAD]
     largest = max(sizes, default=0)
     shown: dict[str, dict[Design, ConditionRow]] = {name: {} for name in study.WORLD_KINDS}

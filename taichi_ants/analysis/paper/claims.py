@@ -80,10 +80,11 @@ Audit = dict[Claim, dict[str, Finding]]  # by claim and delivery setting
 
 
 def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
-    """Return findings on the claims in all delivery settings, all judged together.
+    """Return findings on the claims in all delivery settings; all intervals hold at the same time.
 
-    The finding on a claim is that on its weakest contrast: a claim is supported if all its
-    contrasts are, and contradicted if one of them is.
+    A claim has one or more contrasts, the differences that must fulfil it. The finding on the claim
+    is that on its weakest contrast: the claim is supported if all its contrasts are, and
+    contradicted if one of them is.
     """
     grids = {delivery: grids_of(comparison, delivery) for delivery in comparison.delivery_settings}
     contrasts = {

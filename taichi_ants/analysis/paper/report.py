@@ -250,7 +250,7 @@ def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans])
 
 
 def baseline_table(baselines: Sequence[Baseline]) -> Table:
-    """Return a table of exact bounds and simple policies; notes explain missing ones."""
+    """Return a table of exact bounds and simple policies; notes explain why some are missing."""
     rows = [
         [one.label, number(one.return_mean), number(one.steps_mean), number(one.deliveries_mean, 2)]
         for one in baselines

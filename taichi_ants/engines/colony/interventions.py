@@ -231,7 +231,7 @@ class Interventions:
             self._remove(slots[np.argsort(colony.numbers[0, slots])[missing:]])
 
     def set_task(self, task: Task) -> None:
-        """Set a task that differs only in numbers of the pheromone and in evaporation."""
+        """Set a task; only numbers of the pheromone and the use of evaporation may have changed."""
         colony, arrays = self.colony, self.colony.arrays
         levels = np.maximum(arrays["trail"] - colony.trail_clock(0), 0)
         colony.task, colony.pheromone = task, task.pheromone_while(colony.learns)
