@@ -168,7 +168,7 @@ def _reading(path: Path) -> Iterator[None]:
     except Exception as error:  # h5py and Minari raise many kinds
         text = " ".join(str(error).rstrip(".").split()) or type(error).__name__
         raise AntsError(
-            f"the data set in {str(path)!r} is damaged or not of these environments ({text}); "
+            f"the data set in {str(path)!r} is damaged, or not from these environments ({text}); "
             "write it again, or name another data set."
         ) from error
 

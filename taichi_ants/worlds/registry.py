@@ -87,7 +87,7 @@ def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
         drawn = ", ".join(filter(is_drawn, names()))
         raise AntsError(
             f"{option} has no effect on {shown(name_or_path)}, which is not drawn at random; leave "
-            f"it out, or choose one of {drawn}."
+            f"it out, or choose one of the worlds {drawn}."
         )
 
 
