@@ -87,7 +87,7 @@ class AxialGrid:
 
     @property
     def width(self) -> int:
-        """Number of cells in a row: the values of q, and a void cell at each end."""
+        """Number of cells in a row: one for each value of q, and a void cell at each end."""
         return self.ranges[0] + self.ranges[2] + 1
 
     @property

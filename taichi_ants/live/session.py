@@ -287,8 +287,8 @@ class Session:
     def replay(cls, log: Log) -> Iterator[Session]:
         """Yield the session of a log while it is replayed, at least a few times per second.
 
-        The last session is the whole replay. AntsError if the log is damaged, or if the replay ends
-        in another state.
+        The last session is the whole replay. Raises AntsError if the log is damaged, or if the
+        replay does not end in the state that the log contains.
         """
         with KIND.building(log.name):
             session = cls(log.setup)

@@ -226,7 +226,10 @@ def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def tolerance(largest: float, discount: float, initial_q: float) -> float:
-    """Return the change of action values at which Q iteration ends, far above rounding errors."""
+    """Return the tolerance of Q iteration, far above rounding errors.
+
+    The iteration ends when no action value changes by more.
+    """
     return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_q))
 
 

@@ -197,7 +197,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
 
 def load_plugin(path: str | None) -> None:
-    """Run a Python file that registers learners, observations or worlds, unless it is None.
+    """Run a Python file that registers learners, observations or worlds; do nothing for None.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.

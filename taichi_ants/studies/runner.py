@@ -262,7 +262,7 @@ PointKind = TypeVar("PointKind", bound=Point)
 
 @dataclass(frozen=True)
 class Study(Generic[PointKind]):
-    """Points over the same seeds.
+    """Points that all run with the same seeds.
 
     Raises:
         AntsError: A world is too small for the ants, or worlds and seeds differ in number.

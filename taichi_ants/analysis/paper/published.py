@@ -25,7 +25,7 @@ class PaperRow(NamedTuple):
     deliveries: float  # per episode
 
     def figure(self, measure: str) -> float:
-        """Return the paper's number for a measure such as "return_last50", by its first word."""
+        """Return the paper's number for a measure; "return" and "return_last50" have the same one."""
         return getattr(self, measure.partition("_")[0].replace("return", "reward"))
 
 
