@@ -82,7 +82,7 @@ def paper(world: WorldState, ant: Ant) -> int:
 
 
 def more_cells(turns: tuple[int, ...], world: WorldState, ant: Ant) -> int:
-    """Return the state index of the load and the paper's codes of the cells at these turns."""
+    """Return the state index of the load and the codes of the cells at these turns from ahead."""
     return _number([ant.carries, *codes_in_view(world, ant, turns)], 4)
 
 
@@ -96,7 +96,7 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
 
 
 def trail_levels(world: WorldState, ant: Ant) -> int:
-    """Return the state index of load and cells ahead; trails count in thirds of the strongest."""
+    """Return the state index of load and cells ahead; trails have three codes, by strength."""
     strongest = strongest_in_view(world, ant)
     codes = []
     for code, cell in zip(codes_in_view(world, ant), cells_in_view(ant), strict=True):

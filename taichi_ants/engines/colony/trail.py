@@ -22,7 +22,7 @@ def level_in_view(c: ti.template(), v: ti.template(), place, clock):
 
 @ti.func
 def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
-    """Return the trail of a cell as it counts for the strongest one, 0 if it does not count."""
+    """Return the trail of a cell, or 0 if it does not count as a candidate for the strongest."""
     level = level_in_view(c, v, place, clock)
     if ti.static(v.view == "strongest_under_carriers"):
         carrier = c.ground[place] >> 4 == STANDS_WITH_FOOD
