@@ -8,9 +8,10 @@ middle half of the runs (Agarwal et al. 2021). Each has two intervals:
   quantile with n - 1 degrees of freedom. For the IQM it is the percentile interval, as in rliable.
 - Student's t. For the IQM it is the interval of Tukey and McLaughlin (1963).
 
-Tables and figures show the bootstrap interval. Verdicts on claims use the hull of both, at a level
-corrected for their number, because each can be too short. A bootstrap of few seeds never exceeds
-its most extreme resample, and the t interval is a point if the middle half consists of ties.
+Tables and figures show the bootstrap interval. Verdicts on claims use the hull of both intervals,
+because each can be too short. Their level is corrected for the number of verdicts. A bootstrap of
+few seeds never exceeds its most extreme resample, and the t interval is a point if the middle half
+consists of ties.
 
 The resampling weights come from a fixed random generator and depend only on the number of seeds, so
 that results are reproducible.
@@ -108,7 +109,7 @@ def estimates(values: np.ndarray, uses_iqm: bool = True) -> dict[str, np.ndarray
 
 
 def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return numbers (rows,) computed from values (rows, seeds), with rounding errors set to 0."""
+    """Return numbers (rows,), but 0 for those that are tiny next to the row's `values`."""
     tiny = TIE_TOLERANCE * np.abs(values).max(axis=1)
     return np.where(np.abs(numbers) <= tiny, 0.0, numbers)
 

@@ -177,7 +177,7 @@ def lay(
 
 @ti.func
 def best_headings(neighbours: ti.template(), utilities: ti.template(), colony, goal, cell, among):
-    """Return the headings in the set `among` with the highest utility, and that; or 0 and -1."""
+    """Return the headings in `among` with the highest utility, and this utility; or 0 and -1."""
     headings, best = 0, ti.f64(-1.0)
     for h in ti.static(range(N_HEADINGS)):
         if neighbours[cell, h] >= 0 and (among >> h) & 1:

@@ -119,7 +119,8 @@ def from_minari(
     Args:
         dataset: The data set, or its name.
         world: The world of the ants, required unless `to_minari` wrote the data set.
-        task: The rules of the ants, likewise; by default, the paper's.
+        task: The rules of the ants if `to_minari` did not write the data set; by default, the
+            paper's.
     """
     minari = _minari()
     try:

@@ -140,7 +140,10 @@ class EmpiricalModel:
 
     @classmethod
     def resampled(cls, data: Dataset, times: np.ndarray) -> EmpiricalModel:
-        """Return the model of resamples, a group each; `times` (resamples, episodes) are counts."""
+        """Return the model of resamples, a group each.
+
+        `times` (resamples, episodes) is how often each resample has each episode.
+        """
         n_states = data.task.n_states
         pair = data.state.astype(np.int64) * N_ACTIONS + data.action
         pairs, successors, _, _, triple = _tally(data, pair)

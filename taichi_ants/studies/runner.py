@@ -293,7 +293,7 @@ class Study(Generic[PointKind]):
         return _in_order(self.points)
 
     def blocks(self) -> Iterator[tuple[slice, slice]]:
-        """Yield the slices of `in_order` and of the seeds of each block, by rows of the array."""
+        """Yield two slices for each block: that of `in_order`, and that of the seeds."""
         first = 0
         for _, group in itertools.groupby(self.in_order, lambda point: point.alike):
             points = list(group)

@@ -136,7 +136,10 @@ class Recorder:
         }
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
-        """Return the `name_parts` of states seen, or of all if they are few, except `known`."""
+        """Return the `name_parts` of the states seen so far, except those in `known`.
+
+        If there are few states, it returns those of all.
+        """
         few = self._n_states <= _MOST_NAMES
         seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
         named = range(self._n_states) if few else seen

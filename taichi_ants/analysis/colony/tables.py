@@ -219,7 +219,7 @@ def _compared(
 
 
 def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
-    """Return tables of deliveries and of the main findings, and the number of true statements."""
+    """Return tables of deliveries and of the main findings, and the number of each verdict."""
     seen = glance(rows)
     world_kinds = {one.condition.world_kind for one in rows}
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
@@ -242,7 +242,7 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 
 
 def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
-    """Return the finding on the largest colony; of several, the one that objects most."""
+    """Return the finding on the largest colony; of several, that with the strongest objection."""
     return _of_size(findings, max(ants for ants, _ in findings))
 
 

@@ -21,8 +21,8 @@ from taichi_ants.files import tomllib
 class Claim:
     """An empirical claim of the paper, made precise.
 
-    Every effect of the quantity must fulfil the criterion, which gives words of the paper such as
-    "about", "close" or "consistently" a number.
+    Every effect of the quantity must fulfil the criterion, in which words of the paper such as
+    "about", "close" or "consistently" become numbers.
     """
 
     id: str
