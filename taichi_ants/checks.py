@@ -235,7 +235,7 @@ def checked_share(name: str, value: float) -> float:
 
 
 def check_progress(progress: object) -> None:
-    """Raise AntsError unless `progress` is None or a function (of the share of work done)."""
+    """Raise AntsError unless `progress` is None or a function."""
     if progress is not None and not callable(progress):
         raise AntsError(f"progress is {shown(progress)}; it must be a function or None.")
 

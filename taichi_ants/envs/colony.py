@@ -178,7 +178,7 @@ class HexColonyVectorEnv(AntVectorEnv):
     ## Arguments
     - `num_envs`: The number of ants in all worlds together, a multiple of `ants`.
     - `world`: A registered name, the path of a map, a `World`, or a list of n of these with the
-      same ranges, of which world number w has number w modulo n.
+    same ranges, of which world number w is entry w modulo n.
     - `task`: The rules, without births and lifespan; by default, the paper's.
     - `ants`: The number of ants in each world.
     - `start`, `max_steps`, `observation_format`, `evaporation`: See `HexColonyParallelEnv`.

@@ -236,7 +236,7 @@ class HexForageVectorEnv(AntVectorEnv):
     ## Arguments
     - `num_envs`: The number of environments; each takes 4 bytes for each cell of its world.
     - `world`: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
-      i has number i modulo n.
+    i has entry i modulo n.
     - `autoreset_mode`: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
     - `max_episode_steps`: The step limit of `gymnasium.make_vec`; the smaller limit counts.
     - All others: See `HexForageEnv`; `render` draws all worlds.

@@ -114,7 +114,7 @@ def checked(edit: object, interventions: Interventions) -> Edit:
 
 
 def apply(edit: Edit, interventions: Interventions, length: int | None) -> None:
-    """Apply an edit that `checked` returned; `length` is the length of an episode that it begins.
+    """Apply an edit that `checked` returned; if it begins an episode, `length` is its length.
 
     Raises:
         AntsError: The world does not allow the edit; nothing has changed.

@@ -45,7 +45,8 @@ def check_cues(task: Task) -> None:
 class Setup:
     """The initial conditions of a session.
 
-    AntsError if a value is not allowed; `Session` raises it if the world or colony cannot be built.
+    Raises AntsError if a value is not allowed. If the world or colony cannot be built, `Session`
+    raises it.
     """
 
     world: str  # the name of a registered world, or the text of a map
@@ -144,7 +145,7 @@ class Setup:
     def from_json(cls, facts: object, table: np.ndarray | None = None) -> Setup:
         """Return the setup of `to_json`; `table` are action values if the policy is "table".
 
-        Missing values have their defaults. AntsError if a value is not allowed.
+        Missing values have their defaults. Raises AntsError if a value is not allowed.
         """
         expect("a setup", facts, Mapping)
         assert isinstance(facts, Mapping)

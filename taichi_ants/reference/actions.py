@@ -149,10 +149,10 @@ def settle(
 
 
 def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Task) -> None:
-    """Let all ants act at once; each remembers its action, its event and its reward.
+    """Let all ants act at once, and record in each its action, its event and its reward.
 
-    All intents are from the start of the tick, so no ant's action changes that of another ant. No
-    two ants enter a cell, empty it, or deposit on it.
+    All intents are from the start of the tick, so no ant's action changes that of another ant. At
+    most one ant enters a given cell, at most one takes its food, and at most one deposits on it.
     """
     winning = winners(intents, tick, world.index, task.traffic.carriers_first)
     entered, pushed = settle(intents, winning, task.traffic)

@@ -66,7 +66,7 @@ class FoodSources:
         self._piles = [pile for pile in piles if pile]
 
     def taken(self, cell: Cell, tick: int) -> None:
-        """Note that food was taken from a cell; its full food source waits from now on."""
+        """Note that food was taken from a cell; its food source waits from this tick on."""
         for source in self.food_sources:
             if source.cell == cell and source.waiting_since is None:
                 source.waiting_since = tick

@@ -156,7 +156,7 @@ class Interventions:
         self.set_pheromone()
 
     def set_pheromone(self, **numbers: Any) -> None:
-        """Change numbers of the pheromone; it stays dense, or not dense."""
+        """Change numbers of the pheromone, but not whether it is dense."""
         self._pheromone = replace(self._pheromone, **numbers)
         still: dict[str, Any] = {} if self._falls else {"evaporation": "none", "half_life": None}
         now = replace(self._pheromone, **still)

@@ -120,7 +120,7 @@ def ants_seen(world: WorldState, ant: Ant) -> int:
 
 
 def trail_levels(world: WorldState, ant: Ant) -> int:
-    """Return the state index of load and cells ahead; trails count in thirds of the strongest."""
+    """Return the state index of load and cells ahead; trails have three codes, by strength."""
     strongest = strongest_in_view(world, ant)
     codes = []
     views = zip(AHEAD, codes_seen(world, ant), cells_in_view(ant), strict=True)

@@ -48,7 +48,7 @@ class Span(NamedTuple):
 
 
 def spans(totals: Sequence[Totals]) -> list[Span]:
-    """Return the spans between successive totals; `blocked` is a share of the moves."""
+    """Return a span for each two successive totals; its `blocked` is the share of blocked moves."""
     found = []
     for one, next_ in pairwise(totals):
         ticks, deliveries, moves, blocked = (b - a for a, b in zip(one, next_, strict=True))

@@ -273,7 +273,10 @@ class ColonyPoint:
         progress: Progress,
         where: Mapping[str, Any],
     ) -> Outcome:
-        """Return the outcome of a point, arrays (1, seeds, ...); `learned` has `after`'s tables."""
+        """Return the outcome of the one point in `points`, arrays (1, seeds, ...).
+
+        `learned` has the tables of the point `after`, from which learning starts.
+        """
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
         tables: Any = point.policy.q_values if point.policy else learned
@@ -316,7 +319,7 @@ PointKind = TypeVar("PointKind", bound=Point)
 
 @dataclass(frozen=True)
 class Study(Generic[PointKind]):
-    """Points over the same seeds.
+    """Points that all run with the same seeds.
 
     Raises:
         AntsError: A world is too small for the ants, or worlds and seeds differ in number.
@@ -348,7 +351,7 @@ class Study(Generic[PointKind]):
         return _in_order(self.points)
 
     def blocks(self) -> Iterator[tuple[slice, slice]]:
-        """Yield the slices of `in_order` and of the seeds of each block, by rows of the array."""
+        """Yield two slices for each block: that of `in_order`, and that of the seeds."""
         first = 0
         for _, group in itertools.groupby(self.in_order, lambda point: point.alike):
             points = list(group)

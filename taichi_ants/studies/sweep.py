@@ -96,7 +96,7 @@ class Sweep:
     Attributes:
         study: The points over the seeds, in the order of `settings`.
         settings: The settings that vary, for each point of the study.
-        grids: The slices of `settings` from each [vary].
+        grids: For each [vary] table of the file, the slice of `settings` that it defines.
         measures: Names of measures; the figure shows the first.
         every: Ticks between two rows of `SERIES_FILE`; None without that file.
         against: The setting and its value with which all others are compared.

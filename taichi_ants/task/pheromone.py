@@ -83,7 +83,7 @@ class Pheromone(Settings, path="task.pheromone"):
 
     @property
     def dense(self) -> bool:
-        """Whether levels are float32 and change in every cell each tick, or are integers."""
+        """Whether levels are float32 that change in every cell each tick, rather than integers."""
         return self.evaporation == "exponential" or self.diffusion > 0
 
     @property

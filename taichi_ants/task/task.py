@@ -246,7 +246,7 @@ class Task(Settings, path="task"):
         }
 
     def pheromone_while(self, learning: bool) -> Pheromone:
-        """Return the pheromone while ants learn or do not, with or without evaporation."""
+        """Return the pheromone for learning or evaluation, without evaporation if that is off."""
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
         return self.pheromone if falls else self.pheromone.lasting
 

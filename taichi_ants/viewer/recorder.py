@@ -65,7 +65,7 @@ class Progress:
             self._before = self.ticks
 
     def news(self) -> list[Point]:
-        """Return the points since the last call."""
+        """Return the points of the curves that were added since the last call."""
         new, self._new = self._new, []
         return new
 
@@ -137,7 +137,10 @@ class Recorder:
         }
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
-        """Return the `name_parts` of states seen, or of all if they are few, except `known`."""
+        """Return the `name_parts` of the states seen so far, except those in `known`.
+
+        If there are few states, it returns those of all.
+        """
         few = self._n_states <= _MOST_NAMES
         seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
         named = range(self._n_states) if few else seen

@@ -142,8 +142,8 @@ def _inside(name: str, given: np.ndarray, grid: AxialGrid) -> np.ndarray:
     if len(outside):
         place = f"{name}[{outside[0]}]" if name != "queen" else name
         raise AntsError(
-            f"{place} is {tuple(given[outside[0]].tolist())}, outside the world; in the form whose "
-            f"smallest coordinate is 0, all must be below the ranges {grid.ranges}."
+            f"{place} is {tuple(given[outside[0]].tolist())}, outside the world; after the "
+            f"smallest coordinate is subtracted from all, x, y, z must be below {grid.ranges}."
         )
     return rows.astype(np.int32)
 

@@ -118,9 +118,10 @@ class EpisodeBounds:
         self._chances = coo_array((shares, (rows, columns)), shape=(N_ACTIONS * n, n)).tocsr()
 
     def shortest(self) -> Outcome | None:
-        """Return the fewest steps to a delivery with the largest return, None if there is no way.
+        """Return the outcome of the shortest delivery, None if there is no way.
 
-        Random choices among several food items are assumed to be the best ones.
+        Of several shortest ones, it is the one with the largest return. Random choices among
+        several food items are assumed to be the best ones.
         """
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import dijkstra

@@ -67,7 +67,7 @@ class Colony(ColonyState):
 
         Args:
             length: Number of ticks, for learners that update at the last tick; None if unknown.
-            world: The new worlds, as in the class; None keeps the present ones.
+            world: The new world or worlds, as for `Colony`; None keeps the present ones.
 
         Raises:
             AntsError: A world is not allowed.

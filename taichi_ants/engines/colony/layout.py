@@ -127,7 +127,7 @@ class FoodSourceRow(IntEnum):
 
 
 class SumRow(IntEnum):
-    """Rows of `sums_of`, one column for each chunk and pair: updates of the pair in this tick."""
+    """Rows of `sums_of`: the updates of a state-action pair in a tick, a column for each chunk."""
 
     COUNT = 0
     LATEST = auto()  # the highest ant number

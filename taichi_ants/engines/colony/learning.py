@@ -302,7 +302,7 @@ def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def plan_together(c: ti.template(), v: ti.template(), w, tick):
-    """Update the drawn pairs, by the table at the start of the round."""
+    """Update the pairs that ants drew for planning, by the table before this round of updates."""
     join_sums(c, v, w)
     chunk = w * c.n_chunks
     listed = list_of(v, chunk)

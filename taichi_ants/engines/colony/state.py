@@ -268,7 +268,7 @@ class ColonyState:
 
     @property
     def episode(self) -> int:
-        """The number of the present episode, or the largest of all worlds; -1 before the first."""
+        """The number of the current episode (the largest of all worlds), from 0; -1 before it."""
         return int(self.arrays["episodes"].max())
 
     @property

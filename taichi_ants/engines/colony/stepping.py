@@ -80,7 +80,7 @@ class Stepper:
             self._share_ticks(state, min(end - state.ticks, interval - state.ticks % interval))
 
     def launch(self, state: ColonyState, name: str) -> None:
-        """Launch a kernel: the phases of this name in `kernels`, or "ticks"."""
+        """Launch a kernel by name: "ticks", or a group of phases in `kernels`."""
         runtime.start()  # the caller may have reset Taichi, or forked the process
         if name not in self._launches:
             self._launches[name] = self._prepared(state, name)

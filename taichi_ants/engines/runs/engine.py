@@ -109,7 +109,7 @@ class Runs:
     def following(
         cls, tables: np.ndarray, seeds: np.ndarray, numbers: np.ndarray, epsilon: float
     ) -> Runs:
-        """Return runs that follow tables (n, n_states, 5), in the rollouts `numbers` of each."""
+        """Return runs that follow tables (n, n_states, 5) in the rollouts of these `numbers`."""
         state = RunState.empty((len(tables),), tables.shape[-2])
         state.q[:, 0, :, :N_ACTIONS] = tables
         state.epsilon[:] = epsilon

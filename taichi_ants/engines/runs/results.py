@@ -80,7 +80,10 @@ class RunState(Record):
         return state
 
     def part(self, configs: slice | list[int]) -> RunState:
-        """Return runs of some configurations with one leading axis: views of a slice, or copies."""
+        """Return the runs of some configurations, in arrays (runs, ...).
+
+        The arrays are views if `configs` is a slice, else copies.
+        """
         n, arrays = self.epsilon[configs].size, vars(self).items()
         return RunState(
             **{name: array[configs].reshape(n, *array.shape[2:]) for name, array in arrays}

@@ -62,7 +62,8 @@ class Observation:
         name_of: A function that returns the name of a state for people.
         summary: A line for listings.
         letters: The meaning of letters in names other than the paper's E, O, T, S, F and Q.
-        shape: The sizes of the digits of a state index if it has several, for neural networks.
+        shape: The number of values of each part of a state index, if it has several parts.
+            Environments show neural networks each part.
     """
 
     name: str
@@ -82,7 +83,7 @@ class Observation:
 
     @property
     def parts(self) -> tuple[int, ...]:
-        """The sizes of the digits of a state index: `shape`, or (n_states,) if it has only one."""
+        """The number of values of each part of a state index: `shape`, or (n_states,)."""
         return self.shape or (self.n_states,)
 
     @property
@@ -95,7 +96,7 @@ _OBSERVATIONS: dict[str, Observation] = {}
 
 
 def register(observation: Observation) -> Observation:
-    """Return an observation after registering it, in place of your own one of the same name.
+    """Return an observation after registering it; it replaces your own one of the same name.
 
     Raises AntsError if the name is not an identifier or belongs to a built-in observation, a field
     does not have the right form, or a state index is outside its range.
