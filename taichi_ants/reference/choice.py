@@ -31,8 +31,7 @@ from taichi_ants.task.constants import (
 )
 
 if TYPE_CHECKING:
-    from taichi_ants.task import Traffic
-    from taichi_ants.task.choice import Choice
+    from taichi_ants.task import Choice, Traffic
 
 _WORDS = 4294967296.0
 

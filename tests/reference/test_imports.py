@@ -30,7 +30,7 @@ OUTSIDE = {
     "numpy",
     "typing",
 }
-RULES = {"Field", "Food", "Life", "Pheromone", "Rewards", "Task", "Traffic"}
+RULES = {"Choice", "Field", "Food", "Life", "Pheromone", "Rewards", "Task", "Traffic"}
 
 
 FILES = sorted(FOLDER.rglob("*.py"))

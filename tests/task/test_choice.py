@@ -10,6 +10,7 @@ from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, record, 
 from taichi_ants.analysis.bounds.episodes import EpisodeBounds
 from taichi_ants.envs.colony import ColonyWorlds
 from taichi_ants.envs.forage import LoneAnts
+from taichi_ants.envs.vector import Arguments
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.offline import record_colony
@@ -174,6 +175,7 @@ def test_recorded_probabilities_are_those_of_softmax():
 
 
 CELLS = Task(choice="deneubourg")
+GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
 REFUSED = [
     (lambda: Choice("greedy", temperature=2.0), "`task.choice.temperature` is 2.0; leave it out"),
     (lambda: Choice("softmax", temperature=0), "`task.choice.temperature` is 0; it must be"),
@@ -210,11 +212,11 @@ REFUSED = [
         "learner 'expected_sarsa'",
     ),
     (
-        lambda: LoneAnts(1, "paper", Task(choice="softmax"), None, None, 9, "index", None),
+        lambda: LoneAnts(1, Task(choice="softmax"), None, GIVEN),
         "the actions of an environment are given; leave `task.choice` out",
     ),
     (
-        lambda: ColonyWorlds("paper", 1, CELLS, 1, "nest", None, 9, "index", None, None),
+        lambda: ColonyWorlds(1, CELLS, GIVEN, ants=1, start="nest"),
         "the actions of an environment are given",
     ),
     (lambda: EpisodeBounds(worlds.paper(), Task(noise=Noise(slip=0.1))), "a task without noise"),

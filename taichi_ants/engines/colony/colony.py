@@ -203,9 +203,13 @@ class Colony(ColonyState):
                 recorder.read(self)
                 if not self.running.any():
                     break
-            outcomes.append(self.outcome().counts())
+            outcomes.append(self.outcome())
             self.end_episode()
-        counts = {name: np.concatenate([one[name] for one in outcomes]) for name in outcomes[0]}
+        counts: dict[str, Any] = {
+            name: np.concatenate([getattr(one, name) for one in outcomes])
+            for name, array in vars(outcomes[0]).items()
+            if isinstance(array, np.ndarray)
+        }
         return ColonyEpisodes(**counts, seeds=self.seeds, series=recorder.series())
 
     def _checked_places(self, worlds: Any, episodes: int) -> Sequence[Any]:
