@@ -28,6 +28,7 @@ OUTSIDE = {
     "functools",
     "math",
     "numpy",
+    "struct",
     "typing",
 }
 RULES = {"Choice", "Field", "Food", "Life", "Pheromone", "Rewards", "Task", "Traffic"}
