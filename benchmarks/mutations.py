@@ -25,6 +25,7 @@ TIMEOUT = 300.0  # seconds; a mutation that makes tests take longer counts as no
 RUNS = "tests/engines/runs/test_against_reference.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
+NESTS = "tests/engines/colony/test_nests.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -38,13 +39,38 @@ SESSION = "tests/live/test_session.py"
 EDITS = "tests/live/test_edits.py"
 SETTINGS = "tests/test_settings.py"
 PROTOCOL = "tests/engines/colony/test_protocol.py"
+MEASURES = "tests/measures"
+RESULTS_OF_RUNS = "tests/analysis/test_results.py"
+SWEEPS = "tests/commands/test_sweep_measures.py"
+CHOICE = "tests/task/test_choice.py"
+NUMBERS = "tests/task/test_numbers.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
     # Rules.
+    ("engines/colony/steps.py", "if c.counts_without_food == 1:", "if False:", COLONY),
+    ("engines/colony/steps.py", "ti.select(carries == had_food, age, 0)", "age", COLONY),
+    (
+        "engines/colony/trail.py",
+        "laid == Occasion.DEAD_END, cell, goes",
+        "False, cell, goes",
+        COLONY,
+    ),
+    ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
+    ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
+    ("engines/colony/steps.py", "homing.half", "v.half", COLONY),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),
+    ("engines/colony/steps.py", "(place != queen)", "(place < 0)", NESTS),
+    ("engines/colony/steps.py", "left = c.loads[place] - 1", "left = c.loads[place] - 2", NESTS),
+    ("engines/colony/life.py", "put(c.nest, ant, nest)", "put(c.nest, ant, 0)", COLONY),
+    (
+        "engines/colony/life.py",
+        "c.kind_of[place] = ti.cast(trait(c.kind, ant), ti.u8)",
+        "pass",
+        COLONY,
+    ),
     ("task/rules/conflicts.py", "loaded > other_loaded or", "loaded < other_loaded or", TRAFFIC),
     ("task/rules/conflicts.py", "stays = had_ant(", "stays = not had_ant(", TRAFFIC),
     ("task/rules/conflicts.py", "(WINS | TAKES_FOOD) == WINS", "WINS == WINS", TRAFFIC),
@@ -73,6 +99,17 @@ MUTATIONS = [
         "(1.0 - explores) / ti.cast(ties",
         "1.0 / ti.cast(ties",
         "tests/offline/test_recording.py",
+    ),
+    ("task/rules/policy.py", "cumulative <= drawn", "cumulative < drawn / 2", CHOICE),
+    ("task/rules/policy.py", "(is_open_at * is_nearer).sum() > 0", "False", COLONY),
+    ("task/rules/numbers.py", "if m > ti.f64(SQRT_2)", "if m > ti.f64(2.0)", NUMBERS),
+    ("task/rules/noise.py", "ti.cast(other >= code", "ti.cast(other > code", CHOICE),
+    ("engines/colony/steps.py", "ti.select(is_true, level, 0)", "level", COLONY),
+    (
+        "engines/colony/learning.py",
+        "c.streams[ant] == c.first",
+        "0 * c.streams[ant] != 1 + c.first",
+        CHOICE,
     ),
     ("task/rules/random_bits.py", "ti.u64(27)", "ti.u64(28)", RUNS),
     ("task/rules/vision.py", "2 * level >= ti.max", "2 * level > ti.max", COLONY),
@@ -214,6 +251,24 @@ MUTATIONS = [
     ("worlds/world.py", "np.lexsort((words, distance))", "np.argsort(words)", "tests/worlds"),
     ("worlds/world.py", "[[1, 1, 0], [1", "[[0, 1, 1], [1", "tests/worlds"),
     ("grid/hexgrid.py", "difference > -y", "difference >= -y", "tests/grid"),
+    # Measures and results.
+    (
+        "engines/colony/steps.py",
+        "Tally.CARRIED, chunk, carried)",
+        "Tally.CARRIED, chunk, 1)",
+        COLONY,
+    ),
+    ("measures/paths.py", 'counts["carried"] / counts', 'counts["moves"] / counts', MEASURES),
+    ("measures/paths.py", "float(reached.min()) - 1)", "float(reached.min()))", MEASURES),
+    ("measures/trails.py", "level, n in pairs)", "level, _ in pairs for n in (1,))", MEASURES),
+    ("measures/trails.py", "/ math.log(cells))", "/ math.log(cells + 1))", MEASURES),
+    ("measures/activity.py", "(one - mean) ** 2", "abs(one - mean)", MEASURES),
+    ("measures/series.py", "if self._read.get(world) == tick:", "if False:", MEASURES),
+    ("measures/ants.py", "snapshot.distances[snapshot.ant_cells]", "snapshot.distances", MEASURES),
+    ("measures/tidy.py", "[last[key] == tick", "[last[key] >= tick", RESULTS_OF_RUNS),
+    ("analysis/results.py", "goes_on, np.roll(begins, -1)", "goes_on, begins + 1", RESULTS_OF_RUNS),
+    ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
+    ("studies/sweep.py", "last = array[..., -1]", "last = array[..., 0]", SWEEPS),
     # Settings.
     ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
     ("settings.py", "elif value != one.default:", "elif False:", SETTINGS),

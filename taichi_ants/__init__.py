@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING
 from taichi_ants.environment import prepare_for_taichi
 
 if TYPE_CHECKING:
-    from taichi_ants import analysis, learners, offline, reference, rendering, task, worlds
+    from taichi_ants import (
+        analysis,
+        learners,
+        measures,
+        offline,
+        reference,
+        rendering,
+        task,
+        worlds,
+    )
+    from taichi_ants.analysis.results import compare
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
@@ -24,12 +34,13 @@ if TYPE_CHECKING:
     from taichi_ants.offline.dataset import Dataset
     from taichi_ants.offline.recording import record, record_colony
     from taichi_ants.protocol import At, Every, When
-    from taichi_ants.task import Life, Observation, Pheromone, Rewards, Task, states
+    from taichi_ants.task import Field, Life, Observation, Pheromone, Rewards, Task, states
     from taichi_ants.worlds import World
 
 __version__ = "0.1.0"
 
 _NAMES_IN = {
+    "analysis.results": ("compare",),
     "engines.colony.colony": ("Colony", "ColonyEpisodes"),
     "engines.colony.interventions": ("Interventions",),
     "engines.runs.results": ("Rollouts", "TrainingResult"),
@@ -43,11 +54,21 @@ _NAMES_IN = {
     "offline.dataset": ("Dataset",),
     "offline.recording": ("record", "record_colony"),
     "protocol": ("At", "Every", "When"),
-    "task": ("Life", "Observation", "Pheromone", "Rewards", "Task"),
+    "task": ("Field", "Life", "Observation", "Pheromone", "Rewards", "Task"),
     "worlds": ("World",),
 }
 _MODULES = (
-    *("analysis", "learners", "offline", "reference", "rendering", "task", "task.states", "worlds"),
+    *(
+        "analysis",
+        "learners",
+        "measures",
+        "offline",
+        "reference",
+        "rendering",
+        "task",
+        "task.states",
+        "worlds",
+    ),
 )
 
 __all__ = [
@@ -57,6 +78,7 @@ __all__ = [
     "ColonyEpisodes",
     "Dataset",
     "Every",
+    "Field",
     "Interventions",
     "Life",
     "Observation",
@@ -71,11 +93,13 @@ __all__ = [
     "World",
     "__version__",
     "analysis",
+    "compare",
     "continue_training",
     "evaluate",
     "from_minari",
     "learners",
     "load_policy",
+    "measures",
     "offline",
     "record",
     "record_colony",
@@ -94,7 +118,7 @@ __all__ = [
 
 
 def _show_pages_in_notebooks() -> None:
-    """Register colonies, traces and recordings with IPython, if it runs, to be shown as pages."""
+    """Register worlds, colonies, traces and recordings with IPython, if it runs, to be drawn."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if shell is None:
         return
@@ -108,6 +132,7 @@ def _show_pages_in_notebooks() -> None:
     formatter.for_type_by_name("taichi_ants.engines.colony.colony", "Colony", page_of)
     formatter.for_type_by_name("taichi_ants.engines.runs.traces", "Trace", page_of)
     formatter.for_type_by_name("taichi_ants.viewer.frames", "Recording", page_of)
+    formatter.for_type_by_name("taichi_ants.worlds.world", "World", page_of)
 
 
 prepare_for_taichi()

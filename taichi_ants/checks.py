@@ -15,6 +15,7 @@ from taichi_ants.errors import (
     check_one_of,
     checked_flag,
     checked_whole,
+    count,
     entries_of,
     expect,
     shown,
@@ -24,17 +25,28 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import checked_values
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
+from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.worlds.world import STARTS, World
 
 if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
     from taichi_ants.learners.learner import Learner
 
 MAX_ANTS = 1 << 24
 
 
-def checked_world(world: World, learns: bool = False) -> World:
-    """Return the world; AntsError if it is not a World or, with `learns`, has no food."""
+def checked_world(world: World, learns: bool = False, several: bool = False) -> World:
+    """Return the world; AntsError if it is not a World or, with `learns`, has no food.
+
+    Only colonies (`several`) can have several nests or kinds of food.
+    """
     expect("world", world, World)
+    if not several and (world.n_nests > 1 or world.n_food_kinds > 1):
+        raise AntsError(
+            f"the world has {count(world.n_nests, 'nest')} and "
+            f"{count(world.n_food_kinds, 'kind')} of food; only colonies support several, so use "
+            "a Colony."
+        )
     if learns and not len(world.foods):
         raise AntsError("the world has no food, so ants cannot learn in it; add food.")
     return world
@@ -46,6 +58,15 @@ def checked_task(task: Task) -> Task:
     return task
 
 
+def check_one_nest(colony: Colony, who: str) -> None:
+    """Raise AntsError if a colony has several nests or kinds of food, which `who` cannot have."""
+    if colony.n_nests > 1 or colony.task.foods:
+        raise AntsError(
+            f"the colony has several nests, or `task.foods`; {who} supports one nest and no "
+            "`task.foods`."
+        )
+
+
 def checked_runs_task(task: Task | None) -> Task:
     """Return the task, by default the paper's; AntsError if runs of one ant cannot have it."""
     task = checked_task(Task() if task is None else task)
@@ -53,10 +74,33 @@ def checked_runs_task(task: Task | None) -> Task:
         raise AntsError(
             f"life of the task is {task.life}; only colonies support it, so use a Colony."
         )
+    if task.foods:
+        raise AntsError(
+            f"`task.foods` is {', '.join(task.foods)}; only colonies support it, so use a Colony."
+        )
     if task.pheromone.dense:
         raise AntsError(
             f"pheromone of the task is {task.pheromone}; runs of one ant support neither "
             "exponential evaporation nor diffusion, so use a Colony."
+        )
+    further = [
+        f"{name} of the task is {value}"
+        for name, value, usual in (
+            ("fields", ", ".join(task.fields), ""),
+            ("outbound_cue", task.outbound_cue, TRAIL),
+            ("homing_cue", task.homing_cue, COMPASS),
+            (f"reads of the observation {task.observation!r}", ", ".join(task.sees.reads), ""),
+        )
+        if value != usual
+    ]
+    if further:
+        raise AntsError(
+            f"{further[0]}; runs of one ant have only the trail and the compass, so use a Colony."
+        )
+    if not task.choice.needs_table:
+        raise AntsError(
+            f"`task.choice.rule` of the task is {task.choice.rule!r}; only colonies support it, so "
+            "use a Colony."
         )
     return task
 
@@ -90,6 +134,48 @@ def check_sharing(learner: Learner, sharing: str) -> None:
         raise AntsError(
             f"learner {learner.name!r} has no TD error that can be summed over ants, so ants "
             'cannot share its table; set sharing to "independent".'
+        )
+
+
+def refuse_table(task: Task, sharing: str) -> None:
+    """Raise an AntsError, because the ants of the task choose without action values."""
+    raise AntsError(
+        f"`task.choice.rule` is {task.choice.rule!r}, so ants choose without action values, but "
+        f"sharing is {shown(sharing)} and there is a training or q_values; set sharing to "
+        '"frozen" and training to None, and leave out q_values.'
+    )
+
+
+def check_table(task: Task) -> None:
+    """Raise AntsError if the ants of a task do not choose by action values."""
+    if not task.choice.needs_table:
+        raise AntsError(
+            f"`task.choice.rule` is {task.choice.rule!r}, which has no action values, so the "
+            "probabilities of actions are not known; record ants that are greedy or softmax."
+        )
+
+
+def check_choice(learner: Learner, task: Task) -> None:
+    """Raise AntsError if the learner cannot learn about the choices of the task's ants."""
+    if learner.name == "expected_sarsa" and task.choice.rule != "greedy":
+        raise AntsError(
+            f"learner 'expected_sarsa' takes the mean over epsilon-greedy actions, but "
+            f"`task.choice.rule` is {task.choice.rule!r}; use 'sarsa', or the rule 'greedy'."
+        )
+
+
+def check_choices(configs: Sequence[TrainingConfig], task: Task) -> None:
+    """Raise AntsError if a learner cannot learn about the choices of the task's ants."""
+    for config in configs:
+        check_choice(learners.get(config.learner), task)
+
+
+def check_given_actions(task: Task) -> None:
+    """Raise AntsError if the task has a rule of choice, which given actions would not follow."""
+    if task.choice.rule != "greedy":
+        raise AntsError(
+            f"`task.choice.rule` is {task.choice.rule!r}, but the actions of an environment are "
+            "given; leave `task.choice` out."
         )
 
 
@@ -149,7 +235,7 @@ def checked_share(name: str, value: float) -> float:
 
 
 def check_progress(progress: object) -> None:
-    """Raise AntsError unless `progress` is None or a function (of the share of work done)."""
+    """Raise AntsError unless `progress` is None or a function."""
     if progress is not None and not callable(progress):
         raise AntsError(f"progress is {shown(progress)}; it must be a function or None.")
 

@@ -117,7 +117,7 @@ def start_for_plugin_check() -> None:
 
 
 def holds_data() -> bool:
-    """Return whether Taichi has fields or arrays of the user; taichi_ants itself makes none."""
+    """Return whether Taichi has fields or arrays, which only the user's program creates."""
     import taichi as ti
 
     runtime, root = ti.lang.impl.get_runtime(), ti.lang.impl._root_fb

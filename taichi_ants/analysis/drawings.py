@@ -40,7 +40,7 @@ class Drawing(NamedTuple):
 
 
 def drawing(name: str, figure: Figure) -> Drawing:
-    """Return a figure of `style.frame` as markup; this removes title and caption from `figure`."""
+    """Return a figure that `style.frame` made as markup, after removing its title and caption."""
     from matplotlib import rc_context
 
     [legend] = figure.legends

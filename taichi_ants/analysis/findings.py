@@ -140,7 +140,7 @@ class Finding:
 
 
 def judge(contrasts: Sequence[Contrast]) -> list[Finding]:
-    """Return the findings on contrasts that are judged together, in their order."""
+    """Return the findings on contrasts, in their order; all intervals hold at the same time."""
     readings = {
         (place, uses_iqm): contrast.reading(uses_iqm)
         for place, contrast in enumerate(contrasts)

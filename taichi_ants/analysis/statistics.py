@@ -8,9 +8,10 @@ middle half of the runs (Agarwal et al. 2021). Each has two intervals:
   quantile with n - 1 degrees of freedom. For the IQM it is the percentile interval, as in rliable.
 - Student's t. For the IQM it is the interval of Tukey and McLaughlin (1963).
 
-Tables and figures show the bootstrap interval. Verdicts on claims use the hull of both, at a level
-corrected for their number, because each can be too short. A bootstrap of few seeds never exceeds
-its most extreme resample, and the t interval is a point if the middle half consists of ties.
+Tables and figures show the bootstrap interval. Verdicts on claims use the hull of both intervals,
+because each can be too short. Their level is corrected for the number of verdicts. A bootstrap of
+few seeds never exceeds its most extreme resample, and the t interval is a point if the middle half
+consists of ties.
 
 The resampling weights come from a fixed random generator and depend only on the number of seeds, so
 that results are reproducible.
@@ -121,7 +122,7 @@ def estimates(values: np.ndarray, uses_iqm: bool = True) -> list[Estimator]:
 
 
 def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return numbers (rows,) computed from values (rows, seeds), with rounding errors set to 0."""
+    """Return numbers (rows,), but 0 for those that are tiny next to the row's `values`."""
     tiny = TIE_TOLERANCE * np.abs(values).max(axis=1)
     return np.where(np.abs(numbers) <= tiny, 0.0, numbers)
 
@@ -157,7 +158,7 @@ def _rows(values: np.ndarray) -> np.ndarray:
 def student_interval(
     values: np.ndarray, level: float = 0.95, iqm: bool = False
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return Student's t interval of the mean over seeds, or Tukey and McLaughlin's of the IQM."""
+    """Return Student's t interval of the mean over seeds; with `iqm`, Tukey and McLaughlin's."""
     from scipy.special import stdtrit
 
     values = _rows(values)

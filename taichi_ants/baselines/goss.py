@@ -97,8 +97,8 @@ def class_shares(took: np.ndarray, first: int = 501, last: int = 1000) -> np.nda
     """Return the percentage of colonies in each class of shares of the short branch, float64 (5,).
 
     The classes are 0-20 %, ... 80-100 % of the ants `first` to `last`, counted from 1; a share on a
-    border belongs to the class above. `took` is a result of `choices`. AntsError if there are no
-    such ants.
+    border belongs to the class above. `took` is a result of `choices`. Raises AntsError if there
+    are no such ants.
     """
     checked_whole("last", last, 1, took.shape[1])
     checked_whole("first", first, 1, last)

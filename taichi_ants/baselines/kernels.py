@@ -177,7 +177,7 @@ def lay(
 
 @ti.func
 def best_headings(neighbours: ti.template(), utilities: ti.template(), colony, goal, cell, among):
-    """Return the headings in the set `among` with the highest utility, and that; or 0 and -1."""
+    """Return the headings in `among` with the highest utility, and this utility; or 0 and -1."""
     headings, best = 0, ti.f64(-1.0)
     for h in ti.static(range(N_HEADINGS)):
         if neighbours[cell, h] >= 0 and (among >> h) & 1:
@@ -222,12 +222,12 @@ def live(
     utilities: f64_3d,
     deliveries: i32_2d,
 ):
-    """Advance all colonies from tick `first` to before `last`, see `utility.forage`.
+    """Advance all colonies through the ticks range(first, last), see `utility.forage`.
 
-    `goals` (2, n) are 1 in cells of a goal; each tick multiplies all utilities by `kept`. Takes one
-    draw per ant and tick from the streams `states`. Updates `ants` (colonies, ants, 3), which hold
-    cell, heading and the goal that the ant comes from; the number of ants `standing` in each cell;
-    and `utilities` (colonies, 2, n). Writes `deliveries` (colonies, ticks).
+    `goals` (2, n) are 1 in cells of a goal; each tick multiplies all utilities by `kept`. Draws one
+    random number per ant and tick from the random streams `states`. Updates `ants` (colonies, ants,
+    3), which hold cell, heading and the goal that the ant comes from; the number of ants `standing`
+    in each cell; and `utilities` (colonies, 2, n). Writes `deliveries` (colonies, ticks).
     """
     ti.loop_config(block_dim=1)
     for colony in range(states.shape[0]):

@@ -89,7 +89,8 @@ def forage(
         discount: The factor by which utility decreases per step, above 0 and below 1.
         evaporation: The share of all utilities that evaporates per tick.
         exploration: The probability of a random step if a neighbour has a utility above 0.
-        momentum: The probability, otherwise, of a step straight ahead if that is possible.
+        momentum: The probability of a step straight ahead, if possible, where no neighbour has a
+            utility above 0.
 
     Raises:
         AntsError: An argument is not allowed, or no food is reachable.

@@ -210,7 +210,7 @@ def make_page(
     results: Results | None,
     made: Mapping[str, Any],
 ) -> str:
-    """Return the page of the results in a folder; if `results` is None, read them from there."""
+    """Return the page of the results in a folder, which are read from it if `results` is None."""
     from taichi_ants import files
     from taichi_ants.analysis.colony.figures import draw_all
     from taichi_ants.analysis.colony.tables import Results

@@ -42,6 +42,7 @@ def sweep(settings: argparse.Namespace) -> None:
             where = {"threads": settings.threads, "arch": settings.arch}
             values = asked.measured(blocks, progress, **where)
         asked.write(values, ready, draws=not settings.no_figures)
+        asked.write_series(blocks, ready)
 
     work_or_show(settings, asked.facts(), work)
 

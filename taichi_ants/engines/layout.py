@@ -34,6 +34,7 @@ RETURNS, STEPS, DELIVERIES = range(len(OUTCOMES))
 TRACE = (
     *("episodes", "steps", "cells", "headings", "percepts", "states", "actions", "rewards"),
     *("next_percepts", "next_states", "terminated", "events"),
+    "executed",
 )
 
 

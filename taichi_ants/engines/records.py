@@ -77,6 +77,11 @@ class Snapshot(Record):
     world: World | None = None
 
     @property
+    def further_fields(self) -> dict[str, np.ndarray]:
+        """The levels of all pheromones except the trail, by name."""
+        return {name: levels for name, levels in self.fields.items() if name != "trail"}
+
+    @property
     def distances(self) -> np.ndarray:
         """Steps from each cell to the nearest queen, without obstacles, int32 (grid.size,)."""
         queens = self.grid.cells(np.flatnonzero(self.ground == QUEEN))

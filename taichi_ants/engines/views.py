@@ -11,15 +11,22 @@ from taichi_ants.engines.plugin_check import last_line
 from taichi_ants.errors import unusable
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.rules.vision import see_carrying, see_foraging, state_index
+from taichi_ants.task.rules.vision import see_by_level, see_carrying, see_foraging, state_index
 
 
 @cache
-def view_type(observation: Observation, dense: bool) -> Any:
-    """Return the struct type for `encode`: vectors over cells in view, levels f32 if dense."""
+def view_type(observation: Observation, dense: bool, reads_dense: tuple[bool, ...] = ()) -> Any:
+    """Return the struct type for `encode`: vectors over cells in view, levels f32 if dense.
+
+    `reads_dense` says so for each pheromone that the observation reads; by default, none is.
+    """
     n = len(observation.cells)
     level = ti.f32 if dense else ti.i32
     of_cells = ti.types.vector(n, ti.i32)
+    read: dict[str, Any] = {}
+    for i, name in enumerate(observation.reads):
+        kind = ti.f32 if reads_dense and reads_dense[i] else ti.i32
+        read |= {name: ti.types.vector(n, kind), f"own_{name}": kind}
     return ti.types.struct(
         carries=ti.i32,
         percept=ti.i32,
@@ -27,27 +34,33 @@ def view_type(observation: Observation, dense: bool) -> Any:
         levels=ti.types.vector(n, level),
         strongest=level,
         ants=of_cells,
+        strangers=of_cells,
         nearer=of_cells,
         own_level=level,
+        **read,
     )
 
 
 @ti.func
-def judge(half: ti.template(), view: ti.template(), observation: ti.template()):
-    """Complete a view: replace the ground in `codes` by the paper's codes, and set the percept."""
+def judge(
+    half: ti.template(), homing: ti.template(), view: ti.template(), observation: ti.template()
+):
+    """Complete a view: replace the ground in `codes` by the paper's codes, and set the percept.
+
+    `half` says whether the view of the outbound cue is "half"; `homing` is the view of the homing
+    cue, or "" for the compass.
+    """
     left, forward, right = ti.static(observation.ahead)
     for k in ti.static(range(len(observation.cells))):
         # Not a branch: Taichi cannot compile an unused one, if an observation reads no codes.
-        view.codes[k] = ti.select(
-            view.carries == 1,
-            see_carrying(view.codes[k], view.nearer[k]),
-            see_foraging(
-                half,
-                view.codes[k],
-                ti.select(view.codes[k] == EMPTY, view.levels[k], 0),
-                view.strongest,
-            ),
-        )
+        level = ti.select(view.codes[k] == EMPTY, view.levels[k], 0)
+        carrying = 0
+        if ti.static(homing == ""):
+            carrying = see_carrying(view.codes[k], view.nearer[k])
+        else:
+            carrying = see_by_level(homing == "half", view.codes[k] >> 2, level, view.strongest)
+        foraging = see_foraging(half, view.codes[k], level, view.strongest)
+        view.codes[k] = ti.select(view.carries == 1, carrying, foraging)
     view.percept = state_index(
         view.carries, view.codes[left], view.codes[forward], view.codes[right]
     )

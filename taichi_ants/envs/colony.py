@@ -43,6 +43,7 @@ class ColonyWorlds(Ants):
         capacity: int | None = None,
     ) -> None:
         task = checks.checked_task(Task() if task is None else task)
+        checks.check_given_actions(task)
         super().__init__(n_worlds, task, given, METADATA["render_modes"])
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
@@ -82,7 +83,7 @@ class ColonyWorlds(Ants):
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
         events = np.where(self.acted, colony.events, Event.NONE)
-        self.rewards = colony.task.rewards.by_event()[events].astype(np.float64)
+        self.rewards = np.where(self.acted, colony.rewards, 0).astype(np.float64)
         self.events = events.astype(np.int64)
 
     @property
@@ -177,7 +178,7 @@ class HexColonyVectorEnv(AntVectorEnv):
     ## Arguments
     - `num_envs`: The number of ants in all worlds together, a multiple of `ants`.
     - `world`: A registered name, the path of a map, a `World`, or a list of n of these with the
-      same ranges, of which world number w has number w modulo n.
+    same ranges, of which world number w is entry w modulo n.
     - `task`: The rules, without births and lifespan; by default, the paper's.
     - `ants`: The number of ants in each world.
     - `start`, `max_steps`, `observation_format`, `evaporation`: See `HexColonyParallelEnv`.

@@ -216,9 +216,10 @@ class HexColonyParallelEnv(ParallelEnv):
 
 
 def most_births(life: Life, foods: int, ticks: int) -> int:
-    """Return the largest number of births in `ticks`, by the queen's free neighbours and by food.
+    """Return an upper limit on the number of births in `ticks`.
 
-    Each food item becomes an ant, and can be taken again `life.regrowth` + 1 ticks later.
+    Each neighbour of the queen takes one ant per tick. Each food item becomes an ant,
+    and can be taken again `life.regrowth` + 1 ticks later.
     """
     if not life.births:
         return 0

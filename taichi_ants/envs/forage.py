@@ -26,8 +26,8 @@ METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "ansi"], "render_fps":
 _GROUNDS = {
     EMPTY: text_map.EMPTY,
     OBSTACLE: text_map.OBSTACLE,
-    FOOD: text_map.FOOD,
-    QUEEN: text_map.QUEEN,
+    FOOD: text_map.FOODS[0],
+    QUEEN: text_map.QUEENS[0],
 }
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
@@ -43,6 +43,7 @@ class LoneAnts(Ants):
     ) -> None:
         task = Task.from_dict(task) if isinstance(task, Mapping) else task  # a spec read from JSON
         task = checks.checked_runs_task(task)
+        checks.check_given_actions(task)
         super().__init__(n, task, given, METADATA["render_modes"])
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
@@ -235,7 +236,7 @@ class HexForageVectorEnv(AntVectorEnv):
     ## Arguments
     - `num_envs`: The number of environments; each takes 4 bytes for each cell of its world.
     - `world`: See `HexForageEnv`; or a list of n worlds with the same ranges, of which environment
-      i has number i modulo n.
+    i has entry i modulo n.
     - `autoreset_mode`: A `gymnasium.vector.AutoresetMode` or its name; by default, "NextStep".
     - `max_episode_steps`: The step limit of `gymnasium.make_vec`; the smaller limit counts.
     - All others: See `HexForageEnv`; `render` draws all worlds.

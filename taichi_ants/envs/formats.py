@@ -24,8 +24,8 @@ _MOST_NUMBERS = 1 << 25  # in the table of all states
 class Shown:
     """The observations of an environment, in one of the formats.
 
-    The parts of a state are the digits of its index, see `taichi_ants.task.Observation`: in
-    built-in observations, the load (1 with food) and a code for each cell in view.
+    The index of a state consists of several parts, see `shape` of `taichi_ants.task.Observation`:
+    in built-in observations, the load (1 with food) and a code for each cell in view.
 
     Attributes:
         space: The space of one ant. "cells": MultiDiscrete (k,), int64, the k parts of a state.

@@ -119,7 +119,8 @@ def from_minari(
     Args:
         dataset: The data set, or its name.
         world: The world of the ants, required unless `to_minari` wrote the data set.
-        task: The rules of the ants, likewise; by default, the paper's.
+        task: The rules of the ants if `to_minari` did not write the data set; by default, the
+            paper's.
     """
     minari = _minari()
     try:
@@ -168,7 +169,7 @@ def _reading(path: Path) -> Iterator[None]:
     except Exception as error:  # h5py and Minari raise many kinds
         text = " ".join(str(error).rstrip(".").split()) or type(error).__name__
         raise AntsError(
-            f"the data set in {str(path)!r} is damaged or not of these environments ({text}); "
+            f"the data set in {str(path)!r} is damaged, or not from these environments ({text}); "
             "write it again, or name another data set."
         ) from error
 

@@ -142,7 +142,7 @@ class Kind:
     def reading(
         self, path: files.PathLike, content: bytes | None = None
     ) -> Iterator[tuple[Arrays, dict[str, Any]]]:
-        """Yield the arrays and facts of a file; the block raises as that of `building` does."""
+        """Yield the arrays and facts of a file to a block, whose errors become an AntsError."""
         arrays = read(path, content, self.most, self.foreign)
         try:
             text = arrays.pop("facts").item()
@@ -168,7 +168,7 @@ class Kind:
 
     @contextmanager
     def building(self, path: files.PathLike) -> Iterator[None]:
-        """Yield once, and turn errors while an object is built from a file into an AntsError."""
+        """Yield to a block that builds an object from a file; its errors become an AntsError."""
         what = f"the {self.name} in {files.named(path)}"
         try:
             yield

@@ -87,7 +87,7 @@ class AxialGrid:
 
     @property
     def width(self) -> int:
-        """Number of cells in a row: the values of q, and a void cell at each end."""
+        """Number of cells in a row: one for each value of q, and a void cell at each end."""
         return self.ranges[0] + self.ranges[2] + 1
 
     @property
@@ -130,7 +130,7 @@ class AxialGrid:
         return inside.reshape(-1)
 
     def axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return q, int32 (1, width), and r, int32 (height, 1), of the array in two dimensions."""
+        """Return q of each column, int32 (1, width), and r of each row, int32 (height, 1)."""
         z = self.ranges[2]
         q = np.arange(-z, self.width - z, dtype=np.int32)
         r = np.arange(-z, self.height - z, dtype=np.int32)

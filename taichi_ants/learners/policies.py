@@ -16,7 +16,7 @@ import numpy.typing as npt
 from taichi_ants.errors import AntsError, check_one_of, expect, shown
 from taichi_ants.files import PathLike, to_json
 from taichi_ants.files.archives import Kind
-from taichi_ants.task import Task, observations
+from taichi_ants.task import Choice, Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
 
@@ -72,10 +72,21 @@ def random_policy(observation: str = "paper") -> ActionValues:
     return np.zeros((observations.get(observation).n_states, N_ACTIONS), np.float32)
 
 
-def action_probabilities(q_values: np.ndarray, epsilon: float = 0.0) -> np.ndarray:
-    """Return probabilities of epsilon-greedy actions, float64 (..., 5), exactly as in kernels."""
+def action_probabilities(
+    q_values: np.ndarray, epsilon: float = 0.0, choice: Choice | None = None
+) -> np.ndarray:
+    """Return the probabilities of actions, float64 (..., 5); by default of epsilon-greedy ones.
+
+    Epsilon-greedy probabilities are exactly as in kernels. Probabilities of the rule "softmax" can
+    differ from those in kernels by rounding.
+    """
     explores = np.floor(epsilon * 2.0**32) / 2.0**32
-    best = q_values >= q_values.max(axis=-1, keepdims=True)
+    largest = q_values.max(axis=-1, keepdims=True)
+    if choice is not None and choice.rule == "softmax":
+        weights = np.exp((q_values.astype(float) - largest) / choice.temperature)
+        shares = weights / weights.sum(axis=-1, keepdims=True)
+        return explores / N_ACTIONS + (1.0 - explores) * shares
+    best = q_values >= largest
     return explores / N_ACTIONS + best * ((1.0 - explores) / best.sum(axis=-1, keepdims=True))
 
 
@@ -146,6 +157,34 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
         if cells:
             return cells
     return [LEFT]
+
+
+# Policies without learning, by the names that studies accept.
+WITHOUT_LEARNING = {"trail_follower": trail_follower, "random": random_policy}
+
+
+def frozen_policy(name_or_path: str, observation: str = "paper") -> ActionValues:
+    """Return a policy without learning by its name, or the policy in a file (.npz).
+
+    Raises:
+        AntsError: There is no such policy for this observation, or the file cannot be used.
+    """
+    expect("policy", name_or_path, str)
+    if name_or_path in WITHOUT_LEARNING:
+        return WITHOUT_LEARNING[name_or_path](observation)
+    if not name_or_path.endswith(".npz"):
+        raise AntsError(
+            f"policy is {shown(name_or_path)}; it must be one of {', '.join(WITHOUT_LEARNING)}, or "
+            "the path of a policy file (.npz)."
+        )
+    policy = load_policy(name_or_path)
+    if policy.observation != observation:
+        raise AntsError(
+            f"policy is {shown(name_or_path)}, which is for the observation "
+            f"{policy.observation!r}, but task.observation is {observation!r}; set the observation "
+            "of the policy."
+        )
+    return policy.q_values
 
 
 def save_policy(

@@ -31,7 +31,7 @@ _LEARNERS: dict[str, Learner] = {}
 
 
 def register(learner: Learner) -> Learner:
-    """Return a learner after registering it, in place of your own learner of the same name.
+    """Return a learner after registering it; it replaces your own learner of the same name.
 
     Existing results, colonies and kernels do not change. The first use of a learner tries its
     functions. Raises AntsError if the name is not an identifier or belongs to a built-in learner,

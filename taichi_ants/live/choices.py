@@ -17,7 +17,7 @@ from taichi_ants import learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
-from taichi_ants.live.setup import MOST_ANTS, MOST_TEXT, Setup
+from taichi_ants.live.setup import MOST_ANTS, MOST_TEXT, Setup, check_cues
 from taichi_ants.settings import MISSING, Named, Setting, all_of, declared, flat, nested
 from taichi_ants.task import Task, observations
 
@@ -47,7 +47,7 @@ def fields() -> Iterator[dict[str, Any]]:
     "default". "only" (a path and its values), "world" and "learner" limit a field to these.
     """
     for one in all_of(Task):
-        if not one.is_group and one.kind is not Named:
+        if not one.is_group and one.kind is not Named and not one.is_text:
             yield _field(one)
     for one in declared(TrainingConfig)[1:]:
         yield {**_field(one), "default": _LEARNING.get(one.name, one.default), "learner": ""}
@@ -77,6 +77,10 @@ class Choices:
     """The choices that pages offer."""
 
     policies: Mapping[str, Policy]  # policies to follow, in addition to "by hand"
+
+    def __post_init__(self) -> None:
+        for policy in self.policies.values():
+            check_cues(policy.task)
 
     def as_dict(self) -> dict[str, Any]:
         """Return all choices, JSON-compatible."""
@@ -182,6 +186,11 @@ class Choices:
 def _settings(given: Any, world: str, learner: str) -> dict[str, Any]:
     """Return a page's settings by group; raise AntsError if the form lacks one of them."""
     expect("settings", given, dict)
+    # Tasks have defaults of settings that the form lacks.
+    lacking = {one.path: one.default for one in all_of(Task) if one.is_text}
+    given = {
+        path: one for path, one in given.items() if path not in lacking or one != lacking[path]
+    }
     offered = {
         one["path"]
         for one in fields()

@@ -59,7 +59,7 @@ SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
 
 
 class Undoing:
-    """The replay of a session without its last change; attributes are those of `Making`."""
+    """The replay of a session without its last change; it has the attributes of `Making`."""
 
     page = None
 

@@ -115,7 +115,7 @@ class Page:
             self.tell(frame)
 
     def has_seen(self, frames: int) -> bool:
-        """Return whether the page was behind and, with these frames, has drawn everything."""
+        """Return whether the page was behind and, after drawing `frames` more, no longer is."""
         self.unseen = max(0, self.unseen - frames)
         return self.behind and self.unseen == 0
 
@@ -129,8 +129,8 @@ class Room:
     """The server of a session that several pages can watch and change together.
 
     Pages offer `choices`. The server listens on `port`; 0 means any free port. Worker processes
-    that replay the session call `prepare` first, for example to load a plugin. AntsError if the
-    library `websockets` is not installed, or the port cannot be used.
+    that replay the session call `prepare` first, for example to load a plugin. Raises AntsError if
+    the library `websockets` is not installed, or the port cannot be used.
     """
 
     def __init__(

@@ -116,8 +116,8 @@ class _Snapshot(NamedTuple):
 class Session:
     """A colony with all interventions since its first tick.
 
-    A session depends only on its setup and its edits, so `load` can replay it. AntsError if the
-    world or the colony cannot be built.
+    A session depends only on its setup and its edits, so `load` can replay it. Raises AntsError if
+    the world or the colony cannot be built.
 
     Attributes:
         colony: The colony; only the session may advance it.
@@ -180,7 +180,7 @@ class Session:
         return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
 
     def leap(self, n: int) -> bytes:
-        """Return a frame of changes after n more steps, possibly through several episodes.
+        """Return a frame of all changes after running n more steps, which may span episodes.
 
         The frame does not have the actions of ants.
         """
@@ -214,8 +214,8 @@ class Session:
         """Return a frame of changes after applying and recording an edit, see `edits`.
 
         An edit that affects only an ended episode is lost when the next one begins. An edit that
-        `goes_on` belongs to the same change as the previous edit, see `undone`. AntsError if the
-        edit is not valid or not possible; nothing has changed.
+        `goes_on` belongs to the same change as the previous edit, see `undone`. Raises AntsError if
+        the edit is not valid or not possible; nothing has changed.
         """
         self._do(edit, goes_on)
         return self._recorder.snapshot()
@@ -277,8 +277,8 @@ class Session:
     def load(cls, path: files.PathLike, progress: Callable[[float], None] | None = None) -> Session:
         """Return the replay of a session that `save` wrote.
 
-        Calls `progress` from time to time with the completed share of the steps. AntsError if the
-        file is missing, damaged or altered, or if the replay ends in another state.
+        Calls `progress` from time to time with the completed share of the steps. Raises AntsError
+        if the file is missing, damaged or altered, or if the replay ends in another state.
         """
         log = Log.read(path)
         for session in cls.replay(log):
@@ -290,8 +290,8 @@ class Session:
     def replay(cls, log: Log) -> Iterator[Session]:
         """Yield the session of a log while it is replayed, at least a few times per second.
 
-        The last session is the whole replay. AntsError if the log is damaged, or if the replay ends
-        in another state.
+        The last session is the whole replay. Raises AntsError if the log is damaged, or if the
+        replay does not end in the state that the log contains.
         """
         with KIND.building(log.name):
             session = cls(log.setup)
@@ -320,7 +320,7 @@ class Session:
     def undone(self) -> Iterator[Session]:
         """Return an iterator like `replay` that ends before the last change; it uses a snapshot.
 
-        This session does not change. AntsError if it has no changes.
+        This session does not change. Raises AntsError if it has no changes.
         """
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")

@@ -17,6 +17,7 @@ from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, ROW
+from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.worlds import text_map
 from taichi_ants.worlds.double_bridge import bridge_ranges
 from taichi_ants.worlds.validation import parse_ranges
@@ -29,11 +30,23 @@ MOST_TEXT = 50_000  # characters of a map
 _MOST_NUMBERS = 1 << 27  # elements of independent tables
 
 
+def check_cues(task: Task) -> None:
+    """Raise AntsError if a task has pheromones that the live page cannot show."""
+    if task.fields or (task.outbound_cue, task.homing_cue) != (TRAIL, COMPASS):
+        names = ", ".join(task.fields) or "no"
+        raise AntsError(
+            f"the task has {names} further fields, and its cues are {task.outbound_cue} and "
+            f"{task.homing_cue}; the live page has only the trail and the compass, so draw a "
+            "Colony instead."
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Setup:
     """The initial conditions of a session.
 
-    AntsError if a value is not allowed; `Session` raises it if the world or colony cannot be built.
+    Raises AntsError if a value is not allowed. If the world or colony cannot be built, `Session`
+    raises it.
     """
 
     world: str  # the name of a registered world, or the text of a map
@@ -51,6 +64,7 @@ class Setup:
     def __post_init__(self) -> None:
         expect("world", self.world, str)
         expect("task", self.task, Task)
+        check_cues(self.task)
         if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "independent"))
             learners.get(self.policy.learner)
@@ -131,7 +145,7 @@ class Setup:
     def from_json(cls, facts: object, table: np.ndarray | None = None) -> Setup:
         """Return the setup of `to_json`; `table` are action values if the policy is "table".
 
-        Missing values have their defaults. AntsError if a value is not allowed.
+        Missing values have their defaults. Raises AntsError if a value is not allowed.
         """
         expect("a setup", facts, Mapping)
         assert isinstance(facts, Mapping)

@@ -1,19 +1,22 @@
-"""Measures: numbers of a snapshot of a colony, by name."""
+"""Measures: registered functions of the state of a colony, and their series over time.
 
-from __future__ import annotations
+`Colony.run(..., measures=("deliveries", "entropy"), every=100)` reads measures. `register` adds
+your own. docs/measures.md lists the built-in ones.
+"""
 
-from collections.abc import Callable
-from typing import Any
+from taichi_ants.measures.ants import share_in
+from taichi_ants.measures.measure import Measure
+from taichi_ants.measures.paths import shortest_path
+from taichi_ants.measures.registry import BUILT_IN, get, names, register
+from taichi_ants.measures.series import Series
 
-from taichi_ants.errors import check_one_of
-
-_MEASURES: dict[str, Callable[[Any], float]] = {
-    "deliveries": lambda snapshot: float(snapshot.counts["deliveries"]),
-    "living": lambda snapshot: float(len(snapshot.ant_cells)),
-}
-
-
-def get(name: str) -> Callable[[Any], float]:
-    """Return the measure of a name, a function of a `Snapshot`; AntsError if there is none."""
-    check_one_of("measure", name, tuple(_MEASURES))
-    return _MEASURES[name]
+__all__ = [
+    "BUILT_IN",
+    "Measure",
+    "Series",
+    "get",
+    "names",
+    "register",
+    "share_in",
+    "shortest_path",
+]

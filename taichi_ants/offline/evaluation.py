@@ -35,9 +35,10 @@ class PolicyValues(Record):
         low, high: The ends of its bootstrap interval over episodes (percentiles); nan without
             resamples. It covers the choice of episodes, not the error of the method.
         effective_sample_size: (sum of weights)^2 / sum of squared weights, over whole episodes
-            (Kong, A note on importance sampling using standardized weights, 1992). As many episodes
-            of the target policy would be as informative. nan without weights. If it is 0, ignore
-            the value, because the target policy cannot produce any whole episode of the data.
+            (Kong, A note on importance sampling using standardized weights, 1992). It is the number
+            of episodes of the target policy itself that would be equally informative. nan without
+            weights. If it is 0, ignore the value, because the target policy cannot produce any
+            whole episode of the data.
     """
 
     value: np.ndarray

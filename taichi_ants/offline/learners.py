@@ -140,7 +140,10 @@ class EmpiricalModel:
 
     @classmethod
     def resampled(cls, data: Dataset, times: np.ndarray) -> EmpiricalModel:
-        """Return the model of resamples, a group each; `times` (resamples, episodes) are counts."""
+        """Return the model of resamples, a group each.
+
+        `times` (resamples, episodes) is how often each resample has each episode.
+        """
         n_states = data.task.n_states
         pair = data.state.astype(np.int64) * N_ACTIONS + data.action
         pairs, successors, _, _, triple = _tally(data, pair)
@@ -226,7 +229,10 @@ def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def tolerance(largest: float, discount: float, initial_q: float) -> float:
-    """Return the change of action values at which Q iteration ends, far above rounding errors."""
+    """Return the tolerance of Q iteration, far above rounding errors.
+
+    The iteration ends when no action value changes by more.
+    """
     return 1e-12 * max(1.0, largest / (1.0 - discount), abs(initial_q))
 
 

@@ -64,6 +64,7 @@ def record(
     facts: dict[str, Any]
     if isinstance(behaviour, TrainingConfig):
         configs = checks.checked_configs(behaviour)
+        checks.check_choices(configs, task)
         state = RunState.fresh(configs, numbers, task.n_states).part([0])
         runs = Runs.learning(configs, numbers, state)
         facts = {"policy": "learner", **configs[0].as_dict()}
@@ -109,9 +110,11 @@ def record_colony(
         AntsError: An argument is not allowed, or the colony has different worlds.
     """
     expect("colony", colony, Colony)
+    checks.check_one_nest(colony, "record_colony")
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
     checks.check_progress(progress)
+    checks.check_table(colony.task)
     if len(dict.fromkeys(colony.worlds)) > 1:
         raise AntsError("the worlds of the colony differ; record a separate colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}
@@ -150,13 +153,13 @@ def _tick(colony: Colony, tables: np.ndarray, before: np.ndarray) -> dict[str, n
         order = np.argsort(keys)
         slot = order[np.searchsorted(keys[order], run * 2**32 + agent)] % colony.capacity
     event, action = colony.events[run, slot], colony.actions[run, slot]
-    chances = action_probabilities(values, colony.epsilon)[np.arange(len(run)), action]
+    chances = action_probabilities(values, colony.epsilon, colony.task.choice)
     return {
         **{"run": run, "agent": agent, "step": np.full(len(run), step)},
         **{"state": state, "action": action, "reward": colony.task.rewards.by_event()[event]},
         "next_state": colony.states[run, slot],
         "terminated": (event == Event.DELIVERED) & (colony.task.delivery == "terminates"),
-        "behaviour_probability": chances,
+        "behaviour_probability": chances[np.arange(len(run)), action],
     }
 
 

@@ -6,18 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, neighbour
-from taichi_ants.reference.observations import is_better
-from taichi_ants.reference.random_stream import RandomStream, hash_of, pick
+from taichi_ants.reference.observations import is_better, nestmate
+from taichi_ants.reference.random_stream import hash_of, pick
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task.constants import (
     EMPTY,
     GIVE,
-    N_ACTIONS,
     PICK_UP,
     SEES_EMPTY,
     SEES_GOAL,
@@ -38,19 +35,6 @@ PAID = {
     Event.BLOCKED: "failed",
     Event.FAILED: "failed",
 }
-
-
-def choose_action(values: Sequence[np.float32], epsilon: float, stream: RandomStream) -> int:
-    """Return an action: any with probability epsilon, else one with the largest of these 5 values.
-
-    It makes one draw: the high word decides whether to explore, the low word chooses the action.
-    """
-    high, low = stream.draw()
-    if high < int(epsilon * 4294967296.0):
-        return pick(low, N_ACTIONS)
-    best_value = max(values)
-    best = [action for action in range(N_ACTIONS) if values[action] == best_value]
-    return best[pick(low, len(best))]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +82,7 @@ def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent
         return Intent(ant, action, heading, neighbour(ant.cell, heading))
     heading = (ant.heading + action - 1) % N_HEADINGS
     target = neighbour(ant.cell, heading)
-    if traffic.shared and target in world.ants:
+    if traffic.shared and nestmate(world, ant, target):
         return Intent(ant, action, heading, target, lured=is_better(world, ant, target))
     if codes[action] not in (SEES_EMPTY, SEES_LURE):
         return Intent(ant, action, heading)
@@ -165,16 +149,17 @@ def settle(
 
 
 def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Task) -> None:
-    """Let all ants act at once; each remembers its action, its event and its reward.
+    """Let all ants act at once, and record in each its action, its event and its reward.
 
-    All intents are from the start of the tick, so no ant's action changes that of another ant. No
-    two ants enter a cell, empty it, or deposit on it.
+    All intents are from the start of the tick, so no ant's action changes that of another ant. At
+    most one ant enters a given cell, at most one takes its food, and at most one deposits on it.
     """
     winning = winners(intents, tick, world.index, task.traffic.carriers_first)
     entered, pushed = settle(intents, winning, task.traffic)
     for intent in intents:
         ant, slot = intent.ant, intent.ant.slot
-        ant.action = intent.action
+        start, had_food = ant.cell, ant.carries
+        ant.executed = intent.action
         if intent.action < PICK_UP:
             # Ants turn even if the way is blocked, so that they get out of dead ends.
             ant.heading = intent.heading
@@ -184,9 +169,39 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
             event = _move(world, intent, entered.get(slot))
         else:
             event = _handle(world, intent, slot in winning, task)
-        ant.event, ant.reward = event, getattr(task.rewards, PAID[event])
-        ant.carried += ant.carries
+        paid = getattr(task.rewards, PAID[event])
+        if world.foods and event in (Event.PICKED_UP, Event.DELIVERED):
+            paid = getattr(world.foods[ant.kind], PAID[event])
+        ant.event, ant.reward = event, paid
+        for name, trail in world.fields.items():
+            for cell in _marked(task.fields[name].laid, intent, start, had_food):
+                trail.deposit(cell, ant.carried)
+        ant.carried += 1
     world.ants = {intent.ant.cell: intent.ant for intent in intents}
+
+
+def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell]:
+    """Return the cells on which an ant deposits in a field, after its action.
+
+    `start` and `had_food` are its cell and its load before the action.
+    """
+    ant = intent.ant
+    if laid == "dead_end":
+        return [start] if not had_food and ant.percept == 0b01_01_01 else []
+    if laid == "failed_pick_up":
+        fails = intent.action == PICK_UP and ant.event is Event.FAILED
+        return [start] if fails and not had_food else []
+    if laid != "always" and laid != ("with_food" if had_food else "without_food"):
+        # A pick-up counts as an occasion with food, and a delivery as one without.
+        changes = {"with_food": Event.PICKED_UP, "without_food": Event.DELIVERED}
+        if ant.event is not changes.get(laid):
+            return []
+    if ant.event is Event.PICKED_UP and laid != "without_food":
+        assert intent.target is not None
+        return [intent.target, start]
+    if ant.event is Event.DELIVERED and laid != "with_food":
+        return [start]
+    return [ant.cell] if ant.cell != start else []
 
 
 def _move(world: WorldState, intent: Intent, destination: Cell | None) -> Event:
@@ -208,10 +223,13 @@ def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
             ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.DELIVERED
     if intent.action == PICK_UP and wins and intent.target is not None:
-        world.ground[intent.target] = EMPTY
+        ant.kind = world.kinds[intent.target]
+        world.loads[intent.target] -= 1
+        if world.loads[intent.target] == 0:
+            world.ground[intent.target] = EMPTY
         world.trail.deposit(intent.target, 0)
         world.trail.deposit(ant.cell, 0)
-        ant.carries = True
+        ant.carries, ant.carried = True, 0
         ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.PICKED_UP
     return Event.FAILED

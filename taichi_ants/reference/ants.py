@@ -9,7 +9,13 @@ import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
-from taichi_ants.reference.geometry import Cell, distance, existing_cells, listed_cells
+from taichi_ants.reference.geometry import (
+    Cell,
+    distance,
+    existing_cells,
+    listed_cells,
+    queens_of,
+)
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.task.events import Event
 
@@ -27,10 +33,14 @@ class Ant:
         slot: The ant's place in the colony, 0 .. slots - 1; free again after its death.
         number: 0 .. n - 1 for the initial ants; n, n + 1, ... for ants born in the episode.
         age: Ticks since the ant was born, if there is a lifespan.
-        carried: Ticks since the ant picked up its food.
+        carried: Ticks since the ant's last pick-up or delivery, its birth, or the start.
+        nest: The number of its nest.
+        kind: The kind of the last food that it picked up.
         percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
+        misread: The codes of cells in view that the ant misreads, by turns from its heading.
         action, event, reward: The last ones; -1, NONE and 0 before the first tick.
+        executed: The last action as executed, which differs from `action` if that slipped.
         chosen: The action already drawn for the next tick, if any.
     """
 
@@ -44,10 +54,14 @@ class Ant:
     carried: int = 0
     percept: int = 0
     state: int = 0
+    misread: dict[int, int] = field(default_factory=dict)
     action: int = -1
+    executed: int = -1
     event: Event = Event.NONE
     reward: int = 0
     chosen: int | None = None
+    nest: int = 0
+    kind: int = 0
 
 
 @dataclass(kw_only=True, slots=True)
@@ -57,6 +71,7 @@ class Transition:
     Attributes:
         episode, step: The episode in the run and the tick in the episode, from 0.
         cell, heading, state: Values before the tick.
+        action, executed: The action that the ant chose, and the one that it executed.
         next_state, next_action: Values after the tick; the action is None if none was drawn.
         terminated: Whether the ant delivered into a terminal state: the update does not bootstrap.
         truncated: Whether this is the ant's last update of the episode without `terminated`: the
@@ -78,7 +93,9 @@ class Transition:
     next_action: int | None
     terminated: bool
     truncated: bool
+    nest: int = 0
     td_error: np.float32 | None = None
+    executed: int = -1
 
     @property
     def pair(self) -> Pair:
@@ -89,26 +106,38 @@ def starts(world: World, seed: int, n: int = 1, where: str = "nest") -> list[tup
     """Return the start cell and heading of n ants; AntsError if the world has too few free cells.
 
     The ants listed by the world are first. The seed decides the headings of the others, and the
-    order in which they take free cells: those nearest to the queen first if `where` is "nest",
-    cells anywhere if it is "spread".
+    order in which they take free cells: those nearest to their queen first if `where` is "nest",
+    cells anywhere if it is "spread". Ants take cells in turn, by number.
     """
     listed = [((x, y, z), heading) for x, y, z, heading in world.ants.tolist()]
     if n <= len(listed):
         return listed[:n]
-    taken = {world.queen, *listed_cells(world.foods), *listed_cells(world.obstacles)}
+    queens = queens_of(world)
+    taken = {*queens, *listed_cells(world.foods), *listed_cells(world.obstacles)}
     taken |= {cell for cell, _ in listed}
-    order = start_order(world, world.queen, seed, where)
-    free = [cell for cell in order if cell not in taken]
+    orders = [iter(start_order(world, queen, seed, where)) for queen in queens]
     missing = n - len(listed)
-    if missing > len(free):
+    n_free = len(set(existing_cells(world.ranges)) - taken)
+    if missing > n_free:
         raise AntsError(
-            f"n is {n}; the world lists {len(listed)} ants and has {len(free)} free cells; "
+            f"n is {n}; the world lists {len(listed)} ants and has {n_free} free cells; "
             "choose fewer ants or a larger world."
         )
-    return listed + [
-        (cell, pick(stream_state(seed, STREAM_START_HEADING, ant) >> 32, N_HEADINGS))
-        for ant, cell in enumerate(free[:missing], start=len(listed))
-    ]
+    for number in range(len(listed), n):
+        cell = next(cell for cell in orders[nest_of(world, number)] if cell not in taken)
+        taken.add(cell)
+        heading = pick(stream_state(seed, STREAM_START_HEADING, number) >> 32, N_HEADINGS)
+        listed.append((cell, heading))
+    return listed
+
+
+def nest_of(world: World, number: int) -> int:
+    """Return the nest of an ant that starts: for a listed ant the nearest queen's, else in turn."""
+    queens = queens_of(world)
+    if number >= len(world.ants):
+        return number % len(queens)
+    x, y, z, _ = world.ants[number].tolist()
+    return min(range(len(queens)), key=lambda nest: distance((x, y, z), queens[nest]))
 
 
 def start_order(world: World, queen: Cell, seed: int, where: str) -> list[Cell]:

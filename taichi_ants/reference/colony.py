@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import copy
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -18,17 +19,23 @@ from taichi_ants.grid.constants import (
     STREAM_ROLLOUT,
 )
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.reference.actions import carry_out, choose_action, intend
-from taichi_ants.reference.ants import Ant, Transition, starts
+from taichi_ants.reference.actions import carry_out, intend
+from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
+from taichi_ants.reference.choice import (
+    choose_action,
+    choose_cell,
+    misread_codes,
+    slipped,
+)
 from taichi_ants.reference.food_sources import FoodSources
-from taichi_ants.reference.geometry import Cell, neighbour
+from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS
-from taichi_ants.reference.observations import OBSERVATIONS, observe
+from taichi_ants.reference.observations import OBSERVATIONS, TURNS, codes_in_view, observe
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.reference.sharing import SHARING
+from taichi_ants.reference.sharing import SHARING, ByNest
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, FOOD, PICK_UP
+from taichi_ants.task.constants import EMPTY, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
@@ -47,6 +54,7 @@ class EpisodeRecord:
     births: int = 0
     deaths: int = 0
     regrown: int = 0
+    apart: Counter[tuple[int, int]] = field(default_factory=Counter)  # by nest and kind of food
 
 
 class ReferenceColony:
@@ -59,10 +67,11 @@ class ReferenceColony:
         world: The present state of the world; each episode starts from `start_world`.
         n_ants: The number of ants at the start of an episode.
         pheromone: The task's pheromone, without evaporation where the task switches it off.
+        fields: The task's further pheromones by name, likewise.
         ants: The living ants by slot, 0 to `slots` - 1.
         streams: The random streams of the initial ants, which continue through all episodes.
         next_number: The number of the next ant that is added.
-        store: Food items that the queen will turn into ants.
+        stores: Food items that each queen will turn into ants.
         queen_stream: The queen's random stream, which continues; wandering food also uses it.
         minds: The tables; see `sharing`.
         epsilon, learning_rate: Values in the present episode, float64.
@@ -81,7 +90,7 @@ class ReferenceColony:
         self,
         world: World,
         task: Task | None,
-        training: TrainingConfig,
+        training: TrainingConfig | None,
         seed: int,
         ants: int = 1,
         capacity: int | None = None,
@@ -91,6 +100,8 @@ class ReferenceColony:
         q_values: np.ndarray | None = None,
     ) -> None:
         self.task = task = task or Task()
+        if training is None:  # ants choose without action values
+            training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
         check_one_of("sharing", sharing, tuple(SHARING))
         check_one_of("learner", training.learner, tuple(LEARNERS))
         check_one_of("observation", task.observation, tuple(OBSERVATIONS))
@@ -98,6 +109,7 @@ class ReferenceColony:
             task.evaporation_in_evaluation if sharing == "frozen" else task.evaporation_in_training
         )
         self.pheromone = task.pheromone if falls else task.pheromone.lasting
+        self.fields = {n: one if falls else one.lasting for n, one in task.fields.items()}
         self._row = OBSERVATIONS[task.observation]
         self.start_world, self._training = world, training
         self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
@@ -106,7 +118,13 @@ class ReferenceColony:
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         make = partial(LEARNERS[training.learner], training, task.n_states)
-        self.minds = SHARING[sharing](make, self.slots, q_values)
+        nests = len(queens_of(world)) if sharing != "independent" else 1
+        tables = [None] * nests if q_values is None else [q_values] * nests
+        if nests > 1 and q_values is not None and q_values.ndim == 3:
+            tables = list(q_values)
+        several = [SHARING[sharing](make, self.slots, table) for table in tables]
+        self.minds = several[0] if nests == 1 else ByNest(several)
+        self._foods = list(task.foods.values())
         self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
         self.episode = -1
         self.records: list[EpisodeRecord] = []
@@ -114,9 +132,12 @@ class ReferenceColony:
 
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
-        self.world = WorldState(self.start_world, self.pheromone)
+        self.world = WorldState(
+            *(self.start_world, self.pheromone, self.fields),
+            *(self.task.outbound_cue, self.task.homing_cue, self._foods),
+        )
         self.food_sources = FoodSources(self.start_world)
-        self.store = 0
+        self.stores = [0] * len(self.world.queens)
         self.next_number = self.n_ants
         self.record = EpisodeRecord()
         self.over = False
@@ -124,7 +145,8 @@ class ReferenceColony:
         self.ants: dict[int, Ant] = {}
         begin = starts(self.start_world, self.seed, self.n_ants, self.start)
         for number, (cell, heading) in enumerate(begin):
-            self.add(Ant(cell, heading, slot=number, number=number, stream=self.streams[number]))
+            nest, stream = nest_of(self.start_world, number), self.streams[number]
+            self.add(Ant(cell, heading, slot=number, number=number, stream=stream, nest=nest))
         for ant in self.ants.values():
             self.observe(ant)
 
@@ -137,11 +159,15 @@ class ReferenceColony:
     def q_values(self) -> np.ndarray:
         """A copy of the table, float32 (n_states, 5), or of all tables, (slots, n_states, 5)."""
         tables = np.array([learner.table() for learner in self.minds.tables])
-        return tables if self.sharing == "independent" else tables[0]
+        return tables if self.sharing == "independent" or len(tables) > 1 else tables[0]
 
     def observe(self, ant: Ant) -> None:
-        """Update the percept and the state index of an ant."""
-        ant.percept = observe(self.world, ant)
+        """Update the percept and the state index of an ant, which may misread cells in view."""
+        ant.percept, ant.misread = observe(self.world, ant), {}
+        if self.task.noise.misread > 0 and self.episode >= 0:  # not before the first episode
+            turns = TURNS[self.task.observation]
+            codes = codes_in_view(self.world, ant, turns)
+            ant.misread = misread_codes(codes, turns, self.task.noise.misread, ant.stream)
         ant.state = self._row(self.world, ant)
 
     def begin_episode(self, world: World | None = None) -> None:
@@ -185,27 +211,32 @@ class ReferenceColony:
         traffic = self.task.traffic
         intents = []
         for ant in acting:
-            action = self._draw_action(ant) if ant.chosen is None else ant.chosen
+            ant.action = self._draw_action(ant) if ant.chosen is None else ant.chosen
             ant.chosen = None
+            action = slipped(ant.action, self.task.noise.slip, ant.stream)
             intents.append(intend(self.world, ant, action, traffic))
         carry_out(self.world, intents, tick, self.task)
         for intent in intents:
-            if intent.ant.event is Event.PICKED_UP and intent.target is not None:
-                self.food_sources.taken(intent.target, tick)
-        self.world.trail.tick()
-        delivered = self._count(acting)
+            picked = intent.target if intent.ant.event is Event.PICKED_UP else None
+            if picked is not None and self.world.ground[picked] == EMPTY:  # its last load
+                self.food_sources.taken(picked, tick)
+        for trail in (self.world.trail, *self.world.fields.values()):
+            trail.tick()
+        self._count(acting)
         self.record.carried += sum(
             was.carried
             for was, ant in zip(before, acting, strict=True)
             if ant.event is Event.DELIVERED
         )
         if self.task.life.births:
-            self.store += delivered
-            self._births()
+            for ant in acting:
+                self.stores[ant.nest] += ant.event is Event.DELIVERED
+            for nest in range(len(self.stores)):
+                self._births(nest)
         dying = self._deaths(acting)
         life = self.task.life
-        if life.regrowth is not None:
-            self.record.regrown += self.food_sources.regrow(self.world, life.regrowth, tick)
+        delays = [food.regrowth for food in self._foods] or [life.regrowth]
+        self.record.regrown += self.food_sources.regrow(self.world, delays, tick)
         if life.wander is not None and (tick + 1) % life.wander == 0:
             self.food_sources.wander(self.world, self.queen_stream)
         for ant in [*self.ants.values(), *dying]:
@@ -215,42 +246,49 @@ class ReferenceColony:
         self.record.ticks += 1
 
     def _draw_action(self, ant: Ant) -> int:
-        values = self.minds.of(ant.slot).rows[ant.state]
-        return choose_action(values, self.epsilon, ant.stream)
+        choice = self.task.choice
+        if choice.rule == "deneubourg":
+            return choose_cell(self.world, ant, choice, self.task.traffic)
+        values = self.minds.of(ant).rows[ant.state]
+        return choose_action(values, self.epsilon, ant.stream, choice)
 
-    def _count(self, acting: Sequence[Ant]) -> int:
-        """Record what happened in the tick, and return the number of deliveries."""
+    def _count(self, acting: Sequence[Ant]) -> None:
+        """Record what happened in the tick."""
         record, delivered = self.record, sum(ant.event is Event.DELIVERED for ant in acting)
         record.episode_return += sum(ant.reward for ant in acting)
-        record.moves += sum(ant.action < PICK_UP for ant in acting)
+        record.moves += sum(ant.executed < PICK_UP for ant in acting)
         record.blocked += sum(
-            ant.action < PICK_UP and ant.event in (Event.BLOCKED, Event.PUSHED) for ant in acting
+            ant.executed < PICK_UP and ant.event in (Event.BLOCKED, Event.PUSHED) for ant in acting
         )
         record.deliveries += delivered
+        for ant in acting:
+            if ant.event is Event.DELIVERED:
+                record.apart[ant.nest, ant.kind] += 1
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
-        return delivered
 
-    def _births(self) -> None:
-        """Turn stored food into ants that face away from the queen, while there is room."""
+    def _births(self, nest: int) -> None:
+        """Turn stored food into ants that face away from their queen, while there is room."""
+        queen = self.world.queens[nest]
         free_slots = (slot for slot in range(self.slots) if slot not in self.ants)
-        while self.store > 0:
-            around = [neighbour(self.world.queen, heading) for heading in range(N_HEADINGS)]
+        while self.stores[nest] > 0:
+            around = [neighbour(queen, heading) for heading in range(N_HEADINGS)]
             free = [h for h in range(N_HEADINGS) if self.world.content(around[h]) == EMPTY]
             slot = next(free_slots, None)
             if slot is None or not free:
                 return
             high, _ = self.queen_stream.draw()
             heading = free[pick(high, len(free))]
-            self.new_ant(around[heading], heading, slot)
-            self.store -= 1
+            self.new_ant(around[heading], heading, slot, nest)
+            self.stores[nest] -= 1
             self.record.births += 1
 
-    def new_ant(self, cell: Cell, heading: int, slot: int) -> None:
+    def new_ant(self, cell: Cell, heading: int, slot: int, nest: int = 0) -> None:
         """Add a new ant to a slot and a cell."""
         number = self.next_number
         state = stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number)
-        self.add(Ant(cell, heading, slot=slot, number=number, stream=RandomStream(state)))
+        stream = RandomStream(state)
+        self.add(Ant(cell, heading, slot=slot, number=number, stream=stream, nest=nest))
         self.minds.born(slot)
         self.next_number += 1
 
@@ -268,7 +306,7 @@ class ReferenceColony:
         for ant in dying:
             del self.world.ants[ant.cell]
             if ant.carries:
-                self.world.ground[ant.cell] = FOOD
+                self.world.put_food(ant.cell, ant.kind, 1)
             del self.ants[ant.slot]
         self.record.deaths += len(dying)
         return dying
@@ -291,12 +329,14 @@ class ReferenceColony:
                     heading=was.heading,
                     state=was.state,
                     action=ant.action,
+                    executed=ant.executed,
                     reward=ant.reward,
                     event=ant.event,
                     next_state=ant.state,
                     next_action=ant.chosen,
                     terminated=terminated,
                     truncated=(last or ant.slot not in self.ants) and not terminated,
+                    nest=ant.nest,
                 )
             )
         self.minds.learn(self.transitions, [ant.stream for ant in after], self.epsilon)

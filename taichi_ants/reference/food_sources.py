@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.reference.geometry import Cell, listed_cells, neighbour
 from taichi_ants.reference.random_stream import RandomStream, pick
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.task.constants import EMPTY, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
@@ -20,6 +21,7 @@ class FoodSource:
     """A food source and its present cell."""
 
     cell: Cell
+    kind: int = 0
     waiting_since: int | None = None  # the tick in which its food was taken; None if it has food
 
 
@@ -31,7 +33,9 @@ class FoodSources:
     """
 
     def __init__(self, world: World) -> None:
-        self.food_sources = [FoodSource(cell) for cell in sorted(listed_cells(world.foods))]
+        cells = listed_cells(world.foods)
+        kinds = dict(zip(cells, world.food_kinds.tolist() or [0] * len(cells), strict=True))
+        self.food_sources = [FoodSource(cell, kinds[cell]) for cell in sorted(cells)]
         self._piles = _connected(self.food_sources)
 
     def give(self, cell: Cell) -> None:
@@ -62,25 +66,29 @@ class FoodSources:
         self._piles = [pile for pile in piles if pile]
 
     def taken(self, cell: Cell, tick: int) -> None:
-        """Note that food was taken from a cell; its full food source waits from now on."""
+        """Note that food was taken from a cell; its food source waits from this tick on."""
         for source in self.food_sources:
             if source.cell == cell and source.waiting_since is None:
                 source.waiting_since = tick
 
-    def regrow(self, world: WorldState, delay: int, tick: int) -> int:
-        """Let food grow back on empty cells of food sources that have waited `delay` ticks.
+    def regrow(self, world: WorldState, delays: Sequence[int | None], tick: int) -> int:
+        """Let food grow back on empty cells of food sources that have waited long enough.
+
+        `delays` are ticks, by kind of food; None means that the kind does not grow back.
 
         Returns:
-            The number of food items that grew back.
+            The number of loads that grew back.
         """
         regrown = 0
         for source in self.food_sources:
-            since = source.waiting_since
+            since, delay = source.waiting_since, delays[source.kind]
+            if delay is None:
+                continue
             if since is None or tick < since + delay or world.content(source.cell) != EMPTY:
                 continue
-            world.ground[source.cell] = FOOD
+            world.put_food(source.cell, source.kind, world.full(source.kind))
             source.waiting_since = None
-            regrown += 1
+            regrown += world.full(source.kind)
         return regrown
 
     def wander(self, world: WorldState, stream: RandomStream) -> None:
@@ -100,7 +108,7 @@ class FoodSources:
                         source.cell = ahead
                 elif world.content(ahead) == EMPTY:
                     world.ground[source.cell] = EMPTY
-                    world.ground[ahead] = FOOD
+                    world.put_food(ahead, source.kind, 1)
                     source.cell = ahead
 
 

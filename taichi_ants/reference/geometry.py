@@ -6,9 +6,14 @@ the smallest coordinate is 0. The keys of dictionaries are normal forms, too.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
+
+if TYPE_CHECKING:
+    from taichi_ants.worlds.world import World
 
 Cell = tuple[int, int, int]
 
@@ -44,3 +49,8 @@ def existing_cells(ranges: tuple[int, int, int]) -> list[Cell]:
 def listed_cells(rows: np.ndarray) -> list[Cell]:
     """Return cells that a world lists, int (n, 3) with each row in normal form, as tuples."""
     return [(x, y, z) for x, y, z in rows.tolist()]
+
+
+def queens_of(world: World) -> list[Cell]:
+    """Return the cells of the queens of a world, by nest."""
+    return [world.queen, *listed_cells(world.other_queens)]

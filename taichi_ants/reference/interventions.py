@@ -36,6 +36,8 @@ class Interventions:
         self._first = colony.start_world
         self._pheromone = colony.task.pheromone
         self._falls = colony.pheromone.evaporation == self._pheromone.evaporation
+        for name, one in colony.fields.items():
+            self._falls = self._falls and one == colony.task.fields[name]
         world = colony.start_world
         # The content of the cells that are not empty when later episodes start.
         self._start: dict[Cell, int] = {world.queen: QUEEN}
@@ -64,6 +66,7 @@ class Interventions:
                 continue
             world.ground[cell] = self._start[cell] = what
             if what == FOOD:
+                world.put_food(cell, 0, 1)
                 self.colony.food_sources.give(cell)
             else:
                 self.colony.food_sources.end(cell)
@@ -109,15 +112,20 @@ class Interventions:
         self._observe()
 
     def _new_trail(self) -> None:
-        """Make a new trail with the same levels, for the present rocks and pheromone."""
+        """Make new trails with the same levels, for the present rocks and pheromones."""
         world = self.colony.world
         rocks = [cell for cell, held in world.ground.items() if held == OBSTACLE]
         bare = World(self._first.ranges, world.queen, obstacles=rocks)
-        trail = Trail(bare, world.pheromone)
-        for cell, held in world.ground.items():
+        world.trail = self._copy(world.trail, Trail(bare, world.pheromone))
+        for name, one in self.colony.fields.items():
+            world.fields[name] = self._copy(world.fields[name], Trail(bare, one))
+
+    def _copy(self, old: Trail, new: Trail) -> Trail:
+        """Return a new trail after setting it to the levels of an old one."""
+        for cell, held in self.colony.world.ground.items():
             if held != OBSTACLE:
-                trail.lay(cell, world.trail.level(cell))
-        world.trail = trail
+                new.lay(cell, old.level(cell))
+        return new
 
     def lay_trail(self, cells: Sequence[Cell], level: int) -> None:
         """Set the trail of cells other than rocks."""
@@ -183,8 +191,10 @@ class Interventions:
         colony = self.colony
         self.ants = n
         by_number = sorted(colony.ants.values(), key=lambda ant: ant.number)
-        self.remove_ants([ant.cell for ant in by_number[n:]])
-        self.add_some(max(0, n - len(by_number)))
+        if n < len(by_number):
+            self.remove_ants([ant.cell for ant in by_number[n:]])
+        elif n > len(by_number):
+            self.add_some(n - len(by_number))
 
     def set_evaporation(self, falls: bool) -> None:
         """Switch evaporation on (that of the task, or 1 per tick if it has none) or off."""
@@ -194,11 +204,15 @@ class Interventions:
         self.set_pheromone()
 
     def set_pheromone(self, **numbers: Any) -> None:
-        """Change numbers of the pheromone; it stays dense, or not dense."""
+        """Change numbers of the pheromone, but not whether it is dense."""
         self._pheromone = replace(self._pheromone, **numbers)
         still: dict[str, Any] = {} if self._falls else {"evaporation": "none", "half_life": None}
         now = replace(self._pheromone, **still)
         self.colony.pheromone = self.colony.world.pheromone = now
+        self.colony.fields = {
+            name: one if self._falls else one.lasting
+            for name, one in self.colony.task.fields.items()
+        }
         self._new_trail()
 
     def set_epsilon(self, epsilon: float) -> None:

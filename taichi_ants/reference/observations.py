@@ -19,6 +19,8 @@ from taichi_ants.task.constants import (
 )
 
 AHEAD = (-1, 0, 1)  # headings relative to the ant's: left, forward, right
+# From back left to back right; the sixth cell is the one behind.
+FIVE, SIX = (-2, -1, 0, 1, 2), (-2, -1, 0, 1, 2, 3)
 ANOTHER_ANT = 4  # in addition to the paper's four codes
 # Codes of ants: other load on a better cell, other load elsewhere, same load on a better cell.
 BETTER, OTHER, IN_QUEUE = 4, 5, 6
@@ -31,41 +33,54 @@ def cells_in_view(ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[Cell]:
 
 
 def strongest_in_view(world: WorldState, ant: Ant) -> Level:
-    """Return the largest trail level among the cells ahead that count, 0 if none does."""
+    """Return the largest level of the ant's cue in the cells ahead that count, 0 if none does."""
+    trail = world.cue(ant)
     counting = [cell for cell in cells_in_view(ant) if world.content(cell) == EMPTY]
-    if world.pheromone.view == "strongest_under_carriers":
+    if trail.rule.view == "strongest_under_carriers":
         others = [world.ants.get(cell) for cell in cells_in_view(ant)]
         counting += [other.cell for other in others if other is not None and other.carries]
-    return max((world.trail.level(cell) for cell in counting), default=0)
+    return max((trail.level(cell) for cell in counting), default=0)
+
+
+def nestmate(world: WorldState, ant: Ant, cell: Cell) -> Ant | None:
+    """Return the ant on a cell if it is of the same nest; ants of other nests are obstacles."""
+    other = world.ants.get(cell)
+    return other if other is not None and other.nest == ant.nest else None
 
 
 def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
     """Return whether a cell is better for an ant than its own.
 
-    A better cell is nearer to the queen for a carrier, and has a stronger trail for a forager.
+    A better cell is nearer to the queen for a carrier with a compass, and has a higher level of the
+    ant's cue for other ants.
     """
-    if ant.carries:
-        return distance(cell, world.queen) < distance(ant.cell, world.queen)
-    return bool(world.trail.level(cell) > world.trail.level(ant.cell))
+    if world.has_compass(ant):
+        queen = world.queens[ant.nest]
+        return distance(cell, queen) < distance(ant.cell, queen)
+    trail = world.cue(ant)
+    return bool(trail.level(cell) > trail.level(ant.cell))
 
 
 def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
     """Return the code of each cell: SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
-    strongest = 0 if ant.carries else strongest_in_view(world, ant)
+    strongest = 0 if world.has_compass(ant) else strongest_in_view(world, ant)
     return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
 
 
 def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
     content = world.content(cell)
+    if content == QUEEN and cell != world.queens[ant.nest]:
+        return SEES_OBSTACLE
     if content == (QUEEN if ant.carries else FOOD):
         return SEES_GOAL
     if content != EMPTY:  # also the queen for foragers, and food for carriers
         return SEES_OBSTACLE
-    if ant.carries:
+    if world.has_compass(ant):
         lures = is_better(world, ant, cell)
     else:
-        level = world.trail.level(cell)
-        enough = 2 * level if world.pheromone.view == "half" else level
+        trail = world.cue(ant)
+        level = trail.level(cell)
+        enough = 2 * level if trail.rule.view == "half" else level
         lures = bool(level >= 1 and enough >= strongest)
     return SEES_LURE if lures else SEES_EMPTY
 
@@ -76,30 +91,40 @@ def observe(world: WorldState, ant: Ant) -> int:
     return 64 * ant.carries + 16 * left + 4 * forward + right
 
 
-def paper(world: WorldState, ant: Ant) -> int:
-    """Return the percept."""
-    return ant.percept
+def codes_seen(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
+    """Return the code of each cell as the ant sees it, which may be misread."""
+    codes = codes_in_view(world, ant, turns)
+    return [ant.misread.get(turn, code) for turn, code in zip(turns, codes, strict=True)]
+
+
+def ants_in_view(world: WorldState, ant: Ant) -> list[Ant | None]:
+    """Return the nestmate that the ant sees on each cell ahead, but not on cells it misreads."""
+    return [
+        None if turn in ant.misread else nestmate(world, ant, cell)
+        for turn, cell in zip(AHEAD, cells_in_view(ant), strict=True)
+    ]
 
 
 def more_cells(turns: tuple[int, ...], world: WorldState, ant: Ant) -> int:
     """Return the state index of the load and the paper's codes of the cells at these turns."""
-    return _number([ant.carries, *codes_in_view(world, ant, turns)], 4)
+    return _number([ant.carries, *codes_seen(world, ant, turns)], 4)
 
 
 def ants_seen(world: WorldState, ant: Ant) -> int:
     """Return the state index of the load and the cells ahead; other ants have their own code."""
     codes = [
-        ANOTHER_ANT if cell in world.ants else code
-        for cell, code in zip(cells_in_view(ant), codes_in_view(world, ant), strict=True)
+        code if there is None else ANOTHER_ANT
+        for there, code in zip(ants_in_view(world, ant), codes_seen(world, ant), strict=True)
     ]
     return _number([ant.carries, *codes], 5)
 
 
 def trail_levels(world: WorldState, ant: Ant) -> int:
-    """Return the state index of load and cells ahead; trails count in thirds of the strongest."""
+    """Return the state index of load and cells ahead; trails have three codes, by strength."""
     strongest = strongest_in_view(world, ant)
     codes = []
-    for code, cell in zip(codes_in_view(world, ant), cells_in_view(ant), strict=True):
+    views = zip(AHEAD, codes_seen(world, ant), cells_in_view(ant), strict=True)
+    for turn, code, cell in views:
         if code == SEES_GOAL:
             codes.append(GOAL)
         elif code == SEES_OBSTACLE:
@@ -107,8 +132,9 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
         elif ant.carries:
             codes.append(STRONG if code == SEES_LURE else NOTHING)
         else:
-            # Ants do not see trails under food or the queen.
-            level = world.trail.level(cell) if world.content(cell) == EMPTY else 0
+            # Ants do not see trails under food or the queen, or on cells that they misread.
+            sees = turn not in ant.misread and world.content(cell) == EMPTY
+            level = world.cue(ant).level(cell) if sees else 0
             codes.append(_share(level, strongest))
     return _number([ant.carries, *codes], 6)
 
@@ -118,12 +144,11 @@ def crowd(queue: bool, world: WorldState, ant: Ant) -> int:
 
     If `queue`, ants with the same load on a better cell have a code, too.
     """
-    codes = codes_in_view(world, ant)
-    for side, cell in enumerate(cells_in_view(ant)):
-        there = world.ants.get(cell)
+    codes = codes_seen(world, ant)
+    for side, there in enumerate(ants_in_view(world, ant)):
         if there is None:
             continue
-        better = is_better(world, ant, cell)
+        better = is_better(world, ant, there.cell)
         if there.carries != ant.carries:
             codes[side] = BETTER if better else OTHER
         elif queue and better:
@@ -148,12 +173,13 @@ def _number(digits: list[int], base: int) -> int:
 
 
 OBSERVATIONS: dict[str, Callable[[WorldState, Ant], int]] = {
-    "paper": paper,
-    # From back left to back right, in `six_cells` then back.
-    "five_cells": partial(more_cells, (-2, -1, 0, 1, 2)),
-    "six_cells": partial(more_cells, (-2, -1, 0, 1, 2, 3)),
+    "paper": partial(more_cells, AHEAD),
+    "five_cells": partial(more_cells, FIVE),
+    "six_cells": partial(more_cells, SIX),
     "trail_levels": trail_levels,
     "ants_seen": ants_seen,
     "ants": partial(crowd, False),
     "queues": partial(crowd, True),
 }
+# The cells in view, in the order in which ants may misread them.
+TURNS = {**dict.fromkeys(OBSERVATIONS, AHEAD), "five_cells": FIVE, "six_cells": SIX}

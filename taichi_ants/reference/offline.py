@@ -47,7 +47,10 @@ def q_iteration(
     penalty: float = 0.0,
     lowest: float = -np.inf,
 ) -> np.ndarray:
-    """Return float64 values (n_states, 5) of a policy, or the best ones, in the data's model."""
+    """Return action values, float64 (n_states, 5), in the model that the data imply.
+
+    The values are those of `policy` or, without one, the optimal ones.
+    """
     led_to: defaultdict[tuple[int, int], Counter[int]] = defaultdict(Counter)
     rewards: Counter[tuple[int, int]] = Counter()
     counts: Counter[tuple[int, int]] = Counter()

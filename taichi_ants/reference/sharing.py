@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import update_weights
-from taichi_ants.reference.ants import Pair, Transition
+from taichi_ants.reference.ants import Ant, Pair, Transition
 from taichi_ants.reference.learners import DynaQ, Learner
 from taichi_ants.reference.random_stream import RandomStream
 
@@ -31,8 +31,8 @@ class FrozenTable:
     def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
         self.tables = [make(q_values)]
 
-    def of(self, slot: int) -> Learner:
-        """Return the learner of the ant in a slot."""
+    def of(self, ant: Ant) -> Learner:
+        """Return the learner of an ant."""
         return self.tables[0]
 
     def born(self, slot: int) -> None:
@@ -123,8 +123,8 @@ class IndependentTables(FrozenTable):
         self._make = make
         self.draws_next_action = self.tables[0].draws_next_action
 
-    def of(self, slot: int) -> Learner:
-        return self.tables[slot]
+    def of(self, ant: Ant) -> Learner:
+        return self.tables[ant.slot]
 
     def born(self, slot: int) -> None:
         learning_rate = self.tables[slot].learning_rate
@@ -136,6 +136,29 @@ class IndependentTables(FrozenTable):
     ) -> None:
         for step, stream in zip(steps, streams, strict=True):
             step.td_error = self.tables[step.slot].learn(step, epsilon, stream)
+
+
+class ByNest(FrozenTable):
+    """A shared or frozen table for each nest, for worlds with several."""
+
+    def __init__(self, nests: Sequence[FrozenTable]) -> None:
+        self._nests = nests
+        self.tables = [table for nest in nests for table in nest.tables]
+        self.draws_next_action = nests[0].draws_next_action
+
+    def of(self, ant: Ant) -> Learner:
+        return self.tables[ant.nest]
+
+    def pace(self, learning_rate: float) -> None:
+        for nest in self._nests:
+            nest.pace(learning_rate)
+
+    def learn(
+        self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
+    ) -> None:
+        for nest, minds in enumerate(self._nests):
+            ours = [i for i, step in enumerate(steps) if step.nest == nest]
+            minds.learn([steps[i] for i in ours], [streams[i] for i in ours], epsilon)
 
 
 SHARING = {"shared": SharedTable, "independent": IndependentTables, "frozen": FrozenTable}

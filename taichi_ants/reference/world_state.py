@@ -2,37 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
-from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, neighbour
+from taichi_ants.reference.geometry import (
+    Cell,
+    existing_cells,
+    listed_cells,
+    neighbour,
+    queens_of,
+)
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
-    from taichi_ants.task import Pheromone
+    from collections.abc import Sequence
+
+    from taichi_ants.task import Field, Food, Pheromone
     from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
 
 
 class Trail:
-    """The trail of each cell.
+    """The level of a pheromone in each cell, by default that of the trail of the world.
 
     With linear or no evaporation, levels are integers. With exponential evaporation or diffusion,
     they are float32, and every operation rounds.
     """
 
-    def __init__(self, world: World, pheromone: Pheromone) -> None:
-        self._pheromone = pheromone
+    def __init__(self, world: World, pheromone: Pheromone, is_empty: bool = False) -> None:
+        self.rule = pheromone
         rocks = set(listed_cells(world.obstacles))
         self._cells = [cell for cell in existing_cells(world.ranges) if cell not in rocks]
         self._place = {cell: place for place, cell in enumerate(self._cells)}
         kind = np.float32 if pheromone.dense else np.int64
         self._levels: np.ndarray = np.zeros(len(self._cells), kind)
-        for x, y, z, level in world.trails.tolist():
+        for x, y, z, level in [] if is_empty else world.trails.tolist():
             self._levels[self._place[x, y, z]] = level
         if pheromone.diffusion > 0:
             # Rocks and the outside are walls, which all have the index behind the last cell.
@@ -54,8 +63,8 @@ class Trail:
         self._levels[self._place[cell]] = level
 
     def deposit(self, cell: Cell, carried: int) -> None:
-        """Deposit the pheromone of an ant that has carried its food for `carried` ticks."""
-        place, rule = self._place[cell], self._pheromone
+        """Deposit the pheromone of an ant that has had its load for `carried` ticks."""
+        place, rule = self._place[cell], self.rule
         if rule.deposit == "set":
             self._levels[place] = rule.level
         elif rule.deposit == "add":
@@ -67,16 +76,16 @@ class Trail:
 
     def tick(self) -> None:
         """Let trails evaporate, then spread, for one tick."""
-        if self._pheromone.evaporation == "linear":
+        if self.rule.evaporation == "linear":
             self._levels = np.maximum(self._levels - 1, 0)
-        elif self._pheromone.evaporation == "exponential":
-            self._levels = self._levels * self._pheromone.decay
+        elif self.rule.evaporation == "exponential":
+            self._levels = self._levels * self.rule.decay
             self._levels[self._levels < 1] = 0
-        if self._pheromone.diffusion > 0:
+        if self.rule.diffusion > 0:
             self._diffuse()
 
     def _diffuse(self) -> None:
-        shares = self._levels * self._pheromone.share
+        shares = self._levels * self.rule.share
         given = shares * self._n_open  # nothing diffuses into walls
         shares_and_wall = np.append(shares, np.float32(0))
         got = np.zeros_like(shares)
@@ -90,19 +99,64 @@ class WorldState:
     """The state of a world in an episode.
 
     `ground` maps each cell to EMPTY, OBSTACLE, FOOD or QUEEN; it is EMPTY under ants. `ants` maps
-    cells to ants.
+    cells to ants. `fields` are further pheromones by name, `outbound` and `homing` the names of the
+    cues.
     """
 
-    def __init__(self, world: World, pheromone: Pheromone) -> None:
-        self._ranges = world.ranges
-        self.queen: Cell = world.queen
+    def __init__(
+        self,
+        world: World,
+        pheromone: Pheromone,
+        fields: Mapping[str, Field] | None = None,
+        outbound: str = "trail",
+        homing: str = "compass",
+        foods: Sequence[Food] = (),
+    ) -> None:
+        self._ranges, self.foods = world.ranges, foods
+        self.queens: list[Cell] = queens_of(world)
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
-        self.ground[self.queen] = QUEEN
+        self.ground.update(dict.fromkeys(self.queens, QUEEN))
         self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
+        # The kind of the food in a cell, and its loads.
+        self.kinds = dict.fromkeys(listed_cells(world.foods), 0)
+        self.kinds.update(zip(self.kinds, world.food_kinds.tolist(), strict=False))
+        self.loads = {cell: self.full(kind) for cell, kind in self.kinds.items()}
         self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
         self.ants: dict[Cell, Ant] = {}
         self.pheromone = pheromone
         self.trail = Trail(world, pheromone)
+        self.fields = {name: Trail(world, one, True) for name, one in (fields or {}).items()}
+        self.outbound, self.homing = outbound, homing
+
+    def has_compass(self, ant: Ant) -> bool:
+        """Return whether an ant with this load looks for cells nearer to the queen."""
+        return ant.carries and self.homing == "compass"
+
+    def cue(self, ant: Ant) -> Trail:
+        """Return the pheromone that an ant follows; with a compass, that of ants without food."""
+        uses_homing = ant.carries and self.homing != "compass"
+        return self.pheromone_named(self.homing if uses_homing else self.outbound)
+
+    def pheromone_named(self, name: str) -> Trail:
+        """Return the trail, or a further field."""
+        return self.trail if name == "trail" else self.fields[name]
+
+    @property
+    def queen(self) -> Cell:
+        """The queen of the first nest."""
+        return self.queens[0]
+
+    @queen.setter
+    def queen(self, cell: Cell) -> None:
+        self.queens[0] = cell
+
+    def full(self, kind: int) -> int:
+        """Return the number of loads in a full cell of a kind of food."""
+        return self.foods[kind].loads if self.foods else 1
+
+    def put_food(self, cell: Cell, kind: int, loads: int) -> None:
+        """Put food on a cell."""
+        self.ground[cell], self.kinds[cell], self.loads[cell] = FOOD, kind, loads
 
     def content(self, cell: Cell) -> int:
         """Return the content of a cell: its ground, or OBSTACLE for an ant or the outside."""

@@ -1,5 +1,6 @@
 """Pictures and animations of worlds and their ants: PNG, GIF and MP4, without a display.
 
+- `picture` draws a world at its start.
 - `frames` draws the snapshots of `Episode.snapshots` or `colony_snapshots` as arrays; `Scene`
   draws a single snapshot.
 - `learning_frames` shows an ant at several stages of training, side by side.
@@ -16,7 +17,7 @@ from taichi_ants.rendering.learning import (
 )
 from taichi_ants.rendering.scene import Scene, Status
 from taichi_ants.rendering.sheet import policy_sheet
-from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames
+from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames, picture
 from taichi_ants.rendering.writers import (
     PAUSE,
     check_animation,
@@ -39,6 +40,7 @@ __all__ = [
     "frames",
     "learning_checkpoints",
     "learning_frames",
+    "picture",
     "policy_sheet",
     "save_animation",
     "save_picture",

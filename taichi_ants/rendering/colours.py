@@ -46,6 +46,18 @@ TRAIL_RAMP = np.rint([_red, _green, _blue]).astype(np.uint32).T @ np.array(
 TRAIL_RAMP.setflags(write=False)
 
 
+# The darkest colours of further fields, which repeat.
+_FIELDS = (0xCC79A7, 0xC9A227, 0x8C6BB1, 0xA65628)
+
+
+def field_ramp(number: int) -> np.ndarray:
+    """Return the colours of further field `number`, from 0, from weak to strong, uint32 (256,)."""
+    ends = channels(np.array([CELL_EMPTY, _FIELDS[number % len(_FIELDS)]])).astype(float)
+    parts = np.linspace(0.25, 1.0, 256)[:, None]
+    mixed = np.rint(ends[0] * (1 - parts) + ends[1] * parts).astype(np.uint32)
+    return mixed @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+
+
 class Mark(IntEnum):
     """The shapes of marks; `raster_kernels` defines their outlines."""
 

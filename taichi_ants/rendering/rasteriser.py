@@ -94,7 +94,7 @@ def ants(
     radius: float | None = None,
     opacity: float = 1.0,
 ) -> np.ndarray:
-    """Return marks of ants (n,) with `radius`; None means one for cells of the radius `hexagon`."""
+    """Return marks (n,) of ants. The default of `radius` suits cells of the radius `hexagon`."""
     if hexagon < _DOTS_BELOW:
         colour = np.where(carries, _DOT_WITH_FOOD, colours.ANT)
         return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)
@@ -106,7 +106,7 @@ def ants(
 
 
 def kernels() -> ModuleType:
-    """Return the kernels; starts Taichi first, which must be configured before their import."""
+    """Return the kernels after starting Taichi, which must run before they are imported."""
     runtime.start()
     from taichi_ants.rendering import raster_kernels
 
@@ -196,7 +196,7 @@ class Rasteriser:
         return frame
 
     def draw_cells(self, of_cells: np.ndarray) -> np.ndarray:
-        """Return a picture of cells in the given colours, uint32 (grid.size,); caches the last."""
+        """Return a picture of cells in these colours, uint32 (grid.size,); cache the picture."""
         if self._drawn is None or not np.array_equal(self._drawn[0], of_cells):
             self._drawn = of_cells.copy(), self._cells(of_cells)
         return self._drawn[1].copy()
@@ -226,10 +226,16 @@ class Rasteriser:
         of_ground[FOOD] = colours.FLOOR_FOOD
         of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
         of_cells = of_ground[snapshot.ground & 15]
-        marked = np.flatnonzero((snapshot.ground == EMPTY) & (snapshot.trail >= 1))
-        levels = snapshot.trail[marked].astype(np.float32)
-        share = np.minimum(levels / np.float32(self._strongest), 1)
-        of_cells[marked] = colours.TRAIL_RAMP[(share * 255 + 0.5).astype(np.int32)]
+        ramps = [(colours.TRAIL_RAMP, snapshot.trail)]
+        ramps += [
+            (colours.field_ramp(number), levels)
+            for number, levels in enumerate(snapshot.further_fields.values())
+        ]
+        for ramp, of_field in reversed(ramps):  # the trail covers further fields
+            marked = np.flatnonzero((snapshot.ground == EMPTY) & (of_field >= 1))
+            levels = of_field[marked].astype(np.float32)
+            share = np.minimum(levels / np.float32(self._strongest), 1)
+            of_cells[marked] = ramp[(share * 255 + 0.5).astype(np.int32)]
         of_cells[~self.grid.exists] = colours.PAGE
         return of_cells
 

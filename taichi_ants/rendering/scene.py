@@ -12,7 +12,7 @@ from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, s
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks
+from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
 from taichi_ants.task import Observation, observations
 from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.states import REACHABLE_STATES, TASK_NAMES
@@ -128,6 +128,7 @@ class Scene:
             text.write(self._background, title, room, margin + letters, letters, room=column)
             top = margin + round(_TITLE_HEIGHT * letters) * bool(title)
             self._status_place = room, top, column, letters
+            self._legend_top = bottom
             hexagon = self._rasteriser.hexagon
             draw_legend(self._background, room, bottom, column, letters, hexagon, strongest)
 
@@ -149,7 +150,20 @@ class Scene:
         frame[:, : world.shape[1]] = world
         if self._has_panel and status is not None:
             _draw_status(frame, status, *self._status_place)
+        if self._has_panel:
+            self._draw_field_legend(frame, snapshot)
         return frame
+
+    def _draw_field_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
+        """Draw an entry for each further field above the legend."""
+        left, _, _, size = self._status_place
+        for number, name in enumerate(snapshot.further_fields):
+            y = self._legend_top - (len(snapshot.further_fields) - number) * round(1.55 * size)
+            centre = left + 0.85 * size, y + 0.75 * size
+            colour = int(colours.field_ramp(number)[-1])
+            draw_marks(frame, marks(centre, 0.82 * size, colours.Mark.HEXAGON, colour))
+            baseline = round(y + 1.11 * size)
+            text.write(frame, f"field {name}", left + round(2.1 * size), baseline, size)
 
     def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
         """Draw the world, with outlines and letters on the cells that ant number 0 sees."""

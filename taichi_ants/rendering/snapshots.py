@@ -34,6 +34,15 @@ def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
     return Snapshot(world.grid, world.ground(), world.trail_levels(), cells, headings, nothing)
 
 
+def picture(world: World, size: tuple[int, int] = DEFAULT_SIZE) -> np.ndarray:
+    """Return a picture of a world and its listed ants, uint8 (height, width, 3)."""
+    expect("world", world, World)
+    cells, headings = world.grid.index(world.ants[:, :3]), world.ants[:, 3].astype(np.int32)
+    nothing = np.zeros(len(cells), dtype=bool)
+    start = Snapshot(world.grid, world.ground(), world.trail_levels(), cells, headings, nothing)
+    return Scene(world.grid, size).draw(start)
+
+
 def frames(
     snapshots: Iterable[CaptionedSnapshot], size: tuple[int, int] = DEFAULT_SIZE, **look: Any
 ) -> Iterator[np.ndarray]:
@@ -180,6 +189,8 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
     # All lines together do not fit into the panel.
     lines = [lines[0], lines[3], ("ant", str(follow))]
     slot, table = int(slots[order[0]]), colony.q_values[0]
+    if not colony.one_a_slot and colony.n_nests > 1:
+        table = table[colony.nests[0, slot]]
     state = int(colony.states[0, slot])
     q_values = (table[slot] if colony.one_a_slot else table)[state]
     return snapshot, _status_of(colony.task.sees, state, q_values, None, table, lines)

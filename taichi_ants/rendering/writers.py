@@ -140,7 +140,7 @@ def save_picture(path: files.PathLike, frame: np.ndarray) -> None:
     """
     target = check_picture(path)
     _check_frame(frame)
-    write(target, _png(frame, optimize=True))
+    write(target, png(frame, optimize=True))
 
 
 def write(target: Path, content: bytes) -> None:
@@ -154,7 +154,7 @@ def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
     with files.writing(folder), files.unfinished(folder) as whole:
         whole.mkdir()
         for number, frame in enumerate(frames):
-            (whole / f"frame_{number:06d}.png").write_bytes(_png(frame))
+            (whole / f"frame_{number:06d}.png").write_bytes(png(frame))
         if folder.exists():
             folder.rmdir()  # `check_animation` has checked that it is empty
         os.replace(whole, folder)
@@ -199,7 +199,8 @@ def _check_frame(frame: np.ndarray, sides: tuple[int, int] = _SIDES[""]) -> None
         )
 
 
-def _png(frame: np.ndarray, optimize: bool = False) -> bytes:
+def png(frame: np.ndarray, optimize: bool = False) -> bytes:
+    """Return a picture, uint8 (height, width, 3), as the bytes of a PNG file."""
     from PIL import Image
 
     buffer = io.BytesIO()

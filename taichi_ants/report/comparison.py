@@ -65,8 +65,9 @@ def what_is_seen(
 ) -> Callable[[], Seen]:
     """Return a function that waits for the figures, recordings and policy sheet of the page.
 
-    It skips examples whose policies are not in the folder. Policies are followed in this process,
-    which has compiled the kernel; `play` and `draw` begin the other calls (`WorkerProcess.begin`).
+    Examples whose policies are not in the folder are skipped. This process follows the policies,
+    because it has compiled the kernel. `play` and `draw` start the work of making recordings and
+    figures, for example in a worker process (`WorkerProcess.begin`).
     """
     first: dict[int, tuple[int, int, Path]] = {}
     for row, run in examples(comparison):

@@ -259,7 +259,7 @@ def make_page(
     found: tuple[Results, Seen] | None,
     made: Mapping[str, Any],
 ) -> str:
-    """Return the page of the results in a folder; if `found` is None, read them from there."""
+    """Return the page of the results in a folder, which are read from it if `found` is None."""
     if found is None:
         comparison = comparison_of(settings, study, archives.read(folder / RUNS))
         baselines = [Baseline(**row) for row in files.read_csv(folder / BASELINES)]

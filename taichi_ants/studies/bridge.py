@@ -89,9 +89,9 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
 
     An ant crosses when it enters one room and was in the other before; its branch is the last one
     that it was in. Only foragers that enter the food room and carriers that enter the queen's room
-    count. Rock closes the short branch until tick `opens`; if above 0, there must be one world. The
-    colony has the schedule "by_world", in which ants keep their slots; `bridge` has the arguments
-    of `double_bridge`.
+    count. Rock closes the short branch until tick `opens`, which must be 0 if there are several
+    worlds. The colony has the schedule "by_world", in which ants keep their slots; `bridge` has the
+    arguments of `double_bridge`.
 
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.

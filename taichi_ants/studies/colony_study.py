@@ -70,9 +70,9 @@ def plan(
 ) -> Plan:
     """Return the conditions of some kinds of world, which are names in `WORLDS`.
 
-    `sizes` are ascending; ants that act in another kind of world than they train in have the last.
-    Epsilon decays to `EVALUATION_EPSILON` and the learning rate to a tenth in the first 70 % of the
-    training episodes.
+    `sizes` are ascending. Ants that train in one kind of world and act in another have the last
+    size. Epsilon decays to `EVALUATION_EPSILON` and the learning rate to a tenth in the first 70 %
+    of the training episodes.
 
     Raises:
         AntsError: A kind of world is unknown, or ants cannot share a table with the learner.

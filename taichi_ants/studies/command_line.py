@@ -51,7 +51,8 @@ class _OneOrList(argparse.Action):
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence on standard error.
 
-    `about` is a module's docstring, whose first line is the description, or None (`python -OO`).
+    The description is the first line of `about`, a module's docstring. `python -OO` removes
+    docstrings, so `about` can be None.
     """
 
     open_settings: tuple[str, ...] = ()  # for example "world": accept any option --world.SETTING
@@ -195,7 +196,7 @@ def given_world(settings: argparse.Namespace) -> World:
 
 
 def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
-    """Run a command line to its exit; report errors and interruptions in one sentence."""
+    """Run a command, report an error or interruption in one sentence, and exit Python."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     status = 0
@@ -215,7 +216,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
 
 def load_plugin(path: str | None) -> None:
-    """Run a Python file that registers learners, observations or worlds, unless it is None.
+    """Run a Python file that registers learners, observations or worlds; do nothing for None.
 
     Raises:
         AntsError: The file cannot be read, raises or exits.

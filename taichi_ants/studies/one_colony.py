@@ -48,7 +48,7 @@ class Span(NamedTuple):
 
 
 def spans(totals: Sequence[Totals]) -> list[Span]:
-    """Return the spans between successive totals; `blocked` is a share of the moves."""
+    """Return a span for each two successive totals; its `blocked` is the share of blocked moves."""
     found = []
     for one, next_ in pairwise(totals):
         ticks, deliveries, moves, blocked = (b - a for a, b in zip(one, next_, strict=True))
@@ -188,7 +188,7 @@ def _pieces(
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:
     """Return a summary of two lines for a run of `ticks` ticks that took `seconds`."""
-    outcome = {name: int(array.sum()) for name, array in vars(colony.outcome()).items()}
+    outcome = {name: int(array.sum()) for name, array in colony.outcome().counts().items()}
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
     changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
     changes += [f"{outcome['regrown']} regrown"] if outcome["regrown"] else []

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
@@ -19,7 +19,9 @@ import numpy as np
 
 from taichi_ants import __version__, checks, files, learners
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
+from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.measures.series import Recorder, stops
 from taichi_ants.protocol import Event, When, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.studies import blocks
@@ -29,7 +31,7 @@ from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACT
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony
+    from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
 
 # Added to the seeds of a colony for its evaluation, so that it shares no random numbers with the
 # training.
@@ -42,6 +44,9 @@ _RUN_ARRAYS = ("returns", "steps", "deliveries")
 _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 
 DURING = ("evaluation", "training", "both")
+SERIES = "series_"  # begins the names of the series of measures in outcomes
+# Settings that only the points that use them name, so that the blocks of others stay valid.
+_LATER = ("policy", "measures", "measure_every")
 
 Progress = Callable[[float], None]
 
@@ -130,12 +135,28 @@ class RunPoint:
 
 
 @dataclass(frozen=True)
+class FixedPolicy:
+    """A policy that ants follow without learning: its name or file, and its action values."""
+
+    name: str
+    sha256: str
+    q_values: np.ndarray = field(compare=False, repr=False)
+
+    @classmethod
+    def named(cls, name_or_path: str, task: Task) -> FixedPolicy:
+        """Return the policy of a name or file (.npz); raises as `policies.frozen_policy` does."""
+        q_values = policies.frozen_policy(name_or_path, task.observation)
+        return cls(name_or_path, hashlib.sha256(q_values.tobytes()).hexdigest(), q_values)
+
+
+@dataclass(frozen=True)
 class ColonyPoint:
     """A colony that learns, and is then evaluated without learning, with its lowest epsilon.
 
     Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
     integer (seeds, rollouts), as in `ColonyEpisodes`; `q_values`, float32 (seeds, n_states, 5), if
-    ants learned into a shared table.
+    ants learned into a shared table. `series_NAME`, float64 (seeds, rollouts, rows), of each
+    measure NAME.
 
     Attributes:
         world: The world, or one for each seed, all of the same ranges.
@@ -143,9 +164,13 @@ class ColonyPoint:
             means training in `world`.
         sharing: "shared" or "independent" tables during training.
         start, capacity: The arguments of `Colony`.
-        episodes: The number of training episodes; with 0, ants follow the table of `after`.
+        episodes: The number of training episodes; with 0, ants follow `policy` or the table of
+            `after`.
         ticks: The length of each episode of training and evaluation.
         after: The point from whose shared table learning starts; None means the initial values.
+        policy: The policy that ants follow if there is no training.
+        measures, measure_every: The arguments `measures` and `every` of `Colony.run` for the
+            evaluation, without `Measure` objects.
         protocol: Events with interventions, see `taichi_ants.protocol`.
         during: When they happen: in each episode of the "evaluation", the "training", or "both".
 
@@ -165,6 +190,9 @@ class ColonyPoint:
     ticks: int = 1000
     rollouts: int = 4
     after: ColonyPoint | None = None
+    policy: FixedPolicy | None = None
+    measures: tuple[str, ...] = ()
+    measure_every: int | None = None
     protocol: tuple[Event, ...] = ()
     during: str = "evaluation"
 
@@ -175,7 +203,15 @@ class ColonyPoint:
         checks.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "independent"))
         checks.check_sharing(learners.get(config.learner), self.sharing)
-        checked_whole("episodes", self.episodes, least=0 if self.after else 1)
+        if self.policy and (self.episodes or self.after):
+            raise AntsError(
+                f"policy is {self.policy.name!r}, but episodes is {self.episodes}; a fixed policy "
+                "does not learn, so set episodes = 0."
+            )
+        without_training = self.after or self.policy
+        more = "" if without_training else "; 0 requires a policy"
+        checked_whole("episodes", self.episodes, 0 if without_training else 1, otherwise=more)
+        Recorder(self.measures, self.measure_every)  # raises an error if it cannot read them
         checked_whole("ticks", self.ticks, most=MAX_STEPS)
         checked_whole("rollouts", self.rollouts)
         object.__setattr__(self, "protocol", checked_protocol(self.protocol))
@@ -214,7 +250,9 @@ class ColonyPoint:
     @property
     def bytes_of_a_run(self) -> int:
         """The approximate upper bound on the bytes of one seed's outcome on disk."""
-        return 8 * len(_COLONY_ARRAYS) * self.rollouts + 4 * self.task.n_states * N_ACTIONS
+        rows = len(self.measures) * len(list(stops(self.ticks, self.measure_every)))
+        numbers = 8 * (len(_COLONY_ARRAYS) + rows) * self.rollouts
+        return numbers + 4 * self.task.n_states * N_ACTIONS
 
     def events(self, learns: bool) -> tuple[Event, ...]:
         """Return the events of episodes of training or, if not `learns`, of the evaluation."""
@@ -254,10 +292,13 @@ class ColonyPoint:
         progress: Progress,
         where: Mapping[str, Any],
     ) -> Outcome:
-        """Return the outcome of a point, arrays (1, seeds, ...); `learned` has `after`'s tables."""
+        """Return the outcome of the one point in `points`, arrays (1, seeds, ...).
+
+        `learned` has the tables of the point `after`, from which learning starts.
+        """
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
-        tables: Any = learned
+        tables: Any = point.policy.q_values if point.policy else learned
         if point.episodes:
             places = point.places(seeds)
             learning = point.colony(
@@ -268,11 +309,31 @@ class ColonyPoint:
             tables = learning.q_values
         colony = point.colony(point.world, seeds, tables, False, **where)
         part, protocol = _part(progress, share, 1 - share), point.events(learns=False)
-        episodes = colony.run(point.rollouts, point.ticks, part, protocol=protocol)
+        episodes = colony.run(
+            *(point.rollouts, point.ticks, part),
+            measures=point.measures,
+            every=point.measure_every,
+            protocol=protocol,
+        )
         outcome = {name: files.smallest(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
+        outcome |= _series_of(episodes, point)
         if point.episodes and point.sharing == "shared":
             outcome["q_values"] = tables
         return {name: array[None] for name, array in outcome.items()}
+
+
+def _series_of(episodes: ColonyEpisodes, point: ColonyPoint) -> Outcome:
+    """Return the series of measures, float64 (seeds, rollouts, rows) by "series_NAME"."""
+    series = episodes.series
+    if series is None:
+        return {}
+    for name in series.maps:
+        raise AntsError(f"the measure {name!r} is an array; choose measures that give numbers.")
+    shape = point.rollouts, -1, len(episodes.seeds)  # all worlds run for all ticks
+    return {
+        f"{SERIES}{name}": np.moveaxis(values.reshape(shape), -1, 0)
+        for name, values in series.values.items()
+    }
 
 
 Point = RunPoint | ColonyPoint
@@ -281,7 +342,7 @@ PointKind = TypeVar("PointKind", bound=Point)
 
 @dataclass(frozen=True)
 class Study(Generic[PointKind]):
-    """Points over the same seeds.
+    """Points that all run with the same seeds.
 
     Raises:
         AntsError: A world is too small for the ants, or worlds and seeds differ in number.
@@ -304,7 +365,8 @@ class Study(Generic[PointKind]):
                 )
             starts = [*zip(several, self.seeds, strict=False), *((one, 0) for one in pool or ())]
             for one, seed in starts:
-                checks.checked_world(one, learns=True).start(seed, ants)
+                of_colony = isinstance(self.points[0], ColonyPoint)
+                checks.checked_world(one, learns=True, several=of_colony).start(seed, ants)
 
     @property
     def in_order(self) -> tuple[PointKind, ...]:
@@ -312,7 +374,7 @@ class Study(Generic[PointKind]):
         return _in_order(self.points)
 
     def blocks(self) -> Iterator[tuple[slice, slice]]:
-        """Yield the slices of `in_order` and of the seeds of each block, by rows of the array."""
+        """Yield two slices for each block: that of `in_order`, and that of the seeds."""
         first = 0
         for _, group in itertools.groupby(self.in_order, lambda point: point.alike):
             points = list(group)
@@ -441,12 +503,15 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
 
     def facts(point: Point) -> dict[str, Any]:
         """Return the settings of a point by name, with worlds and other points as indices."""
-        found = {field.name: getattr(point, field.name) for field in fields(point)}
+        found = {one.name: getattr(point, one.name) for one in fields(point)}
         found |= {name: worlds.index(found[name]) for name in ("world", "pool") if found.get(name)}
         found |= {"after": points.index(point.after)} if point.after else {}
         protocol, during = found.pop("protocol", ()), found.pop("during", "")
         if protocol:
             found |= {"protocol": [event.facts() for event in protocol], "during": during}
+        found = {name: value for name, value in found.items() if value or name not in _LATER}
+        if policy := found.get("policy"):
+            found["policy"] = {"name": policy.name, "sha256": policy.sha256}
         return flat({**found, "task": point.task.as_dict(), "training": point.training.as_dict()})
 
     rows = [facts(point) for point in points]
@@ -473,7 +538,11 @@ def world_facts(world: World) -> dict[str, Any]:
         numbers[name] = len(array)
         digest.update(repr(array.shape).encode())
         digest.update(array.tobytes())
+    for more in (world.other_queens, world.food_kinds):  # empty in most worlds
+        digest.update(more.tobytes())
     where = {"ranges": list(world.ranges), "queen": list(world.queen)}
+    if world.n_nests > 1:
+        where["queens"] = world.queens.tolist()
     return {**where, **numbers, "sha256": digest.hexdigest()}
 
 

@@ -6,14 +6,14 @@ import difflib
 import itertools
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants import checks, files, learners, protocol, worlds
+from taichi_ants import checks, files, learners, measures, protocol, worlds
 from taichi_ants.analysis import sweeps
 from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
@@ -21,21 +21,26 @@ from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.files.results import REPORT
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.measures.series import stops
 from taichi_ants.settings import all_of, declared, flat, named_groups, nested
-from taichi_ants.studies.runner import ColonyPoint, Outcome, Point, Progress, RunPoint, Study
+from taichi_ants.studies.runner import (
+    SERIES,
+    ColonyPoint,
+    FixedPolicy,
+    Outcome,
+    Point,
+    Progress,
+    RunPoint,
+    Study,
+)
 from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
-_OF_FILE = ("kind", "seeds", "measures", "margin", "against", "vary")
-_PARTS = (
-    "world",
-    "task",
-    "training",
-    "after",
-    "pool",
-    "protocol",
-)  # attributes of points, not settings
+SERIES_FILE = "series.csv"
+_OF_FILE = ("kind", "seeds", "measures", "measure_every", "margin", "against", "vary")
+# Attributes of points that are not settings.
+_PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
@@ -60,6 +65,28 @@ MEASURES = {
     },
     "colony": {name: Measure(words) for name, words in of_colonies.MEASURES.items()},
 }
+# Ants that follow a policy do not learn or explore, unless the file says so.
+_WITHOUT_LEARNING = {
+    **{"learner": "q_learning", "learning_rate": 1.0, "discount": 1.0},
+    **{"epsilon": 0.0, "epsilon_decay": 1.0},
+}
+
+
+def measure_of(kind: str, name: str) -> Measure:
+    """Return a measure of this kind; for colonies also a registered one.
+
+    Raises:
+        AntsError: There is no such measure; the message lists all names.
+    """
+    known = MEASURES[kind]
+    if name in known:
+        return known[name]
+    registered = set(measures.names()) - {"occupancy"} if kind == "colony" else set()
+    if not isinstance(name, str) or name.partition(".")[0] not in registered:
+        check_one_of("measures", name, (*known, *sorted(registered - known.keys())))
+    one = measures.get(name)
+    words = one.summary or name.replace("_", " ")
+    return Measure(f"{words} ({one.unit})" if one.unit else words)
 
 
 @dataclass(frozen=True)
@@ -69,8 +96,9 @@ class Sweep:
     Attributes:
         study: The points over the seeds, in the order of `settings`.
         settings: The settings that vary, for each point of the study.
-        grids: The slices of `settings` from each [vary].
+        grids: For each [vary] table of the file, the slice of `settings` that it defines.
         measures: Names of measures; the figure shows the first.
+        measure_every: Ticks between two rows of `SERIES_FILE`; None without that file.
         against: The setting and its value with which all others are compared.
         margin: The largest difference in the first measure that is too small to matter.
     """
@@ -80,16 +108,21 @@ class Sweep:
     settings: tuple[Settings, ...]
     grids: tuple[slice, ...]
     measures: tuple[str, ...]
+    measure_every: int | None
     against: tuple[str, Any] | None
     margin: float
 
     def facts(self) -> dict[str, Any]:
         """Return everything that determines the results."""
         own = {"measures": self.measures, "against": self.against, "margin": self.margin}
+        own |= {"measure_every": self.measure_every} if self.measure_every else {}
         return {**self.study.settings(), **own, "vary": self.settings}
 
     def measured(self, blocks: Path, progress: Progress, **where: Any) -> dict[str, np.ndarray]:
-        """Return each measure, float64 (points, seeds); arguments as of `Study.in_blocks`."""
+        """Return each measure, float64 (points, seeds); arguments as of `Study.in_blocks`.
+
+        The value of a registered measure is its mean over rollouts, at the last tick of each.
+        """
 
         def reduce(points: Sequence[Any], seeds: Sequence[int], outcome: Outcome) -> Outcome:
             if self.kind == "runs":
@@ -97,9 +130,42 @@ class Sweep:
             (point,) = points
             arrays = {key: array[0] for key, array in outcome.items()}
             found = of_colonies.measures_of(arrays, point.ants, point.ticks)
-            return {name: found[name][None] for name in self.measures}
+            columns: Outcome = {}
+            for name in self.measures:
+                columns |= {name: found[name]} if name in found else _ends(arrays, name)
+            return {name: array[None] for name, array in columns.items()}
 
         return self.study.reduced(blocks, reduce, progress, **where)
+
+    def write_series(self, blocks: Path, folder: Path) -> None:
+        """Write the series of the registered measures, a row for each value; read finished blocks.
+
+        Does nothing without `measure_every`.
+        """
+        if self.measure_every is None:
+            return
+        columns = [*sweeps.columns_of(self.settings), "seed", "episode", "tick", "measure", "value"]
+        files.write_csv(folder / SERIES_FILE, self._series_rows(blocks), columns)
+
+    def _series_rows(self, blocks: Path) -> Iterator[dict[str, Any]]:
+        order = self.study.in_order
+        settings: dict[Any, list[Settings]] = {}  # points may repeat
+        for point, one in zip(self.study.points, self.settings, strict=True):
+            settings.setdefault(point, []).append(one)
+        for place, outcome in self.study.read(blocks, range(len(order))):
+            point = order[place]
+            ticks = list(stops(point.ticks, self.measure_every))
+            for name, array in outcome.items():
+                for one in settings[point] if name.startswith(SERIES) else ():
+                    for (s, episode, row), value in np.ndenumerate(array):
+                        yield {
+                            **one,
+                            "seed": self.study.seeds[s],
+                            "episode": episode,
+                            "tick": ticks[row],
+                            "measure": name.removeprefix(SERIES),
+                            "value": value,
+                        }
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
         """Return by point the finding on its difference from the point with the value `against`.
@@ -124,10 +190,10 @@ class Sweep:
 
     def write(self, values: dict[str, np.ndarray], folder: Path, draws: bool) -> None:
         """Write all results; `values` are those that `measured` returned."""
-        first, columns = self.measures[0], sweeps.columns_of(self.settings)
+        first, columns = next(iter(values)), sweeps.columns_of(self.settings)
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
-        with_iqm = [name for name in values if MEASURES[self.kind][name].uses_iqm]
+        with_iqm = [name for name in values if measure_of(self.kind, name).uses_iqm]
         rows = [
             {**one, "seeds": len(self.study.seeds), **sweeps.centre_columns(centres)}
             for one, centres in zip(self.settings, sweeps.centres_of(values, with_iqm), strict=True)
@@ -142,7 +208,7 @@ class Sweep:
         files.write_text(folder / REPORT, report)
         if draws:
             files.check_writable_folder(folder / FIGURES)
-            words = MEASURES[self.kind][first].words
+            words = measure_of(self.kind, first).words
             for number, some in enumerate(self.grids, start=1):
                 path = folder / FIGURES / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
                 sweeps.draw(path, self.settings[some], values[first][some], words)
@@ -170,11 +236,10 @@ def _sweep(file: Settings) -> Sweep:
     if kind is None:
         raise AntsError(f"kind is missing; write one of {', '.join(KINDS)}.")
     check_one_of("kind", kind, tuple(KINDS))
-    wanted, measures = _listed(file.get("measures", [])), MEASURES[kind]
+    wanted = _listed(file.get("measures", []))
     if not wanted:
-        raise AntsError(f"measures is missing; name one or more of {', '.join(measures)}.")
-    for name in wanted:
-        check_one_of("measures", name, tuple(measures))
+        raise AntsError(f"measures is missing; name one or more of {', '.join(MEASURES[kind])}.")
+    chosen = [measure_of(kind, name) for name in wanted]
     _check_once("measures", wanted)
     for name in protocol.EVENTS:
         if isinstance(file.get(name), dict):
@@ -187,6 +252,7 @@ def _sweep(file: Settings) -> Sweep:
     if numbered and kind != "colony":
         raise AntsError(f"[[{next(iter(numbered))}]] is for kind 'colony'; leave it out.")
     file = {**file, **numbered}  # so that [vary] can name the settings of an event: at.1.tick
+    reading = _reading(kind, wanted, file.get("measure_every"))
     fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
     grids = [_grid(grid, fixed) for grid in _listed(file.get("vary", []))]
     if not grids:
@@ -196,9 +262,9 @@ def _sweep(file: Settings) -> Sweep:
         seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
     seeds = checks.checked_seeds(seeds)
     rows, built = tuple(itertools.chain(*grids)), dict[str, Any]()
-    points = tuple(_point(kind, {**fixed, **row}, seeds, built) for row in rows)
-    for name in wanted:
-        least = measures[name].episodes
+    points = tuple(_point(kind, {**fixed, **row}, seeds, built, reading) for row in rows)
+    for name, measure in zip(wanted, chosen, strict=True):
+        least = measure.episodes
         if any(point.episodes < least for point in points):
             raise AntsError(f"{name} needs {least} episodes; use more or choose another measure.")
     margin = file.get("margin", 0)
@@ -218,7 +284,44 @@ def _sweep(file: Settings) -> Sweep:
         raise AntsError("margin requires against; add against, or leave margin out.")
     ends = list(itertools.accumulate(map(len, grids), initial=0))
     parts = tuple(map(slice, ends, ends[1:]))
-    return Sweep(kind, Study(points, seeds), rows, parts, tuple(wanted), against, margin)
+    every = reading.get("measure_every")
+    return Sweep(kind, Study(points, seeds), rows, parts, tuple(wanted), every, against, margin)
+
+
+def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
+    """Return the arguments of points for the registered measures."""
+    registered = tuple(n for n in wanted if n.partition(".")[0] in measures.names())
+    if kind != "colony":
+        if every is not None:
+            raise AntsError(
+                f"measure_every is {shown(every)}, but is for colonies only; leave it out."
+            )
+        return {}
+    if every is None:
+        return {"measures": tuple(name for name in registered if name not in MEASURES[kind])}
+    if not registered:
+        raise AntsError(
+            f"measure_every is {shown(every)}, but no measure has a series; add one of "
+            f"{', '.join(measures.names())} to measures."
+        )
+    return {"measures": registered, "measure_every": checked_whole("measure_every", every)}
+
+
+def _ends(outcome: Outcome, name: str) -> Outcome:
+    """Return the mean over rollouts of a registered measure at their last ticks, float64 (seeds,).
+
+    A measure with parts has several arrays. Rollouts without a value do not count.
+    """
+    found = {}
+    for key, array in outcome.items():
+        column = key.removeprefix(SERIES)
+        if key != column and (column == name or column.startswith(f"{name}.")):
+            last = array[..., -1]
+            known = ~np.isnan(last)
+            n = known.sum(axis=1)
+            sums = np.where(known, last, 0.0).sum(axis=1)
+            found[column] = np.divide(sums, n, out=np.full(len(n), math.nan), where=n > 0)
+    return found
 
 
 def _are_tables(value: Any) -> bool:
@@ -258,8 +361,17 @@ def _grid(grid: Any, fixed: Settings) -> list[Settings]:
     return [dict(zip(values, row, strict=True)) for row in itertools.product(*values.values())]
 
 
-def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[str, Any]) -> Point:
-    """Return the point of some settings; reuse the worlds in `built`, and add new ones."""
+def _point(
+    kind: str,
+    settings: Settings,
+    seeds: tuple[int, ...],
+    built: dict[str, Any],
+    reading: Mapping[str, Any],
+) -> Point:
+    """Return the point of some settings; reuse the worlds in `built`, and add new ones.
+
+    `reading` are the arguments of the point that are not settings.
+    """
     learner = settings.get("training.learner")
     more = declared(learners.get(str(learner)).hyperparameters) if learner else ()
     known = [
@@ -276,6 +388,10 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
             raise AntsError(f"{shown(name)} is not a setting {_rather(name, kind, known)}.")
     tree = nested(settings)
     world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
+    rules = Task.from_dict(task)
+    if kind == "colony" and "policy" in tree:
+        tree["policy"] = FixedPolicy.named(tree["policy"], rules)
+        training = {**_WITHOUT_LEARNING, **training}
     for name in _OF_LEARNERS[:5]:  # the others have defaults
         if name not in training:
             raise AntsError(f"training.{name} is missing; add it to [training] or [vary].")
@@ -284,7 +400,7 @@ def _point(kind: str, settings: Settings, seeds: tuple[int, ...], built: dict[st
         built[key] = _world(kind, world, seeds)
     if events:
         tree["protocol"] = protocol.read(events)
-    return KINDS[kind](built[key], Task.from_dict(task), TrainingConfig(**training), **tree)
+    return KINDS[kind](built[key], rules, TrainingConfig(**training), **tree, **reading)
 
 
 def _without_events(settings: Settings) -> tuple[Settings, dict[str, list[Any]]]:

@@ -1,12 +1,19 @@
 """The rules: observations, actions, pheromone and rewards of ants."""
 
+from taichi_ants.task.choice import Choice, Noise
+from taichi_ants.task.field import Field
+from taichi_ants.task.food import Food
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
 from taichi_ants.task.task import Life, Task, Traffic, foraging, paper, queueing
 
 __all__ = [
+    "Choice",
+    "Field",
+    "Food",
     "Life",
+    "Noise",
     "Observation",
     "Pheromone",
     "Rewards",

@@ -15,6 +15,10 @@ OBSTACLE = SEES_OBSTACLE | SEES_OBSTACLE << 2
 FOOD = SEES_GOAL | SEES_OBSTACLE << 2
 QUEEN = SEES_OBSTACLE | SEES_GOAL << 2
 
+# The number of a nest is in three bits of an ant's mark, of which 0 means no ant.
+MAX_NESTS = 7
+MAX_FOOD_KINDS = 8
+
 # Actions. The first three are moves, relative to the heading.
 LEFT, FORWARD, RIGHT, PICK_UP, GIVE = 0, 1, 2, 3, 4
 ACTION_NAMES: tuple[str, ...] = ("left", "forward", "right", "pick up", "give")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Literal, TypeVar, get_args
 
 from taichi_ants.settings import Is, Settings
 from taichi_ants.task.constants import DEPOSIT_LEVEL
@@ -11,6 +11,7 @@ from taichi_ants.task.constants import DEPOSIT_LEVEL
 if TYPE_CHECKING:
     import numpy as np
 
+Own = TypeVar("Own", bound="Pheromone")
 Evaporation = Literal["linear", "exponential", "none"]
 Deposit = Literal["set", "add", "fading", "none"]
 View = Literal["half", "strongest", "strongest_under_carriers"]
@@ -53,8 +54,9 @@ class Pheromone(Settings, path="task.pheromone"):
     deposit: Annotated[
         Deposit,
         Is(
-            "trail that ants with food lay: the cell's trail becomes level (set), grows by level "
-            "(add), or rises to level minus slope per tick since the pick-up (fading)"
+            "level that an ant lays on a cell: the cell's level becomes level (set), grows by "
+            "level (add), or rises to level minus slope per tick since the ant's load changed "
+            "(fading)"
         ),
     ] = "set"
     level: Annotated[
@@ -67,21 +69,21 @@ class Pheromone(Settings, path="task.pheromone"):
     ] = None
     slope: Annotated[
         Level,
-        Is("decrease of an ant's deposits per tick since its pick-up", usual=10),
+        Is("decrease of an ant's deposits per tick since its load changed", usual=10),
         Is(only=("deposit", "fading")),
     ] = None
     view: Annotated[
         View,
         Is(
-            "lowest level that ants without food see as T: half of the highest level in view "
-            "(half) or the highest itself (strongest), also counting trails under ants with food "
+            "lowest level that ants see as T or S: half of the highest level in view (half) or the "
+            "highest itself (strongest), also counting trails under ants with food "
             "(strongest_under_carriers)"
         ),
     ] = "half"
 
     @property
     def dense(self) -> bool:
-        """Whether levels are float32 and change in every cell each tick, or are integers."""
+        """Whether levels are float32 that change in every cell each tick, rather than integers."""
         return self.evaporation == "exponential" or self.diffusion > 0
 
     @property
@@ -90,7 +92,7 @@ class Pheromone(Settings, path="task.pheromone"):
         return -(-int(self.level) // self.slope) if self.slope else 0
 
     @property
-    def lasting(self) -> Pheromone:
+    def lasting(self: Own) -> Own:
         """This pheromone without evaporation."""
         return self.but(evaporation="none")
 

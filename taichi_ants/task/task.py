@@ -6,10 +6,13 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Literal, get_args
 
-from taichi_ants.errors import AntsError
-from taichi_ants.settings import Is, Settings
+from taichi_ants.errors import AntsError, shown
+from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
-from taichi_ants.task.constants import MAX_STEPS
+from taichi_ants.task.choice import Choice, Noise
+from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_STEPS
+from taichi_ants.task.field import COMPASS, TRAIL, Field
+from taichi_ants.task.food import Food
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -94,10 +97,11 @@ class Life(Settings, path="task.life"):
 class Task(Settings, path="task"):
     """The rules of perception, action and reward; by default, those of the paper.
 
-    `traffic` can be a name of `Traffic.named`. If `delivery` "terminates", the target of the update
-    is the reward alone; if it "truncates", the update bootstraps from the next observation. Both
-    end an episode of one ant. Kernels are compiled for an observation and a kind of pheromone; they
-    read all other settings as numbers.
+    `traffic` and `choice` can be names of `Traffic.named` and `Choice.named`. If `delivery`
+    "terminates", the target of the update is the reward alone; if it "truncates", the update
+    bootstraps from the next observation. Both end an episode of one ant. Kernels are compiled for
+    an observation, a kind of pheromone, and rules of choice and noise; they read all other settings
+    as numbers.
     """
 
     observation: Annotated[str, Is("observation of an ant", choices=observations.names)] = "paper"
@@ -105,6 +109,16 @@ class Task(Settings, path="task"):
     pheromone: Annotated[Pheromone, Is("rules by which trails are laid, evaporate and spread")] = (
         field(default_factory=Pheromone)
     )
+    fields: Annotated[Named[Field], Is("further pheromones, by name")] = field(
+        default_factory=Named
+    )
+    outbound_cue: Annotated[
+        str, Is("pheromone that ants without food see as T: trail, or the name of a field")
+    ] = TRAIL
+    homing_cue: Annotated[
+        str,
+        Is("what ants with food see as S: compass (nearer cells), trail, or the name of a field"),
+    ] = COMPASS
     traffic: Annotated[Traffic, Is("rules for entering a cell with an ant on it")] = field(
         default_factory=Traffic
     )
@@ -121,11 +135,85 @@ class Task(Settings, path="task"):
         bool, Is("evaporate trails while ants follow a fixed policy")
     ] = True
     life: Annotated[Life, Is("changes of ants and food in colonies")] = field(default_factory=Life)
+    choice: Annotated[Choice, Is("rule by which ants choose actions")] = field(
+        default_factory=Choice
+    )
+    noise: Annotated[Noise, Is("failures of actions and observations")] = field(
+        default_factory=Noise
+    )
+    foods: Annotated[
+        Named[Food], Is("kinds of food, in the order of their numbers in worlds; colonies only")
+    ] = field(default_factory=Named)
+
+    def __post_init__(self) -> None:
+        self.check()
+        self._check_choice()
+        self._check_fields()
+        self._check_foods()
+
+    def _check_foods(self) -> None:
+        if len(self.foods) > MAX_FOOD_KINDS:
+            raise AntsError(
+                f"`task.foods` has {len(self.foods)} kinds; at most {MAX_FOOD_KINDS} are allowed."
+            )
+        if self.foods and self.life.regrowth is not None:
+            raise AntsError(
+                f"`task.life.regrowth` is {self.life.regrowth}; with `task.foods`, set the "
+                "regrowth of each kind instead."
+            )
+        if self.life.wander and (len(self.foods) > 1 or self.has_loads):
+            raise AntsError(
+                f"`task.life.wander` is {self.life.wander}; only food of one kind with one load in "
+                "a cell can wander, so leave it out."
+            )
+
+    @property
+    def has_loads(self) -> bool:
+        """Whether a cell can have more than one load of food."""
+        return any(food.loads > 1 for food in self.foods.values())
+
+    @property
+    def food_changes(self) -> bool:
+        """Whether food grows back or wanders."""
+        grows = any(food.regrowth is not None for food in self.foods.values())
+        return self.life.regrowth is not None or self.life.wander is not None or grows
 
     @classmethod
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "foraging" and "queueing"."""
         return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
+
+    def _check_choice(self) -> None:
+        if not self.choice.needs_table and self.observation != "paper":
+            raise AntsError(
+                f"`task.observation` is {self.observation!r}; it must be 'paper' if "
+                f"`task.choice.rule` is {self.choice.rule!r}, which chooses without states."
+            )
+
+    def _check_fields(self) -> None:
+        for name in (TRAIL, COMPASS):
+            if name in self.fields:
+                raise AntsError(
+                    f"`task.fields` has a field {name!r}, but that name is taken; choose another "
+                    "name."
+                )
+        pheromones = (TRAIL, *self.fields)
+        for setting, cues in (
+            ("outbound_cue", pheromones),
+            ("homing_cue", (COMPASS, *pheromones)),
+        ):
+            cue = getattr(self, setting)
+            if cue not in cues:
+                raise AntsError(
+                    f"`task.{setting}` is {shown(cue)}; it must be one of {', '.join(cues)}, or "
+                    "the name of a field that you add to `task.fields`."
+                )
+        for name in self.sees.reads:
+            if name not in pheromones:
+                raise AntsError(
+                    f"`task.observation` is {self.observation!r}, which reads the field {name!r}; "
+                    f"add `task.fields.{name}`."
+                )
 
     def __repr__(self) -> str:
         """Return the settings that differ from the paper's."""
@@ -144,7 +232,7 @@ class Task(Settings, path="task"):
         return self.sees.n_states
 
     @property
-    def numbers(self) -> dict[str, int]:
+    def numbers(self) -> dict[str, Any]:
         """The numbers of all rules but the pheromone's, as kernels read them; -1 is off."""
         life, off = self.life, -1
         return {
@@ -154,12 +242,22 @@ class Task(Settings, path="task"):
             "lifespan": life.lifespan or off,
             "regrowth": off if life.regrowth is None else life.regrowth,
             "wander": life.wander or off,
+            **self.noise.numbers,
         }
 
     def pheromone_while(self, learning: bool) -> Pheromone:
-        """Return the pheromone while ants learn or do not, with or without evaporation."""
+        """Return the pheromone for learning or evaluation, without evaporation if that is off."""
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
         return self.pheromone if falls else self.pheromone.lasting
+
+    def fields_while(self, learning: bool) -> dict[str, Field]:
+        """Return the fields while ants learn or do not, with or without evaporation."""
+        falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
+        return {name: one if falls else one.lasting for name, one in self.fields.items()}
+
+    def number_of(self, cue: str) -> int:
+        """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""
+        return -1 if cue == COMPASS else (TRAIL, *self.fields).index(cue)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the task as names and numbers; `from_dict` reads it."""

@@ -60,7 +60,10 @@ _HEAD = 8 * -(-(1 + len(SECTIONS)) // 2)  # bytes
 
 
 def types_of(size: int, n_states: int, dense: bool) -> dict[str, str]:
-    """Return the type of each section for `size` cells; `dense` if trails are levels."""
+    """Return the type of each section of frames.
+
+    `size` is the number of cells. If `dense`, trails are stored as levels, not as expiry clocks.
+    """
     of_world = {
         "cell": "u2" if size < 2**16 else "u4",
         "state": "u2" if n_states < 2**16 else "u4",

@@ -14,9 +14,11 @@ from taichi_ants import files
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import expect
-from taichi_ants.rendering.writers import check_single, write
+from taichi_ants.rendering.snapshots import picture
+from taichi_ants.rendering.writers import check_single, png, write
 from taichi_ants.viewer.frames import Recording
 from taichi_ants.viewer.recorder import record_colony, record_trace
+from taichi_ants.worlds.world import World
 
 # The parts of the script, in this order: each part uses only those before it.
 SCRIPTS = ("history.js", "stage.js", "panel.js", "timeline.js", "viewer.js")
@@ -108,15 +110,23 @@ def frame(recording: Recording) -> str:
 
 
 def notebook(shown: Any) -> str | None:
-    """Return HTML that shows a recording, trace or colony; None if it is too large.
+    """Return HTML that shows a world, recording, trace or colony; None if it is too large.
 
     IPython calls this function, see `taichi_ants.__init__`.
     """
     if isinstance(shown, Recording):
         return frame(shown)
+    if isinstance(shown, World):
+        return _image(shown) if shown.grid.size <= _MOST_CELLS else None
     if isinstance(shown, Trace):
         small = shown.made is not None and len(shown) <= _MOST_STEPS
         return frame(record_trace(shown)) if small else None
     expect("the object", shown, Colony)
     small = shown.grid.size <= _MOST_CELLS and shown.ants <= _MOST_ANTS
     return frame(record_colony(shown)) if small and shown.episode >= 0 else None
+
+
+def _image(world: World) -> str:
+    """Return an HTML image of a world, with its text for screen readers."""
+    content = base64.b64encode(png(picture(world), optimize=True)).decode()
+    return f'<img alt="{html.escape(repr(world))}" src="data:image/png;base64,{content}">'

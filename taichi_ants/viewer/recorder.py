@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.checks import check_progress
+from taichi_ants.checks import check_one_nest, check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, count, expect
@@ -65,7 +65,7 @@ class Progress:
             self._before = self.ticks
 
     def news(self) -> list[Point]:
-        """Return the points since the last call."""
+        """Return the points of the curves that were added since the last call."""
         new, self._new = self._new, []
         return new
 
@@ -89,6 +89,7 @@ class Recorder:
     ) -> None:
         expect("colony", colony, Colony)
         expect("title", title, str)
+        check_one_nest(colony, "the viewer")
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         start = colony.snapshot(world)
         self.grid = start.grid
@@ -136,7 +137,10 @@ class Recorder:
         }
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
-        """Return the `name_parts` of states seen, or of all if they are few, except `known`."""
+        """Return the `name_parts` of the states seen so far, except those in `known`.
+
+        If there are few states, it returns those of all.
+        """
         few = self._n_states <= _MOST_NAMES
         seen = np.unique(np.flatnonzero(self._known) % self._n_states).tolist()
         named = range(self._n_states) if few else seen
@@ -151,6 +155,8 @@ class Recorder:
             "seed": str(colony.seeds[self.world]),
             "observation": f"{colony.task.sees.name}, {self._n_states} states",
         }
+        if colony.fields:
+            lines["pheromone"] = f"the trail; hidden: {', '.join(colony.fields)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
             lines["table"] = "one per ant" if colony.one_a_slot else "shared"
@@ -190,7 +196,8 @@ class Recorder:
         order = np.argsort(after, kind="stable")
         places = order[np.searchsorted(after, numbers, sorter=order)]
         actions = colony.actions[self.world, places]
-        acts = {"acts": actions + 16 * colony.events[self.world, places]}
+        executed = colony.executed[self.world, places]
+        acts = {"acts": executed + 16 * colony.events[self.world, places]}
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})

@@ -38,7 +38,7 @@ _BUILDERS = dict(BUILT_IN)
 
 
 def register(name: str, builder: Builder) -> None:
-    """Register a world by a name for `build` and commands, in place of your own of the same name.
+    """Register a world by a name for `build` and commands; it replaces your own world of that name.
 
     The builder is called with the settings of the world as keywords and returns a `World`. All its
     arguments except `seed` need defaults. A builder with an argument `seed` gets a whole number and
@@ -87,7 +87,7 @@ def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
         drawn = ", ".join(filter(is_drawn, names()))
         raise AntsError(
             f"{option} has no effect on {shown(name_or_path)}, which is not drawn at random; leave "
-            f"it out, or choose one of {drawn}."
+            f"it out, or choose one of the worlds {drawn}."
         )
 
 

@@ -8,6 +8,9 @@ are four columns apart, and neighbouring lines are offset by two columns. The ch
     #  obstacle       F  food           a to f  an ant with heading 0 to 5 on a trail
     t  trail                            blanks are not cells
 
+R, S and U are the queens of a second, third and fourth nest; G, H and I are food of a second, third
+and fourth kind.
+
 Lines that start with `;` are comments. A line `trail = 25` above the drawing sets the level of all
 trails. Ants are numbered in reading order.
 """
@@ -23,18 +26,20 @@ from itertools import permutations
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, expect, shown
+from taichi_ants.errors import AntsError, count, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid, cube
 from taichi_ants.task.constants import MAX_TRAIL_LEVEL
 from taichi_ants.worlds.world import World
 
 DEFAULT_TRAIL_LEVEL = 25
-EMPTY, OBSTACLE, FOOD, QUEEN, TRAIL = ".#FQt"
+EMPTY, OBSTACLE, TRAIL = ".#t"
+FOODS = "FGHI"  # by kind
+QUEENS = "QRSU"  # by nest
 ANTS = "012345"  # by heading
 ANTS_ON_TRAIL = "abcdef"
 
-_CELLS = {EMPTY, OBSTACLE, FOOD, QUEEN, TRAIL, *ANTS, *ANTS_ON_TRAIL}
-_ALLOWED = ". # F Q t, 0 to 5, a to f and blanks"
+_CELLS = {EMPTY, OBSTACLE, TRAIL, *FOODS, *QUEENS, *ANTS, *ANTS_ON_TRAIL}
+_ALLOWED = ". # t, F G H I, Q R S U, 0 to 5, a to f and blanks"
 _SETTING = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
 
 
@@ -62,12 +67,14 @@ def from_text(text: str, source: str = "the map") -> World:
 
     marks = np.array([one.mark for one in drawn])
     trails = cells[np.isin(marks, [TRAIL, *ANTS_ON_TRAIL])]
+    is_food = np.isin(marks, [*FOODS])
     is_ant = np.isin(marks, [*ANTS, *ANTS_ON_TRAIL])
     headings = [(ANTS + ANTS_ON_TRAIL).index(mark) % len(ANTS) for mark in marks[is_ant]]
     return World(
         ranges,
-        cells[marks == QUEEN][0],
-        foods=cells[marks == FOOD],
+        [cells[marks == queen][0] for queen in QUEENS if queen in marks],
+        foods=cells[is_food],
+        food_kinds=[FOODS.index(mark) for mark in marks[is_food]],
         obstacles=np.concatenate([cells[marks == OBSTACLE], grid.cells(np.flatnonzero(undrawn))]),
         trails=np.column_stack([trails, np.full(len(trails), level)]),
         ants=np.column_stack([cells[is_ant], np.array(headings, dtype=np.int64)]),
@@ -116,11 +123,17 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
                     raise AntsError(f"{drawn[-1].found(source)}; use only {_ALLOWED}.")
     if not drawn:
         raise AntsError(f"{source} has no cells; draw cells with {_ALLOWED}.")
-    queens = [one for one in drawn if one.mark == QUEEN]
-    if not queens:
-        raise AntsError(f"{source} has no queen; draw one cell as {QUEEN}.")
-    if len(queens) > 1:
-        raise AntsError(f"{queens[1].found(source)}, a second queen; only one is allowed.")
+    queens = [one for one in drawn if one.mark in QUEENS]
+    for nest, mark in enumerate(QUEENS):
+        several = [one for one in queens if one.mark == mark]
+        if not several and (nest == 0 or any(late.mark > mark for late in queens)):
+            missing = "queen" if nest == 0 else f"queen {mark}"
+            raise AntsError(f"{source} has no {missing}; draw one cell as {mark}.")
+        if len(several) > 1:
+            raise AntsError(
+                f"{several[1].found(source)} a second time; draw the queen of each nest once, as "
+                f"{', '.join(QUEENS)}."
+            )
     return DEFAULT_TRAIL_LEVEL if level is None else level, drawn
 
 
@@ -205,14 +218,22 @@ def to_text(world: World) -> str:
             "show only one; give all trails the same level."
         )
     on_trail = {tuple(cell) for *cell, _ in world.trails.tolist()}
-    hidden = on_trail & {world.queen, *map(tuple, world.foods.tolist())}
+    if world.n_nests > len(QUEENS) or world.n_food_kinds > len(FOODS):
+        raise AntsError(
+            f"the world has {count(world.n_nests, 'nest')} and "
+            f"{count(world.n_food_kinds, 'kind')} of food; a map can show {len(QUEENS)} of each."
+        )
+    hidden = on_trail & set(map(tuple, [*world.queens.tolist(), *world.foods.tolist()]))
     if hidden:
         raise AntsError(
             f"a trail lies on {min(hidden)} under the queen or food, which a map cannot show; "
             "remove this trail."
         )
     marks = [(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)]
-    marks += [(world.obstacles, OBSTACLE), (world.foods, FOOD), (np.array([world.queen]), QUEEN)]
+    kinds = world.kinds_by_cell()[world.grid.index(world.foods)]
+    marks += [(world.obstacles, OBSTACLE)]
+    marks += [(world.foods[kinds == kind], FOODS[kind]) for kind in range(world.n_food_kinds)]
+    marks += [(cell[None], QUEENS[nest]) for nest, cell in enumerate(world.queens)]
     marks += [(world.trails[:, :3], TRAIL)]
     for *cell, heading in world.ants.tolist():
         letters = ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, entries_of, shown, whole
+from taichi_ants.errors import AntsError, count, entries_of, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import FAR, MAX_ARRAY_CELLS, AxialGrid
-from taichi_ants.task.constants import MAX_TRAIL_LEVEL
+from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, MAX_TRAIL_LEVEL
 
 _STANDS = ("nothing", "the queen", "a food item", "an obstacle")
 
@@ -24,20 +24,27 @@ def parse_ranges(ranges: object) -> tuple[int, int, int]:
 
 
 def parse_contents(
-    grid: AxialGrid, queen: object, foods: object, obstacles: object, trails: object, ants: object
-) -> dict[str, tuple[int, ...] | np.ndarray]:
+    grid: AxialGrid,
+    queens: object,
+    foods: object,
+    obstacles: object,
+    trails: object,
+    ants: object,
+    food_kinds: object,
+) -> dict[str, np.ndarray]:
     """Return the checked contents of a world by field, with coordinates in normal form."""
-    cell = _inside("queen", np.array([_row("queen", queen, "one cell (x, y, z)", 3)]), grid)
+    foods, kinds = _foods_and_kinds(foods, food_kinds)
     contents = {
+        "queens": _queens(queens, grid),
         "foods": _parse("foods", foods, grid),
         "obstacles": _parse("obstacles", obstacles, grid),
         "trails": _parse("trails", trails, grid, "level", MAX_TRAIL_LEVEL),
         "ants": _parse("ants", ants, grid, "heading", N_HEADINGS - 1),
     }
+    contents["foods"] = np.column_stack([contents["foods"], _kinds(kinds, contents["foods"])])
     stands = np.zeros(grid.size, dtype=np.uint8)  # the content of each cell, an index of _STANDS
-    stands[grid.index(cell)] = 1
     for name, rows in contents.items():
-        if name != "ants":
+        if name not in ("queens", "ants"):
             rows = rows[np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))]
         index = grid.index(rows[:, :3])
         _, first = np.unique(index, return_index=True)
@@ -53,13 +60,63 @@ def parse_contents(
                 f"{name} contain {_cell(rows[shared[0]])}, the cell of "
                 f"{_STANDS[stands[index[shared[0]]]]}; remove one of them."
             )
-        if name in ("foods", "obstacles"):
-            stands[index] = 2 if name == "foods" else 3
+        stands[index] = {"queens": 1, "foods": 2, "obstacles": 3}.get(name, stands[index])
         contents[name] = rows
     contents["trails"] = contents["trails"][contents["trails"][:, 3] > 0]
+    contents["food_kinds"] = contents["foods"][:, 3].astype(np.uint8)
+    contents["foods"] = np.ascontiguousarray(contents["foods"][:, :3])
     for rows in contents.values():
         rows.setflags(write=False)
-    return {"queen": _cell(cell[0]), **contents}
+    return contents
+
+
+def _queens(values: object, grid: AxialGrid) -> np.ndarray:
+    """Return the cells of the queens, int32 (N, 3), from one cell or a sequence of cells."""
+    entries = entries_of(values) or []
+    several = bool(entries) and all(entries_of(one) is not None for one in entries)
+    if not several:
+        return _inside(
+            "queen",
+            np.array([_row("queen", values, "one cell (x, y, z), or a list of cells", 3)]),
+            grid,
+        )
+    if len(entries) > MAX_NESTS:
+        raise AntsError(
+            f"queen has {len(entries)} cells; a world has at most {MAX_NESTS} nests, so list fewer."
+        )
+    return _inside("queen", _rows("queen", entries, "(x, y, z)", 3), grid)
+
+
+def _foods_and_kinds(foods: object, kinds: object) -> tuple[object, object]:
+    """Return cells and kinds of food, which may be given together as ((x, y, z), kind)."""
+    if isinstance(foods, np.ndarray):
+        together = foods.ndim == 2 and foods.shape[1] == 4
+        return (foods[:, :3], foods[:, 3]) if together else (foods, kinds)
+    entries = [entries_of(one) or [] for one in entries_of(foods) or []]
+    paired = [len(one) == 2 and entries_of(one[0]) is not None for one in entries]
+    if not any(paired):
+        return foods, kinds
+    pairs = [one if pair else [one, 0] for one, pair in zip(entries, paired, strict=True)]
+    return [cell for cell, _ in pairs], [kind for _, kind in pairs]
+
+
+def _kinds(values: object, foods: np.ndarray) -> np.ndarray:
+    """Return the kind of each food item, int32 (n, 1); without kinds, all are of the first."""
+    given = entries_of(values)
+    if not given:
+        return np.zeros((len(foods), 1), np.int32)
+    if len(given) != len(foods):
+        raise AntsError(
+            f"food_kinds has {count(len(given), 'entry')} for {count(len(foods), 'food item')}; "
+            "give one kind for each."
+        )
+    kinds = [whole(f"food_kinds[{i}]", kind) for i, kind in enumerate(given)]
+    wrong = [kind for kind in kinds if not 0 <= kind < MAX_FOOD_KINDS]
+    if wrong:
+        raise AntsError(
+            f"food_kinds contain {wrong[0]}; a kind must lie between 0 and {MAX_FOOD_KINDS - 1}."
+        )
+    return np.array(kinds, dtype=np.int32).reshape(-1, 1)
 
 
 def _parse(
@@ -85,8 +142,8 @@ def _inside(name: str, given: np.ndarray, grid: AxialGrid) -> np.ndarray:
     if len(outside):
         place = f"{name}[{outside[0]}]" if name != "queen" else name
         raise AntsError(
-            f"{place} is {tuple(given[outside[0]].tolist())}, outside the world; in the form whose "
-            f"smallest coordinate is 0, all must be below the ranges {grid.ranges}."
+            f"{place} is {tuple(given[outside[0]].tolist())}, outside the world; after the "
+            f"smallest coordinate is subtracted from all, x, y, z must be below {grid.ranges}."
         )
     return rows.astype(np.int32)
 

@@ -22,6 +22,7 @@ STARTS: tuple[str, ...] = get_args(Start)
 # The neighbours on the hexagonal grid in a 3 x 3 window (rows r, columns q).
 _NEIGHBOURS = np.array([[1, 1, 0], [1, 1, 1], [0, 1, 1]])
 _PARTS = ("foods", "obstacles", "trails", "ants")
+_MORE = ("food_kinds", "other_queens")  # empty in a world with one nest and one kind of food
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -34,14 +35,17 @@ class World:
 
     Attributes:
         ranges: (X, Y, Z), the number of values of each coordinate, in cells, each at least 1.
-        queen: (x, y, z), the queen's cell.
+        queen: (x, y, z), the cell of the queen of the first nest. Give one cell, or a sequence of
+            cells for several nests, at most 7.
         foods, obstacles: Cells with food or obstacles, int32 (n, 3). Give a sequence of (x, y, z),
-            or such an array.
+            or such an array. A food item can also be ((x, y, z), kind).
         trails: Cells with trails, int32 (T, 4) = x, y, z, level (ticks until the trail has
             evaporated). Give a sequence of ((x, y, z), level), or such an array. Level 0 means no
             trail. If `Pheromone.dense`, levels are float32, so those above 2**24 are rounded.
         ants: Listed ants, int32 (A, 4) = x, y, z, heading. Give a sequence of ((x, y, z), heading),
             or such an array. `start` places additional ants.
+        food_kinds: The kind of each food item, uint8 (n,), 0 to 7; empty if all are of kind 0.
+        other_queens: The cells of the queens of all nests but the first, int32 (N - 1, 3).
 
     Raises:
         AntsError: A value has the wrong form, is outside the world or listed twice, or shares a
@@ -54,25 +58,36 @@ class World:
     obstacles: np.ndarray = ()  # type: ignore[assignment]
     trails: np.ndarray = ()  # type: ignore[assignment]
     ants: np.ndarray = ()  # type: ignore[assignment]
+    food_kinds: np.ndarray = ()  # type: ignore[assignment]
+    other_queens: np.ndarray = ()  # type: ignore[assignment]
 
     if TYPE_CHECKING:  # arguments may be any sequences, but attributes are arrays
 
         def __init__(
             self,
             ranges: Sequence[int],
-            queen: Sequence[int],
+            queen: Sequence[int] | Sequence[Sequence[int]],
             foods: npt.ArrayLike = (),
             obstacles: npt.ArrayLike = (),
             trails: npt.ArrayLike = (),
             ants: npt.ArrayLike = (),
+            food_kinds: npt.ArrayLike = (),
+            other_queens: npt.ArrayLike = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
         ranges = validation.parse_ranges(self.ranges)
         grid = AxialGrid(ranges)
-        contents = validation.parse_contents(
-            grid, self.queen, self.foods, self.obstacles, self.trails, self.ants
+        queens: Any = self.queen
+        if len(self.other_queens):
+            queens = [self.queen, *np.asarray(self.other_queens).tolist()]
+        contents: dict[str, Any] = validation.parse_contents(
+            grid, queens, self.foods, self.obstacles, self.trails, self.ants, self.food_kinds
         )
+        queens = contents.pop("queens")
+        contents |= {"queen": tuple(queens[0].tolist()), "other_queens": queens[1:]}
+        if not contents["food_kinds"].any():
+            contents["food_kinds"] = contents["food_kinds"][:0]
         # The dataclass is frozen; only this code sets its fields.
         object.__setattr__(self, "ranges", ranges)
         for name, value in contents.items():
@@ -83,13 +98,35 @@ class World:
         """The layout of flat arrays; `grid.size` is the length of all arrays below."""
         return AxialGrid(self.ranges)
 
+    @cached_property
+    def queens(self) -> np.ndarray:
+        """The cells of the queens, int32 (N, 3), by nest."""
+        return np.concatenate([np.array([self.queen], np.int32), self.other_queens])
+
+    @property
+    def n_nests(self) -> int:
+        """The number of nests, 1 to 7."""
+        return 1 + len(self.other_queens)
+
+    @property
+    def n_food_kinds(self) -> int:
+        """The number of kinds of food, at least 1."""
+        return int(self.food_kinds.max(initial=0)) + 1
+
     def ground(self) -> np.ndarray:
         """Return EMPTY, OBSTACLE (also outside), FOOD or QUEEN by cell, uint8 (grid.size,)."""
         ground = np.where(self.grid.exists, np.uint8(EMPTY), np.uint8(OBSTACLE))
         ground[self.grid.index(self.obstacles)] = OBSTACLE
         ground[self.grid.index(self.foods)] = FOOD
-        ground[self.grid.index(self.queen)] = QUEEN
+        ground[self.grid.index(self.queens)] = QUEEN
         return ground
+
+    def kinds_by_cell(self) -> np.ndarray:
+        """Return the kind of the food in each cell, uint8 (grid.size,); 0 without food."""
+        kinds = np.zeros(self.grid.size, np.uint8)
+        if len(self.food_kinds):
+            kinds[self.grid.index(self.foods)] = self.food_kinds
+        return kinds
 
     def trail_levels(self) -> np.ndarray:
         """Return the trail level of each cell, int32 (grid.size,)."""
@@ -97,13 +134,16 @@ class World:
         levels[self.grid.index(self.trails[:, :3])] = self.trails[:, 3]
         return levels
 
-    def distances(self) -> np.ndarray:
-        """Return the steps to the queen without obstacles, int32 (grid.size,); 0 outside."""
-        return self.grid.distances(self.queen) * self.grid.exists
+    def distances(self, nest: int = 0) -> np.ndarray:
+        """Return the steps to a queen without obstacles, int32 (grid.size,); 0 outside."""
+        return self._far(nest) * self.grid.exists
 
-    def closer(self) -> np.ndarray:
-        """Return bit h by cell, 1 if the neighbour at heading h is nearer to the queen (uint8)."""
-        here = self.grid.distances(self.queen)
+    def _far(self, nest: int) -> np.ndarray:
+        return self.grid.distances(tuple(self.queens[nest].tolist()))
+
+    def closer(self, nest: int = 0) -> np.ndarray:
+        """Return bit h by cell, 1 if the neighbour at heading h is nearer to a queen (uint8)."""
+        here = self._far(nest)
         bits = np.zeros(self.grid.size, dtype=np.uint8)
         for heading, offset in enumerate(self.grid.offsets.tolist()):
             there = np.roll(here, -offset)
@@ -121,8 +161,9 @@ class World:
         return np.isin(regions, home[home > 0])
 
     def reachable_foods(self) -> np.ndarray:
-        """Return for each food item whether an ant can walk to it from the queen, bool (F,)."""
-        found = self.walkable(self.grid.index(self.queen) + self.grid.offsets)
+        """Return for each food item whether an ant can walk to it from a queen, bool (F,)."""
+        around = self.grid.index(self.queens)[:, None] + self.grid.offsets
+        found = self.walkable(around.reshape(-1))
         return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
 
     def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
@@ -131,7 +172,8 @@ class World:
         Args:
             seed: Any whole number; determines cells (ties of distance) and headings of placed ants.
             n: Number of ants, at least 1; the first n listed ants if there are more.
-            where: "nest" for the free cells nearest to the queen, "spread" for any free cells.
+            where: "nest" for the free cells nearest to the ant's queen, "spread" for any free
+                cells. With several nests, ants choose in the order of their numbers.
         """
         seed, n = whole("seed", seed), whole("n", n)
         if n < 1:
@@ -144,6 +186,17 @@ class World:
             headings = np.concatenate([headings, choose(words >> np.uint64(32), N_HEADINGS)])
             cells = np.concatenate([cells, placed])
         return cells.astype(np.int32), headings.astype(np.int32)
+
+    def nests_of(self, n: int) -> np.ndarray:
+        """Return the nests of the ants that start, int32 (n,), by number.
+
+        A listed ant belongs to the nearest queen, or to the first of several; ant number i to nest
+        i % N otherwise.
+        """
+        far = np.stack([self._far(nest) for nest in range(self.n_nests)])
+        listed = far[:, self.grid.index(self.ants[:n, :3])].argmin(axis=0)
+        others = np.arange(len(listed), n) % self.n_nests
+        return np.concatenate([listed, others]).astype(np.int32)
 
     def first_starts(self, seeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return `start` of one ant in the nest for each seed, uint64 (n,)."""
@@ -171,6 +224,8 @@ class World:
                 f"the number of ants is {shown(n + len(taken))}; this world has room for "
                 f"{len(index) + len(taken)}, so start fewer ants or choose a larger world."
             )
+        if where == "nest" and self.n_nests > 1:
+            return self._cells_of_nests(seed, n, len(taken), free)
         if where == "nest":
             distance = self.distances()[index]
             # Only cells up to the distance of the n-th cell need a hash and an order.
@@ -183,15 +238,29 @@ class World:
         first = np.argpartition(words, n - 1)[:n]
         return index[first[np.argsort(words[first])]]
 
+    def _cells_of_nests(self, seed: int, n: int, n_taken: int, free: np.ndarray) -> np.ndarray:
+        """Return a free cell for each of n ants in turn, by distance to its queen, then by hash."""
+        free, (index,) = free.copy(), np.nonzero(free)
+        words = stream_state(seed, STREAM_START_CELL, self.grid.number(self.grid.cells(index)))
+        far = (self._far(nest)[index] for nest in range(self.n_nests))
+        queues = [iter(index[np.lexsort((words, one))].tolist()) for one in far]
+        cells = np.empty(n, np.int64)
+        for i, nest in enumerate(self.nests_of(n_taken + n)[n_taken:].tolist()):
+            cells[i] = next(cell for cell in queues[nest] if free[cell])
+            free[cells[i]] = False
+        return cells
+
     def as_dict(self) -> dict[str, Any]:
         """Return the world as names and lists of numbers; `from_dict` reads it."""
         parts = {name: getattr(self, name).tolist() for name in _PARTS}
+        parts |= {name: getattr(self, name).tolist() for name in _MORE if len(getattr(self, name))}
         return {"ranges": [*self.ranges], "queen": [*self.queen], **parts}
 
     @classmethod
     def from_dict(cls, facts: Mapping[str, Any]) -> World:
         """Return the world of `as_dict`; raises ValueError, KeyError or TypeError."""
-        return cls(facts["ranges"], facts["queen"], *(np.array(facts[n]) for n in _PARTS))
+        more = {name: np.array(facts[name]) for name in _MORE if name in facts}
+        return cls(facts["ranges"], facts["queen"], *(np.array(facts[n]) for n in _PARTS), **more)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, World):
@@ -203,15 +272,18 @@ class World:
 
     @cached_property
     def _key(self) -> tuple:
-        return (self.ranges, self.queen, *(getattr(self, name).tobytes() for name in _PARTS))
+        arrays = (getattr(self, name).tobytes() for name in (*_PARTS, *_MORE))
+        return (self.ranges, self.queen, *arrays)
 
     def __reduce__(self) -> tuple:
         # Copies and unpickled worlds are built from their contents, so that arrays are read-only.
-        return World, (self.ranges, self.queen, *(getattr(self, name) for name in _PARTS))
+        arrays = (getattr(self, name) for name in (*_PARTS, *_MORE))
+        return World, (self.ranges, self.queen, *arrays)
 
     def __repr__(self) -> str:
+        queens = f"queen={self.queen}" if self.n_nests == 1 else f"queens: {self.n_nests}"
         return (
-            f"World(ranges={self.ranges}, queen={self.queen}, foods: {len(self.foods)}, "
+            f"World(ranges={self.ranges}, {queens}, foods: {len(self.foods)}, "
             f"obstacles: {len(self.obstacles)}, trails: {len(self.trails)}, "
             f"ants: {len(self.ants)})"
         )

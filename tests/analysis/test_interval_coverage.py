@@ -81,7 +81,7 @@ def coverage_table(data: dict[str, np.ndarray], level: float | None, draws: int)
         estimates = (pool.mean(), interquartile_mean(pool[None])[0])
         lines.append([name, *(f"{estimator:.2f}" for estimator in estimates), *cells])
     headers = [f"{'IQM' if iqm else 'mean'}, {size}" for iqm, size in kinds]
-    return Table("", ["Of 50 episodes", "mean", "IQM", *headers], lines).markdown()
+    return Table("", ["Of the last 50 episodes", "mean", "IQM", *headers], lines).markdown()
 
 
 def test_the_coverage_of_a_known_pool() -> None:

@@ -514,7 +514,7 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
     assert lines[4][2] == f"{greedy:.1f}"
     assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in tables
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert "the discount is 1.0, but must be at least 0 and below 1" in page
+    assert "the discount is 1.0; it must be at least 0 and below 1" in page
     assert max(len(line) for line in out.splitlines()[:-2]) < 80
 
 

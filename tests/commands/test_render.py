@@ -382,7 +382,11 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
         and not path.startswith(("tests/", "docs/lessons/"))  # which others make
     }
     of_benchmarks = ("growth.png", "peers.png")
-    drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *of_benchmarks)
+    of_guides = (
+        "measures.png",
+        "home_trail.png",
+    )  # examples of docs/measures.md and docs/models.md
+    drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *of_benchmarks, *of_guides)
     figures = {f"docs/figures/{name}" for name in drawn}
     assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
 

@@ -7,7 +7,7 @@ import pytest
 from random_worlds import random_world
 
 from taichi_ants import AntsError, Colony, TrainingConfig, rollout, train
-from taichi_ants.task import Observation, Task, observations
+from taichi_ants.task import Field, Observation, Task, observations
 from taichi_ants.task.observations import registry
 from taichi_ants.worlds import World, paper
 
@@ -179,3 +179,54 @@ def test_what_taichi_cannot_compile_is_refused_and_taichi_goes_on(capfd):
         train(paper(), CONFIG, 0, 2, 50, task)
     assert capfd.readouterr() == ("", "")
     assert train(paper(), CONFIG, 0, 2, 50).q_values.any()
+
+
+def of_home(view):
+    """Which of the cells ahead have a higher level of the field, and whether this one has any."""
+    index = 0
+    for k in range(3):
+        index = 2 * index
+        if view.home[k] > view.own_home:
+            index += 1
+    if view.own_home >= 1:
+        index += 8
+    return index
+
+
+@pytest.mark.parametrize("diffusion", [0.0, 0.3])
+def test_a_field_is_read_by_its_name(diffusion):
+    """After each tick, the states are those that the levels of the snapshot give."""
+    observations.register(Observation("homely", 16, of_home, reads=("home",)))
+    home = Field(laid="without_food", deposit="fading", diffusion=diffusion)
+    rules = {"fields": {"other": Field(), "home": home}, "evaporation_in_training": True}
+    colony = Colony(random_world(5, 7), Task("homely", **rules), CONFIG, ants=6)
+    colony.begin_episode()
+    seen = set()
+    for _ in range(30):
+        colony.tick()
+        now, grid = colony.snapshot(), colony.grid
+        level, open_to_ants = now.fields["home"], now.ground == 0
+        for cell, heading, state in zip(
+            colony.cells[0].tolist(), colony.headings[0].tolist(), colony.states[0], strict=True
+        ):
+            ahead = [cell + grid.offsets[(heading + turn) % 6] for turn in (-1, 0, 1)]
+            levels = [level[one] * (open_to_ants[one] and grid.exists[one]) for one in ahead]
+            bits = [one > level[cell] for one in levels]
+            assert state == 8 * (level[cell] >= 1) + 4 * bits[0] + 2 * bits[1] + bits[2]
+            seen.add(int(state))
+    assert len(seen) > 5
+
+
+@pytest.mark.parametrize("reads", [("codes",), ("a", "a"), ("own_a", "a"), (3,), ("no name",)])
+def test_fields_to_read_have_names_of_their_own(reads):
+    with pytest.raises(AntsError, match=r"^reads of 'homely' contains .*\.$"):
+        observations.register(Observation("homely", 16, of_home, reads=reads))
+
+
+def test_a_field_that_the_task_lacks_cannot_be_read():
+    observations.register(Observation("homely", 16, of_home, reads=("home",)))
+    with pytest.raises(AntsError, match=r"reads the field 'home'; add `task\.fields\.home`\.$"):
+        Task("homely")
+    task = Task("homely", fields={"home": Field()})
+    with pytest.raises(AntsError, match=r"only the trail and the compass, so use a Colony\.$"):
+        train(paper(), CONFIG, 0, task=task)

@@ -114,7 +114,7 @@ def test_what_others_wrote_needs_a_world():
     ]
     given = {"action_space": spaces.Discrete(5), "observation_space": spaces.Discrete(128)}
     other = minari.create_dataset_from_buffers("others/ants-v0", buffers, **given)
-    with pytest.raises(AntsError, match="give world and task"):
+    with pytest.raises(AntsError, match="give the arguments world and task"):
         from_minari(other)
     read = from_minari(other, worlds.paper())
     assert np.array_equal(read.state, data.state)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 from command_lines import ROOT
 
-from taichi_ants import TrainingConfig
+from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.commands import watch
 from taichi_ants.live.choices import TASKS, Choices, fields
-from taichi_ants.settings import all_of
+from taichi_ants.settings import Named, all_of
 from taichi_ants.task import Task
 from taichi_ants.worlds import double_bridge
 
@@ -25,13 +26,26 @@ def test_the_form_makes_the_tasks_that_have_names(name):
 def test_the_form_has_every_setting_with_its_bounds():
     offered = {one["path"]: one for one in fields()}
     declared = [*all_of(Task), *all_of(TrainingConfig), *all_of(double_bridge)]
-    paths = {one.path for one in declared if not one.is_group} - {"training.learner"}
+    shown = [one for one in declared if not one.is_group and one.kind is not Named]
+    paths = {one.path for one in shown} - {
+        "training.learner",
+        "task.outbound_cue",
+        "task.homing_cue",
+    }
     assert paths < offered.keys()
     half_life = offered["task.pheromone.half_life"]
     assert (half_life["above"], half_life["default"], half_life["unit"]) == (0, 50.0, "ticks")
     assert half_life["only"] == ["task.pheromone.evaporation", "exponential"]
     assert offered["training.planning_steps"]["learner"] != ""
     assert offered["world.aside"]["world"] == "double_bridge"
+
+
+def test_fields_that_the_page_cannot_show_are_refused():
+    chosen = Choices({}).chosen(Choices({}).setup(watch.START))
+    Choices({}).setup(chosen)  # without the cues, which the form does not have
+    for rules in ({"fields": {"home": {}}}, {"homing_cue": "trail"}):
+        with pytest.raises(AntsError, match=r"only the trail and the compass, so draw a Colony"):
+            replace(Choices({}).setup(watch.START), task=Task(**rules))
 
 
 def test_settings_of_the_form_reach_the_session():

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_choices import NO_NOISE, NOISE
 from random_colonies import random_colony
 from random_edits import apply_to_both, random_edit
 from same_colonies import assert_equal
@@ -15,7 +16,7 @@ from same_colonies import assert_equal
 from taichi_ants import AntsError, Colony, TrainingConfig, worlds
 from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.engines.colony.layout import Stage, WorldRow
+from taichi_ants.engines.colony.layout import NestRow, Stage, WorldRow
 from taichi_ants.live import edits
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.interventions import Interventions as PlainInterventions
@@ -24,9 +25,9 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 # Each entry takes kernels of its own, see tests/engines/colony/test_against_reference.py.
 KERNELS = [
-    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest", "ab", ("trail", "b")),
     ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),
-    ("double_q", "independent", "ants_seen", True, "blocking", "half"),
+    ("double_q", "independent", "ants_seen", True, "blocking", "half", "aB", ("a", "B")),
     ("dyna_q", "shared", "trail_levels", True, "blocking", "half"),
     ("n_step_sarsa", "independent", "paper", False, "blocking", "half"),
 ]
@@ -46,7 +47,8 @@ def assert_sound(interventions: Interventions) -> None:
     assert (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all()
     bare = colony.snapshot().ground
     assert (arrays["walls"] == (bare == OBSTACLE)).all()
-    assert np.flatnonzero(bare == QUEEN).tolist() == [world[WorldRow.QUEEN_CELL]]
+    queens = colony.arrays["nests"][NestRow.QUEEN_CELL].tolist()
+    assert np.flatnonzero(bare == QUEEN).tolist() == queens
     assert colony.snapshot().trail[bare == OBSTACLE].sum() == 0
     later = interventions.world()
     assert (later.closer() == arrays["closer"]).all()
@@ -55,7 +57,7 @@ def assert_sound(interventions: Interventions) -> None:
 
 @pytest.mark.parametrize("kernel", MARKED, ids=lambda kernel: "-".join(map(str, kernel[:4])))
 def test_edits_keep_colony_and_reference_equal(kernel):
-    learner, sharing, observation, dense, traffic, view = kernel
+    learner, sharing, observation, dense, traffic, view, *fields = kernel
     done, refused = {}, 0
     for seed in range(8):
         rng = np.random.default_rng(seed)
@@ -64,6 +66,9 @@ def test_edits_keep_colony_and_reference_equal(kernel):
             traffic=traffic,
             view=view,
             changes=True,
+            choice="softmax" if learner == "q_learning" else "greedy",
+            noise=NOISE if learner == "q_learning" else NO_NOISE,
+            **dict(zip(("fields", "cues"), fields, strict=False)),
         )
         population = {**drawn.population, "ends_at_delivery": False}
         population["capacity"] = population["ants"] + int(rng.integers(0, 9))

@@ -181,7 +181,7 @@ def test_what_cannot_be_recorded(change, says):
 def test_colonies_in_different_worlds_are_refused():
     places = [worlds.open_world(seed, (6, 6, 6)) for seed in range(2)]
     config = TrainingConfig("q_learning", 0.3, 0.9, 0.3, 1.0)
-    with pytest.raises(AntsError, match="different worlds"):
+    with pytest.raises(AntsError, match="worlds of the colony differ"):
         record_colony(Colony(places, None, config, (0, 1), 2))
     with pytest.raises(AntsError, match="colony is 3"):
         record_colony(3)

@@ -12,7 +12,7 @@ from transitions import transition
 
 from taichi_ants.errors import AntsError
 from taichi_ants.reference import LEARNERS
-from taichi_ants.reference.actions import choose_action
+from taichi_ants.reference.choice import choose_action
 from taichi_ants.reference.random_stream import RandomStream
 
 BY_ERROR = [name for name in LEARNERS if LEARNERS[name].shares]

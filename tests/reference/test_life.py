@@ -48,7 +48,7 @@ def test_a_food_given_becomes_an_ant_that_faces_away(seed):
     assert (born.carries, born.age, born.action, born.reward) == (False, 0, -1, 0)
     assert born.state == observe(colony.world, born)
     assert born.stream.state == stream_state(seed, STREAM_BORN, 1)
-    assert colony.store == 0
+    assert colony.stores[0] == 0
     assert n_draws(colony.queen_stream.state, stream_state(seed, STREAM_QUEEN, 0)) == 1
     assert (colony.record.births, colony.record.deliveries) == (1, 1)
     # It did not act in the tick of its birth; in the next one it draws its first action.
@@ -66,7 +66,7 @@ def test_without_births_the_food_is_just_received():
     colony = begun(around(3), births=False, capacity=5)
     load(colony, 0)
     act(colony, GIVE)
-    assert (len(colony.ants), colony.store, colony.record.births) == (1, 0, 0)
+    assert (len(colony.ants), colony.stores[0], colony.record.births) == (1, 0, 0)
     assert colony.queen_stream.state == stream_state(0, STREAM_QUEEN, 0)
 
 
@@ -100,13 +100,13 @@ def test_the_food_waits_while_no_neighbour_is_free():
     colony = begun(around(*range(6)), births=True)
     load(colony, *range(6))
     act(colony, *[GIVE] * 6)
-    assert (len(colony.ants), colony.store, colony.record.births) == (6, 6, 0)
+    assert (len(colony.ants), colony.stores[0], colony.record.births) == (6, 6, 0)
     assert colony.queen_stream.state == stream_state(0, STREAM_QUEEN, 0)  # no draw in vain
     # The ant at heading 2 turns round and goes: its cell is free in this very tick, for one.
     colony.ants[2].heading = 2
     colony.observe(colony.ants[2])
     act(colony, GIVE, GIVE, FORWARD, GIVE, GIVE, GIVE)
-    assert (len(colony.ants), colony.store, colony.record.births) == (7, 5, 1)
+    assert (len(colony.ants), colony.stores[0], colony.record.births) == (7, 5, 1)
     assert (colony.ants[6].cell, colony.ants[6].heading) == (neighbour(QUEEN, 2), 2)
 
 
@@ -114,16 +114,16 @@ def test_the_food_waits_while_the_colony_is_full_and_slots_are_free_a_tick_after
     colony = begun(around(1, 4), births=True, capacity=3, lifespan=3)
     load(colony, 0, 1)
     act(colony, GIVE, GIVE)
-    assert (sorted(colony.ants), colony.store) == ([0, 1, 2], 1)
+    assert (sorted(colony.ants), colony.stores[0]) == ([0, 1, 2], 1)
     act(colony, *[GIVE] * 3)
     act(colony, *[GIVE] * 3)
     # Ticks 0, 1, 2: the first two are 3 ticks old and die, after the births of this tick.
-    assert (sorted(colony.ants), colony.store) == ([2], 1)
+    assert (sorted(colony.ants), colony.stores[0]) == ([2], 1)
     assert colony.ants[2].age == 2
     act(colony, GIVE)
     # The newborn takes the lowest slot; the ant in slot 2 has died in turn.
     assert {slot: ant.number for slot, ant in colony.ants.items()} == {0: 3}
-    assert colony.store == 0
+    assert colony.stores[0] == 0
     record = colony.record
     assert (record.births, record.deaths) == (2, 3)
 
@@ -144,10 +144,10 @@ def test_the_queens_stream_runs_on_and_her_store_does_not():
     colony = begun(around(*range(6), ranges=(2, 2, 2)), births=True)
     load(colony, 0)
     act(colony, *[GIVE] * 6)
-    assert colony.store == 1
+    assert colony.stores[0] == 1
     colony.end_episode()
     colony.begin_episode()
-    assert colony.store == 0
+    assert colony.stores[0] == 0
     colony = begun(around(3), births=True)
     for n_births in (1, 2):
         load(colony, 0)

@@ -54,6 +54,10 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
     "Checkpoint": [("a checkpoint", lambda wrong: next(rendering.learning_frames([wrong])))],
     "Status": [("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong))],
     "at_start": [("world", of(at_start))],
+    "picture": [
+        ("world", of(rendering.picture)),
+        ("size", lambda wrong: rendering.picture(WORLD, wrong)),
+    ],
     "check_animation": [
         ("path", of(rendering.check_animation, 8)),
         ("fps", lambda wrong: rendering.check_animation("a.gif", wrong)),

@@ -32,7 +32,7 @@ def never() -> bool:
 
 @pytest.mark.parametrize(
     ("render", "writer", "ticks"),
-    [("a.gif", "_gif", 6), ("frames", "_png", 6), ("a.png", "_png", 20)],
+    [("a.gif", "_gif", 6), ("frames", "png", 6), ("a.png", "png", 20)],
 )
 def test_a_colony_is_saved_although_its_picture_cannot_be(
     tmp_path, monkeypatch, render, writer, ticks

@@ -42,6 +42,7 @@ def begun(
     names = {field.name for field in fields(Life)}
     life = Life(**{name: options.pop(name) for name in names & options.keys()})
     named = ("pheromone", "delivery", "observation", "rewards", "traffic")
+    named += ("fields", "outbound_cue", "homing_cue")
     rules = {name: options.pop(name) for name in named if name in options}
     task = Task(evaporation_in_training=True, life=life, **rules)
     colony = ReferenceColony(

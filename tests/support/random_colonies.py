@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from random_choices import NO_NOISE, random_choice, random_noise
 from random_worlds import random_world
 
 from taichi_ants import TrainingConfig
 from taichi_ants.engines.colony.state import SHARINGS
-from taichi_ants.task import Life, Pheromone, Rewards, Task, observations
+from taichi_ants.task import Field, Food, Life, Pheromone, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY, GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds import World
 from taichi_ants.worlds.world import STARTS
@@ -25,7 +26,7 @@ class RandomColony:
     world: World
     task: Task
     population: dict[str, Any]
-    training: TrainingConfig
+    training: TrainingConfig | None
     seed: int
     sharing: str
     q_values: np.ndarray | None
@@ -43,11 +44,21 @@ def random_colony(
     traffic: str = "blocking",
     view: str = "half",
     changes: bool = False,
+    fields: str = "",
+    cues: tuple[str, str] = ("trail", "compass"),
+    choice: str = "greedy",
+    noise: str = NO_NOISE,
 ) -> RandomColony:
     """Return the random colony of a seed.
 
     `sharing`, `learner` and `dense` (trails as real numbers) are random unless they are given. With
     `changes`, ants are born or die and food grows back or wanders, which uses separate kernels.
+
+    Each letter of `fields` names a further pheromone. Those of capitals are dense, the others are
+    not; all else about them is random, except the views of `cues`, outbound and homing.
+
+    `choice` is the rule, with random numbers, and `noise` names its kinds. Ants that choose by
+    "deneubourg" have no training, so their `sharing` must be "frozen".
     """
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
@@ -56,6 +67,9 @@ def random_colony(
     population, task = _rules(rng, min(room, most_ants), dense, changes)
     training, delivery = _training(rng, learner)
     given = sharing == "frozen" or rng.random() < 0.6
+    chooses = random_choice(seed, choice)
+    if not chooses.needs_table:
+        training, given = None, False
     return RandomColony(
         world=world,
         task=replace(
@@ -64,8 +78,13 @@ def random_colony(
             rewards=rewards or Rewards(),
             observation=observation,
             pheromone=replace(task.pheromone, view=view),
+            fields={name: _field(seed, name, view) for name in fields},
+            outbound_cue=cues[0],
+            homing_cue=cues[1],
             traffic=traffic,
             turns_at_queen=bool(rng.random() < 0.5),
+            choice=chooses,
+            noise=random_noise(seed, noise),
         ),
         population=population,
         training=training,
@@ -73,6 +92,37 @@ def random_colony(
         sharing=sharing,
         q_values=forager(observation) if given else None,
     )
+
+
+def with_nests(drawn: RandomColony, seed: int, nests: int, kinds: int, loads: bool) -> RandomColony:
+    """Return a random colony in a world with more queens, kinds of food, and loads in cells.
+
+    A world that is too small for so many queens has fewer. Food of several kinds does not wander.
+    """
+    rng = np.random.default_rng([seed, 3])
+    world, life = drawn.world, drawn.task.life
+    ants, taken = drawn.population["ants"], world.grid.index(world.ants[:, :3])
+    free = np.setdiff1d(np.flatnonzero(world.ground() == EMPTY), taken)
+    more = min(nests - 1, len(free) - 1, max(0, len(free) + len(taken) - ants))
+    queens = world.grid.cells(rng.permutation(free)[:more])
+    foods = {
+        f"kind_{k}": Food(
+            pick_up=int(rng.integers(-2, 9)),
+            deliver=int(rng.integers(-2, 30)),
+            loads=int(rng.integers(1, 5)) if loads else 1,
+            regrowth=int(rng.choice([0, 1, 4])) if rng.random() < 0.7 else None,
+        )
+        for k in range(kinds)
+    }
+    several = kinds > 1 or loads
+    life = replace(life, regrowth=None, wander=None if several else life.wander)
+    world = replace(
+        world,
+        other_queens=queens,
+        food_kinds=rng.integers(0, kinds, len(world.foods)),
+        trails=world.trails,
+    )
+    return replace(drawn, world=world, task=replace(drawn.task, foods=foods, life=life))
 
 
 def forager(observation: str = "paper") -> np.ndarray:
@@ -134,6 +184,15 @@ def _pheromone(rng: np.random.Generator, dense: bool | None) -> Pheromone:
         cap=int(rng.choice([1, 10, 1000])) if deposit == "add" else None,
         slope=int(rng.choice([1, 10, 100])) if deposit == "fading" else None,
     )
+
+
+def _field(seed: int, name: str, view: str) -> Field:
+    """Return a random field, which is dense if its name is a capital."""
+    rng = np.random.default_rng([seed, 4, ord(name)])
+    rules = vars(_pheromone(rng, name.isupper()))
+    laid = rng.choice(["with_food", "without_food", "always", "dead_end", "failed_pick_up"])
+    laid = laid if rng.random() < 0.9 else "never"
+    return Field(**{**rules, "view": view, "laid": str(laid)})
 
 
 def _training(rng: np.random.Generator, learner: str | None) -> tuple[TrainingConfig, str]:

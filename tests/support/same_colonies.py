@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from taichi_ants import Colony
-from taichi_ants.engines.colony.layout import FoodSourceRow, WorldRow
+from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, WorldRow
 from taichi_ants.reference import ReferenceColony
+from taichi_ants.task.constants import FOOD
 
 
 def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None:
@@ -28,14 +29,35 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
             assert mine["age"] == ant.age
         assert (mine["percept"], states[slot]) == (ant.percept, ant.state)
         assert int(mine["streams"]) == ant.stream.state
+        assert mine["action"] == ant.action
         if ant.action >= 0:
+            assert colony.executed[world, slot] == ant.executed
             assert mine["event"] == ant.event
-            assert arrays["rewards"][ant.event] == ant.reward
+            if not colony.task.foods:  # their rewards are in the sum of returns
+                assert arrays["rewards"][ant.event] == ant.reward
+        assert colony.nests[world, slot] == ant.nest
+        if colony.n_kinds > 1 and ant.carries:
+            assert mine["kind"] == ant.kind
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(plain.world.ground.values())
+    food = np.flatnonzero(ours.ground == FOOD)
+    at = world * grid.size + food
+    their_foods = [tuple(cell) for cell in grid.cells(food).tolist()]
+    if colony.n_kinds > 1:
+        kinds = [plain.world.kinds[cell] for cell in their_foods]
+        assert arrays["kind_of"][at].tolist() == kinds
+    if colony.task.has_loads:
+        loads = [plain.world.loads[cell] for cell in their_foods]
+        assert arrays["loads"][at].tolist() == loads
     levels = np.array([plain.world.trail.level(cell) for cell in plain.world.ground])
     assert np.array_equal(ours.trail[places], levels.astype(ours.trail.dtype))
+    assert list(ours.fields) == ["trail", *plain.world.fields]
+    for name, field in ours.fields.items():
+        levels = np.array(
+            [plain.world.pheromone_named(name).level(cell) for cell in plain.world.ground]
+        )
+        assert np.array_equal(field[places], levels.astype(field.dtype)), name
     assert np.array_equal(colony.q_values[world], plain.q_values)
     assert int(arrays["queen_streams"][world]) == plain.queen_stream.state
     _assert_equal_records(colony, plain, world)
@@ -49,7 +71,10 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     for name in (*names, "carried"):
         assert getattr(outcome, name)[0, world] == getattr(record, name), name
     assert outcome.regrown[0, world] == record.regrown
-    assert row[WorldRow.STORE] == plain.store
+    stores = colony.arrays["nests"][NestRow.STORE].reshape(-1, colony.n_nests)[world]
+    assert stores.tolist() == plain.stores
+    apart = outcome.deliveries_apart[0, world]
+    assert {(int(n), int(k)): int(apart[n, k]) for n, k in np.argwhere(apart)} == record.apart
     first = world * colony.n_food_sources
     food_sources = colony.arrays["food_sources"][:, first : first + row[WorldRow.FOOD_SOURCES]]
     theirs = plain.food_sources.food_sources[: food_sources.shape[1]]
@@ -58,5 +83,6 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     ]
     cells = colony.snapshot(world).grid.cells(food_sources[FoodSourceRow.CELL]).tolist()
     assert cells == [list(source.cell) for source in theirs]
+    assert food_sources[FoodSourceRow.KIND].tolist() == [source.kind for source in theirs]
     if colony.sharing == "shared" and colony.training.learner == "dyna_q":
         assert colony.arrays["integers"][0] == len(plain.minds.tables[0].model)

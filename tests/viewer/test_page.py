@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import re
 import sys
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import taichi_ants
-from taichi_ants import AntsError, Colony, TrainingConfig, rollout, task, worlds
+from taichi_ants import AntsError, Colony, TrainingConfig, World, rollout, task, worlds
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import Episode, colours
@@ -96,7 +97,7 @@ def test_text_can_be_read_and_ants_stand_out(theme):
     assert levels == sorted(levels, reverse=theme == 0)
 
 
-def test_notebooks_show_traces_and_colonies(monkeypatch):
+def test_notebooks_show_worlds_traces_and_colonies(monkeypatch):
     """By IPython's formatter, to which the package tells it when it is imported."""
     display = pytest.importorskip("IPython.core.formatters").DisplayFormatter()
     shell = SimpleNamespace(display_formatter=display)
@@ -121,6 +122,12 @@ def test_notebooks_show_traces_and_colonies(monkeypatch):
     assert "<iframe " in html_of(colony)
     assert colony.ticks == 0
     assert "<iframe " in html_of(record_colony(colony, ticks=2))
+    for world in (worlds.paper(), World((3, 4, 1), (0, 0, 0))):
+        alternative, source = re.findall(r'"([^"]*)"', html_of(world))
+        assert html.unescape(alternative) == repr(world)
+        content = base64.b64decode(source.removeprefix("data:image/png;base64,"))
+        assert content.startswith(b"\x89PNG")
+    assert html_of(World((600, 600, 1), (0, 0, 0))) is None
 
 
 def test_the_command_writes_pages(tmp_path, capsys):

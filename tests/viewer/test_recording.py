@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from playback import played, unpack, unpacked
+from random_choices import NO_NOISE, NOISE
 from random_colonies import random_colony
 
 from taichi_ants import (
@@ -53,6 +54,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
             dense=dense,
             traffic=traffic,
             changes=True,
+            noise=NOISE if sharing == "independent" else NO_NOISE,
         )
         rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
         given = (drawn.world, drawn.task, drawn.training, drawn.seed)
@@ -98,7 +100,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
             assert met == {entry // 5 for entry in moment.values}
             if before is not None:
                 assert before.numbers.tolist() == [one.number for one in did]
-                assert moment.actions.tolist() == [one.action for one in did]
+                assert moment.actions.tolist() == [one.executed for one in did]
                 assert rewards[moment.events].tolist() == [one.reward for one in did]
                 assert len(moment.td_errors) == (len(did) if sharing != "frozen" else 0)
             before = moment

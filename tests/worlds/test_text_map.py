@@ -84,8 +84,11 @@ def test_settings() -> None:
         ("", "the map has no cells"),
         (" \n\n; nothing\n", "the map has no cells"),
         (".\n  .", "no queen"),
-        ("Q\n  .\nQ", "line 3, column 1 of the map has 'Q', a second queen"),
-        ("Q\n  x", r"line 2, column 3 of the map has 'x'; use only \. # F Q t, 0 to 5, a to f"),
+        ("Q\n  .\nQ", "line 3, column 1 of the map has 'Q' a second time"),
+        (
+            "Q\n  x",
+            r"line 2, column 3 of the map has 'x'; use only \. # t, F G H I, Q R S U, 0 to 5",
+        ),
         ("; c\nQ\n\t.", r"line 3, column 1 of the map has '\\t'; use only"),
         ("Q\n  6", "line 2, column 3 of the map has '6'"),
         ("Q\n  ö", "line 2, column 3 of the map has 'ö'"),

@@ -1,12 +1,14 @@
 """Every way to misdescribe a world is refused with a sentence that names the value."""
 
+import pickle
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from taichi_ants.errors import AntsError
-from taichi_ants.worlds import World
+from taichi_ants.worlds import World, from_text, to_text
 
 HUGE = 10**5000  # more digits than Python writes
 
@@ -38,13 +40,53 @@ def test_ranges(ranges: object) -> None:
         world(ranges=ranges)
 
 
+def test_several_nests_and_kinds_of_food() -> None:
+    one = World((6, 6, 6), [(0, 0, 0), (5, 1, 0)], [((3, 3, 0), 1), (2, 2, 0), ((1, 0, 1), 2)])
+    assert one.queen == (0, 0, 0)
+    assert one.queens.tolist() == [[0, 0, 0], [5, 1, 0]]
+    assert one.foods.tolist() == [[1, 0, 1], [2, 2, 0], [3, 3, 0]]  # kinds are sorted with them
+    assert one.food_kinds.tolist() == [2, 0, 1]
+    assert (one.n_nests, one.n_food_kinds) == (2, 3)
+    assert one == replace(one) == World.from_dict(one.as_dict()) == pickle.loads(pickle.dumps(one))
+    assert one != replace(one, other_queens=()) != replace(one, food_kinds=())
+    assert from_text(to_text(one)).n_nests == 2
+    (here,) = np.nonzero(one.kinds_by_cell() == 2)
+    assert one.grid.cells(here).tolist() == [[1, 0, 1]]
+
+
+def test_ants_start_around_their_own_queen() -> None:
+    one = World((9, 9, 9), [(0, 0, 0), (8, 0, 0)], ants=[((7, 0, 0), 3), ((1, 0, 0), 0)])
+    assert one.nests_of(6).tolist() == [1, 0, 0, 1, 0, 1]  # listed ants are next to queens 1, 0
+    cells, _ = one.start(5, 6)
+    far = np.stack([one.distances(0), one.distances(1)])[:, cells]
+    assert (far[one.nests_of(6), range(6)] == 1).all()
+    assert len(set(cells.tolist())) == 6
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"queen": [(0, 0, 0), (0, 0, 0)]}, "queens contain (0, 0, 0) more than once"),
+        ({"queen": [(0, i, 0) for i in range(8)]}, "queen has 8 cells; a world has at most 7"),
+        ({"queen": [(0, 0, 0), (1, 0)]}, "queen[1] is (1, 0); it must be (x, y, z)"),
+        ({"foods": [((1, 0, 0), 8)]}, "food_kinds contain 8; a kind must lie between 0 and 7"),
+        ({"foods": [((1, 0, 0), 0.5)]}, "food_kinds[0] is 0.5"),
+        ({"foods": [(1, 0, 0)], "food_kinds": [0, 1]}, "food_kinds has 2 entries for 1 food item"),
+    ],
+)
+def test_wrong_nests_and_kinds(changes: dict, message: str) -> None:
+    with pytest.raises(AntsError) as caught:
+        world(**changes)
+    assert message in str(caught.value)
+
+
 def test_ranges_that_need_too_much_memory() -> None:
     with pytest.raises(AntsError, match=r"\(100000, 100000, 1\).*smaller ranges"):
         world(ranges=(100_000, 100_000, 1))
 
 
 @pytest.mark.parametrize(
-    "queen", [(0, 0), (0.0, 0, 0), (np.nan, 0, 0), "000", None, 7, [(0, 0, 0)], np.zeros(3)]
+    "queen", [(0, 0), (0.0, 0, 0), (np.nan, 0, 0), "000", None, 7, [], np.zeros(3)]
 )
 def test_the_queen_is_one_cell(queen: object) -> None:
     with pytest.raises(AntsError, match=r"queen is .*one cell \(x, y, z\)"):
@@ -75,7 +117,7 @@ def test_the_queen_is_inside(queen: tuple) -> None:
         ([(10**30, 0, 0)], "[0] is (1000"),
         ([(HUGE, 0, 0)], "[0] is a huge number"),
         (np.array([1, 0, 0]), " is an array of shape (3,)"),
-        (np.ones((2, 4), dtype=int), " is an array of shape (2, 4)"),
+        (np.ones((2, 5), dtype=int), " is an array of shape (2, 5)"),
         (np.ones((2, 3)), " is an array of shape (2, 3) and type float64"),
         (np.array([["1", "0", "0"]]), " is an array of shape (1, 3) and type <U1"),
         (np.array([[2**63 - 1, -(2**63), 0]]), "[0] is (9223372036854775807"),

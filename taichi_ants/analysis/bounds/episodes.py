@@ -61,6 +61,10 @@ class EpisodeBounds:
                 "trails evaporate or spread in training, but exact bounds require constant trails; "
                 "set `task.evaporation_in_training` to False and `task.pheromone.diffusion` to 0."
             )
+        if task.noise.slip or task.noise.misread:
+            raise AntsError(
+                f"noise of the task is {task.noise}; exact bounds require a task without noise."
+            )
         around = look_around(world)
         cells, headings = world.start(seed=0)
         cell = int(np.searchsorted(around.cells, cells[0]))
@@ -114,9 +118,10 @@ class EpisodeBounds:
         self._chances = coo_array((shares, (rows, columns)), shape=(N_ACTIONS * n, n)).tocsr()
 
     def shortest(self) -> Outcome | None:
-        """Return the fewest steps to a delivery with the largest return, None if there is no way.
+        """Return the outcome of the shortest delivery, None if there is no way.
 
-        Random choices among several food items are assumed to be the best ones.
+        Of several shortest ones, it is the one with the largest return. Random choices among
+        several food items are assumed to be the best ones.
         """
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import dijkstra

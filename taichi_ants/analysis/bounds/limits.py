@@ -21,6 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
+from taichi_ants.checks import checked_world
+from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
@@ -47,6 +49,12 @@ class Limits:
 def limits_of(world: World, task: Task | None = None) -> Limits:
     """Return the bounds of a world with the traffic rules of a task; None is the paper's."""
     task = task or Task()
+    checked_world(world)
+    if task.foods:
+        raise AntsError(
+            f"`task.foods` is {', '.join(task.foods)}; the bounds hold for one kind of food, so "
+            "leave it out."
+        )
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = world.walkable(around)[around]
     ticks = 2 if task.traffic.shared or task.turns_at_queen else 3

@@ -42,7 +42,7 @@ class Surroundings:
         return in_view(np.where(can_enter, self.neighbours + turned[:, :1], turned))
 
     def sees(self, what: np.ndarray) -> np.ndarray:
-        """Return the states with a cell of a kind, bool (6, n), in view; int64 (S,)."""
+        """Return the states with neighbours in view that are in `what`, bool (6, n); int64 (S,)."""
         return np.flatnonzero(in_view(what).any(axis=0))
 
     def turned_round(self, states: np.ndarray) -> np.ndarray:

@@ -144,7 +144,7 @@ def _basis(rows: Sequence[ConditionRow]) -> str:
 
 
 def glance(rows: Sequence[ConditionRow]) -> Table:
-    """Return a table of deliveries of the largest colonies: designs down, kinds of world across."""
+    """Return deliveries of the largest colonies: a row per design, a column per kind of world."""
     sizes = [one.condition.ants for one in rows if one.condition.regime != study.ABROAD]
     largest = max(sizes, default=0)
     shown: dict[str, dict[Design, ConditionRow]] = {name: {} for name in study.WORLD_KINDS}
@@ -220,7 +220,7 @@ def _compared(
 
 
 def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
-    """Return tables of deliveries and of the main findings, and the number of true statements."""
+    """Return tables of deliveries and of the main findings, and the number of each verdict."""
     seen = glance(rows)
     world_kinds = {one.condition.world_kind for one in rows}
     conditions = f"{count(len(rows), 'condition')} in {count(len(world_kinds), 'kind')} of world"
@@ -241,7 +241,7 @@ def on_one_screen(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
 
 
 def of_largest(findings: Mapping[Sizes, Finding]) -> Finding:
-    """Return the finding on the largest colony; of several, the one that objects most."""
+    """Return the finding on the largest colony; of several, that with the strongest objection."""
     return _of_size(findings, max(ants for ants, _ in findings))
 
 

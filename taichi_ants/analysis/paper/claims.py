@@ -20,8 +20,8 @@ from taichi_ants.files import tomllib
 class Claim:
     """An empirical claim of the paper, made precise.
 
-    Every effect of the quantity must fulfil the criterion, which gives words of the paper such as
-    "about", "close" or "consistently" a number.
+    Every effect of the quantity must fulfil the criterion, in which words of the paper such as
+    "about", "close" or "consistently" become numbers.
     """
 
     id: str
@@ -79,10 +79,11 @@ Audit = dict[Claim, dict[str, Finding]]  # by claim and delivery setting
 
 
 def assess(comparison: Comparison, claims: Sequence[Claim] = CLAIMS) -> Audit:
-    """Return findings on the claims in all delivery settings, all judged together.
+    """Return findings on the claims in all delivery settings; all intervals hold at the same time.
 
-    The finding on a claim is that on its weakest contrast: a claim is supported if all its
-    contrasts are, and contradicted if one of them is.
+    A claim has one or more contrasts, the differences that must fulfil it. The finding on the claim
+    is that on its weakest contrast: the claim is supported if all its contrasts are, and
+    contradicted if one of them is.
     """
     grids = {delivery: grids_of(comparison, delivery) for delivery in comparison.delivery_settings}
     contrasts = {

@@ -20,7 +20,7 @@ PAPER_WORLD = "the paper's"  # its numbers and claims apply to this world only
 
 
 class Variant(NamedTuple):
-    """A learner with values of its hyperparameters, which the paper calls an algorithm."""
+    """A learner with values of its hyperparameters; the paper calls this an algorithm."""
 
     learner: str
     hyperparameters: str = ""  # for example "planning_steps=3"; several are separated by spaces

@@ -25,7 +25,7 @@ class PaperRow(NamedTuple):
     deliveries: float  # per episode
 
     def figure(self, measure: str) -> float:
-        """Return the paper's number for a measure such as "return_last50", by its first word."""
+        """Return the paper's number for a measure, the same for "return_last50" as for "return"."""
         return getattr(self, measure.partition("_")[0].replace("return", "reward"))
 
 

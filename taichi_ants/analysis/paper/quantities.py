@@ -51,7 +51,7 @@ def grids_of(comparison: Comparison, delivery: str) -> Grids:
 
 
 def pairs(grid: np.ndarray, factor: str) -> np.ndarray:
-    """Return differences between both values of a hyperparameter, upper - lower, (8, seeds)."""
+    """Return differences between the two values of a hyperparameter, upper - lower, (8, seeds)."""
     lower, upper = np.moveaxis(grid, list(FACTORS).index(factor), 0)
     return (upper - lower).reshape(-1, grid.shape[-1])
 

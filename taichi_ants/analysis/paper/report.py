@@ -141,7 +141,10 @@ def _glance(lines: Sequence[Line]) -> Table:
 
 
 def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
-    """Return a table for each of `FIGURES`, with the paper's numbers in its world, and notes."""
+    """Return a table for each of `FIGURES`, and one with notes only.
+
+    In the paper's world, the tables also have the paper's numbers.
+    """
     runs = comparison.episodes
     late = f"last {WINDOW} episodes" if runs > WINDOW else f"all {count(runs, 'episode')}"
     titles = (f"Return, {late}", "Steps, all episodes", f"Steps, {late}", f"Deliveries, {late}")
@@ -250,7 +253,7 @@ def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans])
 
 
 def baseline_table(baselines: Sequence[Baseline]) -> Table:
-    """Return a table of exact bounds and simple policies; notes explain missing ones."""
+    """Return a table of exact bounds and simple policies; notes explain why some are missing."""
     rows = [
         [one.label, number(one.return_mean), number(one.steps_mean), number(one.deliveries_mean, 2)]
         for one in baselines

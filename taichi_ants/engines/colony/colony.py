@@ -15,6 +15,8 @@ from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState, checke
 from taichi_ants.engines.colony.stepping import Stepper, features_of
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown
+from taichi_ants.measures.measure import Measure
+from taichi_ants.measures.series import Recorder
 from taichi_ants.protocol import Event
 from taichi_ants.task import Task
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
@@ -33,8 +35,9 @@ class Colony(ColonyState):
         world: One world for all seeds, or one per seed, all with the same ranges.
         task: The rules; None for those of the paper. Colonies that learn use its evaporation in
             training, others its evaporation in evaluation.
-        training: The learner and its settings. None, with sharing "frozen": you give the actions
-            with `act`, and there are no action values.
+        training: The learner and its settings. None, with sharing "frozen": there are no action
+            values; you give the actions with `act`, or ants choose by a task whose rule of choice
+            is "deneubourg".
         seeds: One seed for each of the W worlds.
         ants: Number of ants at the start of an episode, 1 to 2**24. The ants that the world lists
             are the first.
@@ -68,7 +71,7 @@ class Colony(ColonyState):
 
         Args:
             length: Number of ticks, for learners that update at the last tick; None if unknown.
-            world: The new worlds, as in the class; None keeps the present ones.
+            world: The new world or worlds, as for `Colony`; None keeps the present ones.
 
         Raises:
             AntsError: A world is not allowed.
@@ -187,6 +190,8 @@ class Colony(ColonyState):
         progress: Progress | None = None,
         worlds: Sequence[World | Sequence[World]] | None = None,
         *,
+        measures: str | Measure | Sequence[str | Measure] = (),
+        every: int | None = None,
         protocol: Event | Sequence[Event] = (),
     ) -> ColonyEpisodes:
         """Return the results of whole episodes with a fixed number of ticks.
@@ -194,6 +199,9 @@ class Colony(ColonyState):
         Args:
             progress: A function that is called with the share of the work done, 0 to 1.
             worlds: The `world` of `begin_episode` for each episode; None keeps the present worlds.
+            measures: Names of registered measures, or `Measure` objects, to read at the end of each
+                episode; see `taichi_ants.measures`. They do not change the colony.
+            every: Read the measures also every n ticks, before the events of the tick.
             protocol: Events with interventions, see `taichi_ants.protocol`. They happen in each
                 episode, which begins without the changes of the one before.
         """
@@ -201,21 +209,29 @@ class Colony(ColonyState):
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         places = self._checked_places(worlds, episodes)
         checks.check_progress(progress)
-        timetable, outcomes = Timetable(self, protocol, ticks), []
+        recorder, timetable = Recorder(measures, every), Timetable(self, protocol, ticks)
+        outcomes = []
         for episode in range(episodes):
             self.begin_episode(ticks, places[episode])
+            recorder.begin(episode)
             with timetable:
-                for _ in timetable.pieces(self._stepper, ticks):
-                    if progress is not None:
-                        progress((episode + self.ticks / ticks) / episodes)
+                for stop in recorder.stops(ticks):
+                    for _ in timetable.pieces(self._stepper, stop - self.ticks):
+                        if progress is not None:
+                            progress((episode + self.ticks / ticks) / episodes)
+                        if not self.running.any():
+                            break
+                    recorder.read(self)
                     if not self.running.any():
                         break
                 outcomes.append(self.outcome())
             self.end_episode()
-        return ColonyEpisodes(
-            **{name: np.stack([vars(one)[name][0] for one in outcomes])
-               for name in vars(outcomes[0])}
-        )  # fmt: skip
+        counts: dict[str, Any] = {
+            name: np.concatenate([getattr(one, name) for one in outcomes])
+            for name, array in vars(outcomes[0]).items()
+            if isinstance(array, np.ndarray)
+        }
+        return ColonyEpisodes(**counts, seeds=self.seeds, series=recorder.series())
 
     def _checked_places(self, worlds: Any, episodes: int) -> Sequence[Any]:
         """Return the worlds of each episode after checks; None to keep the present ones."""
@@ -242,7 +258,7 @@ class Colony(ColonyState):
         lines = [
             f"world: {self.worlds[0]}{more}",
             f"task: {self.task}",
-            f"training: {None if self.is_given_actions else self.training}",
+            f"training: {self.training if self.has_training else None}",
             f"seeds: {shown(self.seeds)}",
             f"ants: {self.ants}, capacity: {self.capacity}, start: {self.start!r}",
             f"sharing: {self.sharing!r}, epsilon: {self.epsilon:.4g}",

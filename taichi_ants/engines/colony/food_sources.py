@@ -15,18 +15,19 @@ def arrays(
 ) -> dict[str, np.ndarray]:
     """Return the arrays of food sources and piles of all worlds, with `room` sources in each.
 
-    `sources` has for each world the rows CELL, TAKEN and PILE of `FoodSourceRow`, (3, n). Write the
-    numbers of sources and piles into `rows`, (WorldRow, W). A world has `size` cells.
+    `sources` has for each world the rows CELL, TAKEN, PILE and KIND of `FoodSourceRow`, (4, n).
+    Write the numbers of sources and piles into `rows`, (WorldRow, W). A world has `size` cells.
     """
     n_worlds = rows.shape[1]
     food_sources = np.zeros((len(FoodSourceRow), max(1, n_worlds * room)), np.int32)
     begins = np.zeros((n_worlds, room + 1), np.int32)
     food_sources[FoodSourceRow.TAKEN] = -1
     source_of = np.full(n_worlds * size if room else 1, -1, np.int32)
-    for w, (cells, taken, piles) in enumerate(sources):
+    for w, (cells, taken, piles, kinds) in enumerate(sources):
         n_piles = int(piles.max(initial=-1)) + 1
         of_world = food_sources[:, w * room : w * room + len(cells)]
         of_world[FoodSourceRow.CELL], of_world[FoodSourceRow.TAKEN] = cells, taken
+        of_world[FoodSourceRow.KIND] = kinds
         of_world[FoodSourceRow.PILE], of_world[FoodSourceRow.LISTED] = (
             piles,
             np.argsort(piles, kind="stable"),
@@ -45,7 +46,7 @@ def arrays(
 
 
 def at_start(world: World) -> np.ndarray:
-    """Return the food sources of a world for `arrays`, int (3, n), one per food item.
+    """Return the food sources of a world for `arrays`, int (4, n), one per food item.
 
     A pile consists of connected cells. Piles are numbered in the order of their first cells.
     """
@@ -62,4 +63,4 @@ def at_start(world: World) -> np.ndarray:
     _, labels = connected_components(graph, directed=False)
     _, first, numbers = np.unique(labels, return_index=True, return_inverse=True)
     piles = np.argsort(np.argsort(first))[numbers].astype(np.int32)
-    return np.stack([cells, np.full(len(cells), -1), piles])
+    return np.stack([cells, np.full(len(cells), -1), piles, world.kinds_by_cell()[cells]])

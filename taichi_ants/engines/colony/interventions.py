@@ -25,7 +25,14 @@ import numpy as np
 
 from taichi_ants import files
 from taichi_ants.engines.colony import food_sources
-from taichi_ants.engines.colony.layout import ANT_GROUND, FoodSourceRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import (
+    ANT_GROUND,
+    FoodSourceRow,
+    NestRow,
+    Stage,
+    WorldRow,
+    array_of,
+)
 from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.grid.constants import (
     N_HEADINGS,
@@ -72,12 +79,18 @@ class Interventions:
         length: The `length` of episodes that an intervention begins.
 
     Raises:
-        AntsError: The colony does not have one of the worlds.
+        AntsError: The colony does not have one of the worlds, or has several nests or kinds of
+            food.
     """
 
     def __init__(
         self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
+        if colony.n_nests > 1 or colony.task.foods:
+            raise AntsError(
+                "the colony has several nests or kinds of food, which interventions do not "
+                "support yet; use one of each."
+            )
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None
         self.worlds = self._checked_worlds(worlds)
@@ -205,11 +218,15 @@ class Interventions:
         self._check_all("the task")
         colony = self.colony
         colony.check_same_kernels(task)
-        levels = [np.maximum(one.view("trail") - one.clock, 0) for one in self._all()]
+        whole = [n for n, pheromone in enumerate(colony.pheromones) if not pheromone.dense]
+        levels = {
+            (one, number): np.maximum(one.stored(number) - one.clock(number), 0)
+            for one in self._each_of_all()
+            for number in whole
+        }
         colony.set_task(task)
-        if not colony.pheromone.dense:
-            for one, level in zip(self._all(), levels, strict=True):
-                one.view("trail")[:] = np.where(level > 0, level + one.clock, 0)
+        for (one, number), level in levels.items():
+            one.stored(number)[:] = np.where(level > 0, level + one.clock(number), 0)
 
     def set_epsilon(self, epsilon: float) -> None:
         """Set epsilon, which no longer decays."""
@@ -240,6 +257,11 @@ class Interventions:
             raise AntsError(
                 "the ants of this colony do not follow a policy; make a colony with "
                 'sharing="frozen" and q_values.'
+            )
+        if not colony.task.choice.needs_table:
+            raise AntsError(
+                f"the ants choose by the rule {colony.task.choice.rule!r}, which has no policy; "
+                "leave it out."
             )
 
     def state(self) -> str:
@@ -319,8 +341,8 @@ class Interventions:
     def _each(self) -> Iterator[_World]:
         return (_World(self, w) for w in self.worlds)
 
-    def _all(self) -> list[_World]:
-        return [_World(self, w) for w in range(len(self.colony.worlds))]
+    def _each_of_all(self) -> Iterator[_World]:
+        return (_World(self, w) for w in range(len(self.colony.worlds)))
 
 
 class _World:
@@ -333,8 +355,7 @@ class _World:
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
         array = self.colony.arrays[name]
-        # A colony has only one of the arrays "trail" and "level".
-        return array if array.size == 1 else array.reshape(len(self.colony.worlds), -1)[self.w]
+        return array.reshape(len(self.colony.worlds), -1)[self.w]
 
     @property
     def cells(self) -> np.ndarray:
@@ -342,9 +363,17 @@ class _World:
         return self.view("cell")
 
     @property
-    def clock(self) -> int:
-        """The clock of the trails."""
-        return self.colony.trail_clock(self.w)
+    def queen_cell(self) -> np.ndarray:
+        """A view of the queen's cell, (1,)."""
+        return self.colony.arrays["nests"][NestRow.QUEEN_CELL, self.w : self.w + 1]
+
+    def stored(self, number: int = 0) -> np.ndarray:
+        """Return a view of a pheromone as kernels store it; see `ColonyState.stored_trail`."""
+        return self.view(array_of(number, self.colony.pheromones[number].dense))
+
+    def clock(self, number: int = 0) -> int:
+        """Return the clock of a pheromone."""
+        return self.colony.trail_clock(self.w, number)
 
     def living_slots(self) -> np.ndarray:
         """Return the slots of the living ants, in the order of their numbers."""
@@ -373,7 +402,8 @@ class _World:
         self.view("walls")[cells] = what == OBSTACLE
         self.colony.changed[self.w] = True
         if what == OBSTACLE:
-            self.lay(cells, 0)
+            for number in range(len(self.colony.pheromones)):
+                self.lay(cells, 0, number)
         self._change_food_sources(cells, what)
 
     def _aside(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -429,23 +459,21 @@ class _World:
                 f"the queen cannot move to cell {tuple(grid.cells(cell).tolist())}, because it is "
                 "not empty; choose an empty cell."
             )
-        old = self.rows[WorldRow.QUEEN_CELL]
+        old = int(self.queen_cell[0])
         start = self.all.start(self.w)
         start[old], start[cell] = EMPTY, QUEEN
         self.all.begin_with(self.w, start)
         self._step_aside(*self._aside(np.array([cell])))
         ground[old], ground[cell] = EMPTY, QUEEN
-        self.rows[WorldRow.QUEEN_CELL] = cell
+        self.queen_cell[:] = cell
         self.view("closer")[:] = World(grid.ranges, grid.cells(cell).tolist()).closer()
         self.colony.changed[self.w] = True
         self._change_food_sources(np.array([cell]), QUEEN)
 
-    def lay(self, cells: np.ndarray, level: int) -> None:
-        """Set the trail of cells."""
-        if self.colony.pheromone.dense:
-            self.view("level")[cells] = level
-        else:
-            self.view("trail")[cells] = level + self.clock if level else 0
+    def lay(self, cells: np.ndarray, level: int, number: int = 0) -> None:
+        """Set the levels of a pheromone in cells; 0 is the trail."""
+        stored = self.stored(number)
+        stored[cells] = level + self.clock(number) if level else 0
 
     def add(self, cells: np.ndarray, heading: int | None = None) -> None:
         """Put newborn ants on cells; see `Interventions.add_ants`."""
@@ -468,6 +496,7 @@ class _World:
             "heading": headings,
             "number": numbers,
             "action": -1,
+            "executed": -1,
             "next_action": -1,
             "stage": Stage.NEWBORN,
             "streams": stream_state(colony.seeds[self.w], STREAM_BORN, born),
@@ -489,7 +518,7 @@ class _World:
             )
         seed = colony.seeds[self.w]
         words = stream_state(seed, STREAM_START_CELL, grid.number(grid.cells(free)))
-        queen = grid.cells(self.rows[WorldRow.QUEEN_CELL])
+        queen = grid.cells(int(self.queen_cell[0]))
         far = grid.distances(tuple(queen.tolist()))[free]
         order = np.lexsort((words, far * (colony.start == "nest")))
         self.add(free[order[:n]], heading)
@@ -543,7 +572,7 @@ class _World:
         if not colony.food_changes:
             return
         several = [self._sources(w) for w in range(len(colony.worlds))]
-        known = several[self.w]
+        known = several[self.w][:3]
         if what != FOOD:
             known = known[:, ~np.isin(known[0], cells)]
         at, taken, pile = known.tolist()
@@ -562,15 +591,16 @@ class _World:
             if all(taken[source] >= 0 for source in here):
                 taken[here[0]] = -1
         _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
-        several[self.w] = np.array([at, taken, pile], int).reshape(3, -1)
+        several[self.w] = np.array([at, taken, pile, [0] * len(at)], int).reshape(4, -1)
         colony.make_food_sources_fit(len(at))
         arrays |= food_sources.arrays(
             several, arrays["worlds"], colony.n_food_sources, colony.grid.size
         )
 
     def _sources(self, w: int) -> np.ndarray:
-        """Return the rows CELL, TAKEN and PILE of the food sources of a world, (3, n)."""
+        """Return the food sources of a world as `food_sources.arrays` takes them, (4, n)."""
         arrays, room = self.colony.arrays, self.colony.n_food_sources
         n = arrays["worlds"][WorldRow.FOOD_SOURCES, w]
-        rows = [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE]
+        of = FoodSourceRow
+        rows = [of.CELL, of.TAKEN, of.PILE, of.KIND]
         return arrays["food_sources"][rows, w * room : w * room + n]

@@ -32,7 +32,8 @@ class Phase(NamedTuple):
     """A part of a tick that all ants, cells or worlds (`of`: ANTS, CELLS, WORLD) finish together.
 
     It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
-    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, place) for CELLS, (c, v, w, tick) for WORLD.
+    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place) for CELLS, (c, v, w, tick) for
+    WORLD.
     """
 
     of: str
@@ -43,19 +44,31 @@ class Features(NamedTuple):
     """The features of a model that decide what is compiled, and nothing else.
 
     With `own_tables` there is a table for each slot, not one for each world; for the others, see
-    `ColonyState` and `Pheromone`. A model does not pay for features that it does not use: kernels
-    without births, deaths or food that changes are faster, and compile much faster.
+    `ColonyState` and `Pheromone`. `dense` and `views` have an entry for each pheromone, the trail
+    first. The cues and `reads` are numbers of pheromones; -1 is the compass. A model does not pay
+    for features that it does not use: kernels without births, deaths or food that changes are
+    faster, and compile much faster.
     """
 
     learner: Learner | None
     own_tables: bool
     is_given_actions: bool
     observation: Observation
-    dense: bool
-    view: str
+    dense: tuple[bool, ...]
+    views: tuple[str, ...]
+    outbound: int
+    homing: int
+    reads: tuple[int, ...]  # of the observation
     traffic: Traffic
     ants_change: bool
     food_changes: bool
+    n_nests: int = 1
+    n_kinds: int = 1
+    has_foods: bool = False
+    has_loads: bool = False
+    choice: str = "greedy"
+    slips: bool = False
+    misreads: bool = False
 
 
 class Variant:
@@ -63,13 +76,24 @@ class Variant:
 
     def __init__(self, features: Features) -> None:
         learner, observation = features.learner, features.observation
-        self.own_tables, self.dense = features.own_tables, features.dense
+        self.own_tables, self.dense = features.own_tables, any(features.dense)
         self.is_given_actions = features.is_given_actions
-        self.view, self.half = features.view, features.view == "half"
+        self.pheromones = tuple(zip(features.dense, features.views, strict=True))
+        self.outbound, self.homing = features.outbound, features.homing
+        self.has_compass = self.homing < 0
+        cues = {self.outbound} | ({self.homing} - {-1})
+        self.half = features.views[self.outbound] == "half"
+        self.homing_view = "" if self.has_compass else features.views[self.homing]
+        self.reads = features.reads
         self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
+        self.n_nests, self.n_kinds = features.n_nests, features.n_kinds
+        self.has_foods, self.has_loads = features.has_foods, features.has_loads
+        # Whether deliveries are counted by nest and kind.
+        self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
+        self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
@@ -82,13 +106,32 @@ class Variant:
         if self.together:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
-        self.n_pairs = observation.n_states * ROW  # state-action pairs, and unused numbers
-        self.sees_percept = observation.name == "paper"  # the percept is the state index
+        self.n_numbers = observation.n_states * ROW  # of a table: state-action pairs, and unused
+        self.n_pairs = self.n_numbers * self.n_nests  # of all tables that ants of a world share
+        self.is_papers = observation.name == "paper"
+        # The percept is the state index, unless ants misread cells.
+        self.sees_percept = self.is_papers and not self.misreads
         # Whether the cell of an ant must show that the ant carries food.
-        self.sees_ants = not self.sees_percept or self.view == "strongest_under_carriers"
-        if not self.sees_percept:
+        under_carriers = any(features.views[cue] == "strongest_under_carriers" for cue in cues)
+        self.sees_ants = not self.is_papers or under_carriers
+        sees_dense = any(features.dense[cue] for cue in cues)
+        self.level_type = ti.f32 if sees_dense else ti.i32
+        if not self.is_papers:
             self.encode = views.encode_function(observation)
-            self.view_type = views.view_type(observation, self.dense)
+            reads_dense = tuple(features.dense[number] for number in self.reads)
+            self.view_type = views.view_type(observation, sees_dense, reads_dense)
+
+    def field(self, c: Any, number: int) -> trail.Pheromone:
+        """Return the arrays and numbers of a pheromone; 0 is the trail."""
+        return trail.pheromone_of(c, number, *self.pheromones[number])
+
+    def dense_fields(self, c: Any) -> list[trail.Pheromone]:
+        """Return the arrays and numbers of the dense pheromones."""
+        return [self.field(c, k) for k, (dense, _) in enumerate(self.pheromones) if dense]
+
+    def further_fields(self, c: Any) -> list[trail.Pheromone]:
+        """Return the arrays and numbers of the pheromones other than the trail."""
+        return [self.field(c, number) for number in range(1, len(self.pheromones))]
 
 
 variant = cache(Variant)
@@ -157,7 +200,7 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
         for place in range(w * c.size + first, w * c.size + last * running):
-            phase.do(c, place)
+            phase.do(c, v, place)
     elif running == 1:
         phase.do(c, v, w, tick)
 
@@ -204,8 +247,9 @@ def wait_for_all(c: ti.template(), part, parts, number):
     """Wait until all parts arrive at barrier `number`; return 0 if one does not arrive, else 1.
 
     The first part that starts decides: it opens the barrier once the others have arrived, or gives
-    up. If it gives up, all parts that have started wait at this barrier and leave. A part that
-    starts later leaves at its first barrier, which is the same one.
+    up. If it gives up, all parts that have started leave at this barrier, also those that still
+    wait at the one before. A part that starts later leaves at its first barrier, which is the same
+    one.
     """
     goes_on = 1
     if part == 0:
@@ -224,6 +268,9 @@ def wait_for_all(c: ti.template(), part, parts, number):
         opened = ti.atomic_add(c.barrier[Barrier.OPENED], 0)
         while opened >= 0 and opened <= number:
             opened = ti.atomic_add(c.barrier[Barrier.OPENED], 0)
+        # The first part may have opened this barrier, and given up at the next one since then.
+        if opened < 0:
+            opened -= ti.i64(GAVE_UP)
         goes_on = ti.cast(opened > number, ti.i32)
     return goes_on
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from enum import IntEnum, auto
 
-from taichi_ants.task.constants import OBSTACLE
+from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
 
 # Columns are arrays with one entry for each slot. Small values that each tick uses take one byte,
 # which is a quarter of the memory traffic.
 INTEGER_COLUMNS = (
     "cell",
-    "carried",  # ticks since the pick-up of its food
+    "carried",  # ticks since the pick-up of its food, or, if a field needs it, without food
     "number",  # -1 in a slot that was never used in this episode
     "want",  # the cell to enter or to take food from, else its own; later its previous cell
-    "state",  # the state index, unless it is the percept
+    "state",  # the state index, unless it is the percept (it is not if ants misread cells)
     "age",  # in ticks, if ants are born or die
 )
 BYTE_COLUMNS = (
@@ -23,7 +23,10 @@ BYTE_COLUMNS = (
     "percept",  # the paper's state, which decides about actions and rewards
     "event",  # the result of the last action, an `Event`
     "action",  # the last action, -1 before the first one; or the next one, if actions are given
+    "executed",  # the last action as executed, if actions slip; else it is `action`
     "next_action",  # the next action if it is drawn already, else -1; for learners that draw ahead
+    "nest",  # the number of its nest, with several nests
+    "kind",  # the kind of the last food that it picked up, with several kinds
 )
 
 
@@ -43,10 +46,8 @@ class WorldRow(IntEnum):
     TOP = auto()  # slots from this one on are vacant
     FIRST_VACANT = auto()  # no slot below this one is vacant
     NEXT_NUMBER = auto()  # the number of the next newborn ant
-    STORE = auto()  # food items that the queen has not turned into ants yet
     FOOD_SOURCES = auto()
     PILES = auto()
-    QUEEN_CELL = auto()
     # The counts of `ColonyEpisodes`, by the names of its fields.
     TICKS = auto()  # also the number of the present tick, from 0
     DELIVERIES = auto()
@@ -55,6 +56,13 @@ class WorldRow(IntEnum):
     DEATHS = auto()
     REGROWN = auto()
     LIVING = auto()
+
+
+class NestRow(IntEnum):
+    """Rows of `nests`, one column for each world and nest."""
+
+    QUEEN_CELL = 0
+    STORE = auto()  # food items that the queen has not turned into ants yet
 
 
 class Tally(IntEnum):
@@ -72,6 +80,8 @@ class Tally(IntEnum):
 
 
 TOTALS = (Tally.RETURNS, Tally.MOVES, Tally.BLOCKED, Tally.CARRIED)
+# Numbers in `delivered` for each chunk: deliveries of a tick by nest and kind of food.
+NESTS_BY_KINDS = MAX_NESTS * MAX_FOOD_KINDS
 # Wide enough that two chunks never share a cache line, which would slow threads down.
 TALLY_WIDTH = 16
 
@@ -96,6 +106,15 @@ class Barrier(IntEnum):
 GAVE_UP = -(2**40)  # added to OPENED when the first part gives up, which keeps the number
 
 
+class FoodRow(IntEnum):
+    """Rows of `food_numbers`, one column for each kind of food; see `Food`."""
+
+    PICK_UP = 0
+    DELIVER = auto()
+    LOADS = auto()
+    REGROWTH = auto()  # -1 if it does not grow back
+
+
 class FoodSourceRow(IntEnum):
     """Rows of `food_sources`, one column for each food source."""
 
@@ -103,11 +122,12 @@ class FoodSourceRow(IntEnum):
     TAKEN = auto()  # the tick in which its food was taken; -1 if it has food
     MOVES = auto()  # 1 if it moves in this tick
     PILE = auto()
+    KIND = auto()
     LISTED = auto()  # the numbers of the food sources in their world, pile by pile
 
 
 class SumRow(IntEnum):
-    """Rows of `sums_of`, one column for each chunk and pair: updates of the pair in this tick."""
+    """Rows of `sums_of`: the updates of a state-action pair in a tick, a column for each chunk."""
 
     COUNT = 0
     LATEST = auto()  # the highest ant number
@@ -115,13 +135,18 @@ class SumRow(IntEnum):
 
 
 # In `ground`, the lower four bits of a cell are its ground, see `task.constants`. The upper four
-# mark an ant on it and, if others can see that, whether the ant carries food.
-ANT_STANDS, STANDS_WITH_FOOD = 7, 15
+# mark an ant on it: 7 minus its nest, plus 8 if it carries food and others can see that.
+ANT_STANDS = 7
 ANT_GROUND = OBSTACLE | ANT_STANDS << 4  # the cell of an ant without food
 
 # The number of slots from which threads share a world: a single world, and each of many.
 _LARGE_ALONE, _LARGE_COLONY = 2048, 16_384
 _CHUNKS_PER_THREAD = 2
+
+
+def array_of(number: int, dense: bool) -> str:
+    """Return the name of the array of a pheromone; 0 is the trail."""
+    return f"field_{number}" if number else "level" if dense else "trail"
 
 
 def usual_schedule(n_worlds: int, capacity: int) -> str:

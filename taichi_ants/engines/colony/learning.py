@@ -20,9 +20,9 @@ _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 
 
 @ti.func
-def see_anew(c: ti.template(), v: ti.template(), w, ant, clock):
+def see_anew(c: ti.template(), v: ti.template(), w, ant, tick):
     """Update the percept and the state index of an ant."""
-    percept, state = steps.observe(c, v, w, ant, clock)
+    percept, state = steps.observe(c, v, w, ant, tick)
     note_seen(c, v, ant, percept, state)
 
 
@@ -38,7 +38,12 @@ def note_seen(c: ti.template(), v: ti.template(), ant, percept, state):
 def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Let an ant observe and its learner start an episode, unless its world is within one."""
     if tick == 0:
-        see_anew(c, v, w, ant, 0)
+        if ti.static(v.misreads):
+            # An ant that has observed already must not draw again.
+            if c.streams[ant] == c.first_streams[w * c.n_slots + c.number[ant]]:
+                see_anew(c, v, w, ant, 0)
+        else:
+            see_anew(c, v, w, ant, 0)
         begin_to_learn(c, v, ant)
 
 
@@ -49,13 +54,13 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         steps.put(c.stage, ant, Stage.LIVING)
         if ti.static(v.alone):
             forget(c, v, ant)
-    see_anew(c, v, w, ant, tick * c.evaporates)
+    see_anew(c, v, w, ant, tick)
 
 
 @ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action if the learner needs it, and learn."""
-    percept, state = steps.observe(c, v, w, ant, (tick + 1) * c.evaporates)
+    percept, state = steps.observe(c, v, w, ant, tick + 1)
     next_action = -1
     if steps.trait(c.stage, ant) != Stage.NEWBORN:
         c.wants[w * c.size + c.want[ant]] = 0
@@ -74,7 +79,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @ti.func
 def memory_of(c: ti.template(), v: ti.template(), owner):
-    """Return the start of the tables and of the memory of an ant or a world."""
+    """Return the start of the tables and of the memory of a slot, or of a world and nest."""
     return At(steps.table_of(c, v, owner), owner * c.floats_by_8 * 8, owner * c.integers_by_8 * 8)
 
 
@@ -115,7 +120,7 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
     step = Transition(
         state=steps.state_index_of(c, v, ant),
         action=steps.trait(c.action, ant),
-        reward=ti.cast(c.rewards[event], ti.f32),
+        reward=ti.cast(steps.reward_of(c, v, ant), ti.f32),
         next_state=seen,
         next_action=next_action,
         terminated=terminated,
@@ -130,10 +135,11 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
 def error_of(
     c: ti.template(), v: ti.template(), w, pair, reward, terminated, seen, next_action
 ):  # fmt: skip
-    """Return the TD error of a pair (its offset in the table) by the shared table of a world."""
-    table = steps.table_of(c, v, w)
+    """Return the TD error of a pair by the table of its nest; see `place_in_tables`."""
+    table = steps.table_of(c, v, w * v.n_nests + nest_of_pair(v, pair))
+    value = place_in_tables(c, v, w, pair)
     error = v.td_error(
-        c.q[table + pair],
+        c.q[value],
         reward,
         discount_of(rates_of(c, v), terminated),
         values_of(c.q, table, seen),
@@ -141,17 +147,34 @@ def error_of(
         c.epsilon,
     )
     if not ti.abs(error) < c.largest_error:
-        c.q[table + pair] = ti.math.nan  # a fixed-point sum would hide such an error
+        c.q[value] = ti.math.nan  # a fixed-point sum would hide such an error
     return error
+
+
+@ti.func
+def nest_of_pair(v: ti.template(), pair):
+    """Return the nest of a pair, whose number is its place in the tables of all nests in turn."""
+    nest = 0
+    if ti.static(v.n_nests > 1):
+        nest = pair // v.n_numbers
+    return nest
+
+
+@ti.func
+def place_in_tables(c: ti.template(), v: ti.template(), w, pair):
+    """Return the index in `q` of the value of a pair of a world."""
+    nest = nest_of_pair(v, pair)
+    return steps.table_of(c, v, w * v.n_nests + nest) + pair - nest * v.n_numbers
 
 
 @ti.func
 def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
     """Add the TD error and the transition of an ant to the sums of its chunk."""
     event = steps.trait(c.event, ant)
-    reward = ti.cast(c.rewards[event], ti.f32)
+    reward = ti.cast(steps.reward_of(c, v, ant), ti.f32)
     terminated = terminates(event, c.delivery_terminates)
     pair = steps.state_index_of(c, v, ant) * ROW + steps.trait(c.action, ant)
+    pair += steps.nest_of(c, v, ant) * v.n_numbers
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
     add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
@@ -240,24 +263,26 @@ def remember_shared(c: ti.template(), v: ti.template(), w):
     for i in range(1, n + 1):
         pair = c.touched[listed + i]
         transition = c.sums_of[SumRow.TRANSITION, v.n_pairs * chunk + pair]
-        model.remember(memory, memory_of(c, v, w), pair, transition)
+        nest = nest_of_pair(v, pair)
+        at = memory_of(c, v, w * v.n_nests + nest)
+        model.remember(memory, at, pair - nest * v.n_numbers, transition)
 
 
 @ti.func
 def apply_sums(c: ti.template(), v: ti.template(), w):
     """Update the shared values of a world by the joined sums, and reset the sums."""
-    chunk, table = w * c.n_chunks, steps.table_of(c, v, w)
+    chunk = w * c.n_chunks
     listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
         pair = c.touched[listed + 1 + i]
         place = v.n_pairs * chunk + pair
         count = c.sums_of[SumRow.COUNT, place]
-        error = c.errors[place]
+        error, value = c.errors[place], place_in_tables(c, v, w, pair)
         rate = c.weights[ti.min(count, c.weights.shape[0] - 1)]  # the last is for more errors
         if count > 1:
             mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
             error = ti.cast(mean, ti.f32)
-        c.q[table + pair] = c.q[table + pair] + rate * error
+        c.q[value] = c.q[value] + rate * error
         c.sums_of[SumRow.COUNT, place] = 0
     c.touched[listed] = 0
 
@@ -267,16 +292,17 @@ def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Draw a visited pair for a planning update of an ant."""
     if steps.trait(c.stage, ant) != Stage.NEWBORN:
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
-        at = memory_of(c, v, w)
+        at = memory_of(c, v, steps.owner_of(c, v, w, ant))
         drawn, c.streams[ant] = draw_below(c.streams[ant], model.visited(memory, at))
         pair, transition = model.recall(memory, at, drawn)
+        pair += steps.nest_of(c, v, ant) * v.n_numbers
         add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
         note_transition(c, v.n_pairs * chunk + pair, 0, transition)
 
 
 @ti.func
 def plan_together(c: ti.template(), v: ti.template(), w, tick):
-    """Update the drawn pairs, by the table at the start of the round."""
+    """Update the pairs that ants drew for planning, by the table before this round of updates."""
     join_sums(c, v, w)
     chunk = w * c.n_chunks
     listed = list_of(v, chunk)

@@ -9,9 +9,13 @@ from taichi.math import popcnt
 
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
+    ANT_STANDS,
+    NESTS_BY_KINDS,
     TALLY_WIDTH,
     TOTALS,
+    FoodRow,
     FoodSourceRow,
+    NestRow,
     Stage,
     Tally,
     WorldRow,
@@ -19,7 +23,7 @@ from taichi_ants.engines.colony.layout import (
 from taichi_ants.engines.colony.learning import forget
 from taichi_ants.engines.colony.steps import put, tally, trait
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
-from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.task.rules.policy import bit_number
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
@@ -47,9 +51,24 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         for row in ti.static(range(len(Tally))):
             c.tallies[first + row] = 0
     c.worlds[WorldRow.DELIVERIES, w] += gives
-    c.worlds[WorldRow.STORE, w] += gives * c.births
+    if ti.static(v.counts_apart):
+        count_by_nest(c, v, w)
+    else:
+        c.nests[NestRow.STORE, w] += gives * c.births
     if gives > 0 and c.worlds[WorldRow.FIRST_DELIVERY, w] < 0:
         c.worlds[WorldRow.FIRST_DELIVERY, w] = tick + 1
+
+
+@ti.func
+def count_by_nest(c: ti.template(), v: ti.template(), w):
+    """Add the deliveries of all chunks by nest and kind to those of a world, and reset them."""
+    for i in ti.static(range(v.n_nests * v.n_kinds)):
+        n = 0
+        for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
+            n += c.delivered[chunk * NESTS_BY_KINDS + i]
+            c.delivered[chunk * NESTS_BY_KINDS + i] = 0
+        c.deliveries_apart[w * (v.n_nests * v.n_kinds) + i] += n
+        c.nests[NestRow.STORE, w * v.n_nests + ti.static(i // v.n_kinds)] += n * c.births
 
 
 @ti.func
@@ -64,11 +83,21 @@ def free_around(c: ti.template(), base, cell):
 
 @ti.func
 def give_birth(c: ti.template(), v: ti.template(), w, tick):
-    """Turn stored food into ants next to the queen, while slots and cells are free."""
-    base, queen = w * c.size, c.worlds[WorldRow.QUEEN_CELL, w]
+    """Turn stored food into ants next to the queens, while slots and cells are free."""
+    for nest in range(v.n_nests):
+        give_birth_in(c, v, w, nest)
+
+
+@ti.func
+def give_birth_in(c: ti.template(), v: ti.template(), w, nest):
+    """Turn stored food of a nest into ants next to its queen."""
+    base, column = w * c.size, w * v.n_nests + nest
+    queen = c.nests[NestRow.QUEEN_CELL, column]
     free = free_around(c, base, queen)
     while (
-        c.worlds[WorldRow.STORE, w] > 0 and c.worlds[WorldRow.LIVING, w] < c.n_slots and free != 0
+        c.nests[NestRow.STORE, column] > 0
+        and c.worlds[WorldRow.LIVING, w] < c.n_slots
+        and free != 0
     ):
         k, c.queen_streams[w] = draw_below(c.queen_streams[w], popcnt(free))
         heading = bit_number(free, k)
@@ -77,15 +106,15 @@ def give_birth(c: ti.template(), v: ti.template(), w, tick):
             slot += 1
         c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
         c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
-        place_newborn(c, w, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
+        place_newborn(c, v, w, nest, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
         if ti.static(v.alone):
             forget(c, v, w * c.n_slots + slot)
-        c.worlds[WorldRow.STORE, w] -= 1
+        c.nests[NestRow.STORE, column] -= 1
         free = free_around(c, base, queen)
 
 
 @ti.func
-def place_newborn(c: ti.template(), w, ant, cell, heading):
+def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, heading):
     """Put a newborn ant into a slot and onto a cell."""
     number = c.worlds[WorldRow.NEXT_NUMBER, w]
     c.cell[ant] = cell
@@ -93,11 +122,18 @@ def place_newborn(c: ti.template(), w, ant, cell, heading):
     put(c.carries, ant, 0)
     put(c.stage, ant, Stage.NEWBORN)
     put(c.action, ant, -1)
+    if ti.static(v.slips):
+        put(c.executed, ant, -1)
     c.age[ant] = 0
+    c.carried[ant] = 0
     c.number[ant] = number
     born = ti.cast(c.episodes[w], ti.u64) << ti.u64(32) | ti.cast(number, ti.u64)
     c.streams[ant] = stream_of(c.seeds[w], STREAM_BORN, born)
-    c.ground[w * c.size + cell] = ANT_GROUND
+    ground = ANT_GROUND
+    if ti.static(v.n_nests > 1):
+        put(c.nest, ant, nest)
+        ground = OBSTACLE | (ANT_STANDS - nest) << 4
+    c.ground[w * c.size + cell] = ti.cast(ground, ti.u8)
     c.worlds[WorldRow.NEXT_NUMBER, w] = number + 1
     c.worlds[WorldRow.LIVING, w] += 1
     c.worlds[WorldRow.BIRTHS, w] += 1
@@ -112,7 +148,13 @@ def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             put(c.stage, ant, Stage.DYING)
             tally(c, Tally.DEATHS, chunk, 1)
             left_behind = ti.select(trait(c.carries, ant) == 1, FOOD, EMPTY)
-            c.ground[w * c.size + c.cell[ant]] = ti.cast(left_behind, ti.u8)
+            place = w * c.size + c.cell[ant]
+            c.ground[place] = ti.cast(left_behind, ti.u8)
+            if left_behind == FOOD:
+                if ti.static(v.n_kinds > 1):
+                    c.kind_of[place] = ti.cast(trait(c.kind, ant), ti.u8)
+                if ti.static(v.has_loads):
+                    c.loads[place] = 1
 
 
 @ti.func
@@ -123,13 +165,24 @@ def regrow(c: ti.template(), v: ti.template(), w, tick):
         w * c.n_food_sources, w * c.n_food_sources + c.worlds[WorldRow.FOOD_SOURCES, w]
     ):
         taken = c.food_sources[FoodSourceRow.TAKEN, source]
-        if c.regrowth >= 0 and taken >= 0 and tick >= taken + c.regrowth:
+        waits, kind = c.regrowth, 0
+        if ti.static(v.n_kinds > 1):
+            kind = c.food_sources[FoodSourceRow.KIND, source]
+        if ti.static(v.has_foods):
+            waits = c.food_numbers[FoodRow.REGROWTH, kind]
+        if waits >= 0 and taken >= 0 and tick >= taken + waits:
             place = base + c.food_sources[FoodSourceRow.CELL, source]
             if c.ground[place] == EMPTY:
                 c.ground[place] = FOOD
+                grown = 1
+                if ti.static(v.n_kinds > 1):
+                    c.kind_of[place] = ti.cast(kind, ti.u8)
+                if ti.static(v.has_loads):
+                    grown = c.food_numbers[FoodRow.LOADS, kind]
+                    c.loads[place] = grown
                 c.source_of[place] = source
                 c.food_sources[FoodSourceRow.TAKEN, source] = -1
-                c.worlds[WorldRow.REGROWN, w] += 1
+                c.worlds[WorldRow.REGROWN, w] += grown
 
 
 @ti.func

@@ -7,7 +7,7 @@ The state is in NumPy arrays, which kernels change in place. Only this package r
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
@@ -18,12 +18,16 @@ from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     BYTE_COLUMNS,
     INTEGER_COLUMNS,
+    NESTS_BY_KINDS,
     TALLY_WIDTH,
     TOTALS,
+    FoodRow,
+    NestRow,
     Order,
     Stage,
     SumRow,
     WorldRow,
+    array_of,
     chunks_of,
     usual_schedule,
 )
@@ -34,6 +38,7 @@ from taichi_ants.errors import (
     check_array,
     check_one_of,
     checked_whole,
+    count,
     entries_of,
     shown,
 )
@@ -42,8 +47,12 @@ from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
-from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.measures.series import Series
+from taichi_ants.measures.tidy import Measured, Tidy, seed_array
+from taichi_ants.task import Pheromone, Task
+from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.task.events import Event
+from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import Start, World
 
 State = TypeVar("State", bound="ColonyState")
@@ -57,6 +66,8 @@ _MOST_NUMBERS = 2**31 - 1  # kernels use 32-bit indices
 # Unused settings for colonies with given actions, in which ants neither choose nor learn.
 _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
+_UNKNOWN = ("number", "action", "executed", "next_action")  # columns that are -1 at first
+
 _KIND = Kind("colony", 12, "Colony.save")
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
@@ -64,12 +75,14 @@ _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ColonyEpisodes(Record):
+class ColonyEpisodes(Record, Tidy):
     """Results of episodes, arrays of shape (episodes, worlds).
 
     `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
-    with food of all delivered loads, `living` ants at the end. Returns, moves, blocked and carried
-    are int64, all others int32.
+    with food of all delivered loads, `living` ants at the end. `deliveries_apart` has deliveries by
+    nest and kind of food, (episodes, worlds, nests, kinds). Returns, moves, blocked and carried are
+    int64, all others int32. `seeds` has the seed of each world. `series` has the values of the
+    measures that you asked `Colony.run` for, else None.
     """
 
     returns: np.ndarray
@@ -83,6 +96,47 @@ class ColonyEpisodes(Record):
     deaths: np.ndarray
     regrown: np.ndarray
     living: np.ndarray
+    deliveries_apart: np.ndarray
+    seeds: tuple[int, ...] = ()
+    series: Series | None = field(default=None, repr=False)
+
+    @property
+    def nest_deliveries(self) -> np.ndarray:
+        """Deliveries by nest, (episodes, worlds, nests)."""
+        return self.deliveries_apart.sum(axis=3, dtype=np.int32)
+
+    @property
+    def food_deliveries(self) -> np.ndarray:
+        """Deliveries by kind of food, (episodes, worlds, kinds)."""
+        return self.deliveries_apart.sum(axis=2, dtype=np.int32)
+
+    def counts(self) -> Arrays:
+        """Return the arrays of all counts of worlds by name."""
+        arrays = (one for one in vars(self).items() if isinstance(one[1], np.ndarray))
+        return {name: array for name, array in arrays if array.ndim == 2}
+
+    def measured(self) -> Measured:
+        """Return the values of the measures, or all counts if `Colony.run` was asked for none."""
+        shape, series = self.returns.shape, self.series
+        if series is None:
+            episodes, worlds = (one.ravel().astype(np.int32) for one in np.indices(shape))
+            ticks = self.ticks.ravel()
+            values = {name: array.ravel() for name, array in self.counts().items()}
+            usual: tuple[str, ...] = ("deliveries",)
+        else:
+            worlds, episodes, ticks = series.worlds, series.episodes, series.ticks
+            values, usual = dict(series.values), tuple(series.values)
+        seeds = seed_array(self.seeds)[worlds]
+        index = {"world": worlds, "seed": seeds, "episode": episodes, "tick": ticks}
+        return Measured(
+            index=index,
+            values=values,
+            of_seed=worlds,
+            of_group=np.zeros(len(worlds), np.int32),
+            seeds=self.seeds,
+            usual=usual,
+            units={} if series is None else dict(series.units),
+        )
 
 
 def column(name: str) -> property:
@@ -99,12 +153,17 @@ class ColonyState:
 
     Attributes, in addition to the arguments of `Colony`:
         learns: Whether the ants learn.
+        has_training: Whether a `training` is given. Without it, ants take given actions, or choose
+            by a rule that needs no action values.
         is_given_actions: Whether ants take the actions passed to `Colony.act`.
         one_a_slot: Whether each slot has its own table of action values, not each world.
         ants_change: Whether ants are born or die.
         food_changes: Whether food grows back or wanders.
+        n_nests: The number of nests in each world.
+        n_kinds: The number of kinds of food in the task, at least 1.
         memory: The size of the learner's memory for each table.
         pheromone: The pheromone of the task, with or without evaporation.
+        fields: The further pheromones of the task by name, with or without evaporation.
         stored: The names of the arrays in a file.
         length: Length of the episode in ticks; 0 if unknown.
         ticks: Number of ticks since an episode started in all worlds.
@@ -134,22 +193,27 @@ class ColonyState:
         self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
         self.sharing, self.learns = sharing, sharing != "frozen"
-        self.is_given_actions = training is None and not self.learns and q_values is None
-        if self.is_given_actions:
+        self.has_training = training is not None or self.learns or q_values is not None
+        needs_table = self.task.choice.needs_table
+        self.is_given_actions = needs_table and not self.has_training
+        if not self.has_training:
             training = _NO_TRAINING
+        elif not needs_table:
+            checks.refuse_table(self.task, sharing)
         if not isinstance(training, TrainingConfig):
             raise AntsError(
                 f"training is {shown(training)}; it must be one TrainingConfig, or None with "
                 'sharing="frozen" and without q_values.'
             )
         (self.training,) = checks.checked_configs(training)
-        if not self.learns and q_values is None and not self.is_given_actions:
+        if not self.learns and q_values is None and self.has_training:
             raise AntsError(
                 "sharing is 'frozen', but q_values is None; give the action values that the ants "
                 "follow, because they do not learn."
             )
         if self.learner:
             checks.check_sharing(self.learner, sharing)
+            checks.check_choice(self.learner, self.task)
         table = None if q_values is None else checks.checked_q_values(q_values, self.task)
         self.seeds = checks.checked_seeds(seeds)
         running = runtime.start(threads, arch)
@@ -159,8 +223,13 @@ class ColonyState:
         worlds = checked_worlds(world, len(self.seeds), self.learns)
 
         self.one_a_slot = sharing == "independent" or (
-            not self.learns and table is not None and table.ndim == 4
+            # Frozen tables by slot; those by nest have another length, see `owners`.
+            not self.learns
+            and table is not None
+            and table.ndim == 4
+            and (worlds[0].n_nests == 1 or table.shape[1] != worlds[0].n_nests)
         )
+        self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(self.task.foods))
         self.take_task(self.task)
         self.memory = Memory()
         if self.learner and (self.one_a_slot or self.plans_together):
@@ -177,8 +246,14 @@ class ColonyState:
         """Set the attributes that depend on the task."""
         life = task.life
         self.task, self.pheromone = task, task.pheromone_while(self.learns)
+        self.fields = task.fields_while(self.learns)
         self.ants_change = life.births or life.lifespan is not None
-        self.food_changes = life.regrowth is not None or life.wander is not None
+        self.food_changes = task.food_changes
+
+    @property
+    def pheromones(self) -> tuple[Pheromone, ...]:
+        """All pheromones, in the order of their numbers: the trail, then the further fields."""
+        return self.pheromone, *self.fields.values()
 
     @property
     def learner(self) -> Learner | None:
@@ -194,7 +269,7 @@ class ColonyState:
 
     @property
     def episode(self) -> int:
-        """The number of the present episode, or the largest of all worlds; -1 before the first."""
+        """The number of the current episode (the largest of all worlds), from 0; -1 before it."""
         return int(self.arrays["episodes"].max())
 
     @property
@@ -215,7 +290,7 @@ class ColonyState:
     # Arrays (W, capacity) by slot: the number of its last ant, int32, -1 for none; the flat index
     # of its cell, int32; its heading 0 to 5, percept (see `task.states`), last action (-1 before
     # the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1; and the
-    # state of its random stream, uint64.
+    # state of its random stream, uint64. If actions slip, `actions` are those that ants chose.
     numbers, cells, headings = column("number"), column("cell"), column("heading")
     percepts, actions, events = column("percept"), column("action"), column("event")
     next_actions, streams = column("next_action"), column("streams")
@@ -237,6 +312,13 @@ class ColonyState:
         return (self._states if "state" in self.arrays else self.percepts).astype(np.int32)
 
     @property
+    def executed(self) -> np.ndarray:
+        """The last actions as executed, int8 (W, capacity); unless actions slip, `actions`."""
+        if "executed" not in self.arrays:
+            return self.actions
+        return self.arrays["executed"].reshape(len(self.seeds), self.capacity)
+
+    @property
     def draws_ahead(self) -> bool:
         """Whether ants draw their next action before they learn from the last one."""
         learner = self.learner
@@ -245,7 +327,7 @@ class ColonyState:
     @property
     def occupied(self) -> np.ndarray:
         """Whether an ant is on each cell, bool (W, grid.size)."""
-        return self.arrays["ground"].reshape(len(self.seeds), -1) >= ANT_GROUND
+        return self.arrays["ground"].reshape(len(self.seeds), -1) >> 4 != 0
 
     @property
     def update_weights(self) -> np.ndarray:
@@ -259,16 +341,50 @@ class ColonyState:
 
     @property
     def q_values(self) -> np.ndarray:
-        """The action values, float32 (W, n_states, 5), by slot (W, slots, n_states, 5); a copy."""
-        n = self.capacity if self.one_a_slot else 1
+        """The action values, float32 (W, n_states, 5); a copy.
+
+        With a table for each slot (W, slots, n_states, 5), and with several nests that share tables
+        (W, nests, n_states, 5).
+        """
+        n = self.owners
         tables = self.arrays["q"].reshape(len(self.seeds), n, -1, self.task.n_states, ROW)
         tables = tables[:, :, 0, :, :N_ACTIONS]
-        return (tables if self.one_a_slot else tables[:, 0]).copy()
+        return (tables if self.one_a_slot or n > 1 else tables[:, 0]).copy()
+
+    @property
+    def owners(self) -> int:
+        """The number of tables in each world: one for each slot, or for each nest."""
+        return self.capacity if self.one_a_slot else self.n_nests
+
+    @property
+    def nests(self) -> np.ndarray:
+        """The nest of the last ant in each slot, int32 (W, capacity)."""
+        if self.n_nests == 1:
+            return np.zeros((len(self.seeds), self.capacity), np.int32)
+        return self.arrays["nest"].reshape(len(self.seeds), -1).astype(np.int32)
+
+    @property
+    def rewards(self) -> np.ndarray:
+        """The reward of the last action of the ant in each slot, int32 (W, capacity)."""
+        rewards = self.task.rewards.by_event()[self.events]
+        if self.task.foods:
+            kinds = self.arrays["kind"].reshape(rewards.shape) if self.n_kinds > 1 else 0
+            picked_up, delivered = self.arrays["food_numbers"][:2, kinds]
+            rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
+            rewards = np.where(self.events == Event.DELIVERED, delivered, rewards)
+        return rewards
 
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
-        return ColonyEpisodes(**{name: one[None].copy() for name, one in self._counts().items()})
+        if self.n_nests * self.n_kinds == 1:
+            apart = self.deliveries.astype(np.int32)
+        else:
+            apart = self.arrays["deliveries_apart"]
+        apart = apart.reshape(-1, self.n_nests, self.n_kinds)
+        every = {**self._counts(), "deliveries_apart": apart}
+        counts: dict[str, Any] = {name: one[None].copy() for name, one in every.items()}
+        return ColonyEpisodes(**counts, seeds=self.seeds)
 
     def _counts(self) -> Arrays:
         """Return views of the counts of the episode (W,), by their names in `ColonyEpisodes`."""
@@ -285,14 +401,13 @@ class ColonyState:
         ant_cells = self.cells[world, living]
         ground = self.arrays["ground"][cells].copy()
         ground[ant_cells] = EMPTY
-        stored, clock = self.stored_trail(world)
-        trail = np.maximum(stored - stored.dtype.type(clock), 0)
         carries = self.carrying[world, living]
         carried = self.arrays["carried"].reshape(self.cells.shape)[world, living]
+        fields = {name: self._levels(world, name) for name in (TRAIL, *self.fields)}
         return Snapshot(
             self.grid,
             ground,
-            trail,
+            fields[TRAIL],
             ant_cells,
             self.headings[world, living].astype(np.int32),
             carries,
@@ -300,25 +415,34 @@ class ColonyState:
             ant_numbers=self.numbers[world, living],
             ant_actions=self.actions[world, living].astype(np.int32),
             ant_events=self.events[world, living].astype(np.int32),
-            fields={"trail": trail},
+            fields=fields,
             counts={name: int(array[world]) for name, array in self._counts().items()},
             world=self.worlds[world],
         )
 
-    def stored_trail(self, world: int = 0) -> tuple[np.ndarray, int]:
+    def _levels(self, world: int, field: str) -> np.ndarray:
+        """Return the levels of a pheromone in a world."""
+        stored, clock = self.stored_trail(world, field)
+        return np.maximum(stored - stored.dtype.type(clock), 0)
+
+    def stored_trail(self, world: int = 0, field: str = TRAIL) -> tuple[np.ndarray, int]:
         """Return a copy of the trail of world number `world` as kernels store it, and the clock.
 
-        The stored trail has expiry clocks, int32 (grid.size,). If the pheromone is dense, it has
-        levels, float32, and the clock is 0. The level of a cell is max(stored - clock, 0).
+        `field` is the name of another pheromone; AntsError if there is none. The stored trail has
+        expiry clocks, int32 (grid.size,). If the pheromone is dense, it has levels, float32, and
+        the clock is 0. The level of a cell is max(stored - clock, 0).
         """
+        check_one_of("field", field, (TRAIL, *self.fields))
         cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
-        if self.pheromone.dense:
-            return self.arrays["level"][cells].copy(), 0
-        return self.arrays["trail"][cells].copy(), self.trail_clock(world)
+        number = self.task.number_of(field)
+        stored = self.arrays[array_of(number, self.pheromones[number].dense)][cells].copy()
+        return stored, self.trail_clock(world, number)
 
-    def trail_clock(self, world: int) -> int:
-        """Return the amount by which integer trails have evaporated in this episode."""
-        return int(self.episode_ticks[world]) * (self.pheromone.evaporation == "linear")
+    def trail_clock(self, world: int, number: int = 0) -> int:
+        """Return the amount by which a pheromone in whole numbers has evaporated this episode."""
+        pheromone = self.pheromones[number]
+        falls = pheromone.evaporation == "linear" and not pheromone.dense
+        return int(self.episode_ticks[world]) * falls
 
     def check_begun(self) -> None:
         """Raise an AntsError if no episode has started."""
@@ -334,6 +458,17 @@ class ColonyState:
 
     def lay_out(self, worlds: tuple[World, ...]) -> None:
         """Make the arrays that depend on the worlds; AntsError if they have too few free cells."""
+        for world in worlds:
+            if world.n_nests != self.n_nests:
+                raise AntsError(
+                    f"a world has {count(world.n_nests, 'nest')}, but another one {self.n_nests}; "
+                    "all worlds of a colony must have the same number."
+                )
+            if world.n_food_kinds > self.n_kinds:
+                raise AntsError(
+                    f"the world has {count(world.n_food_kinds, 'kind')} of food, but the task "
+                    f"{self.n_kinds}; add the others to `task.foods`."
+                )
         self.worlds, self.grid = worlds, worlds[0].grid
         self.changed = np.zeros(len(worlds), bool)
         most = max(len(world.foods) for world in worlds)
@@ -374,6 +509,7 @@ class ColonyState:
         """Set a task for which the colony has the right arrays and kernels."""
         self.take_task(task)
         self.arrays["rewards"][:] = task.rewards.by_event()
+        self.arrays["choice"][:] = task.choice.numbers()
 
     def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
         """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
@@ -437,7 +573,9 @@ class ColonyState:
         ]
         cells = np.stack([cells for cells, _ in starts])
         ground = self._of_each(World.ground)
-        np.put_along_axis(ground, cells.astype(np.int64), ANT_GROUND, axis=1)
+        nests = np.stack([world.nests_of(n) for world in worlds])
+        marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
+        np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
         levels = self._of_each(World.trail_levels)
         levels = levels if levels.any() else levels[:, :1].copy()  # all cells are equal
         rows = np.zeros((len(WorldRow), len(worlds)), np.int32)
@@ -445,35 +583,74 @@ class ColonyState:
         for row in (WorldRow.TOP, WorldRow.FIRST_VACANT, WorldRow.LIVING, WorldRow.NEXT_NUMBER):
             rows[row] = n
         rows[WorldRow.FIRST_DELIVERY] = -1
-        rows[WorldRow.QUEEN_CELL] = [int(self.grid.index(world.queen)) for world in worlds]
+        of_nests = np.zeros((len(NestRow), len(worlds) * self.n_nests), np.int32)
+        of_nests[NestRow.QUEEN_CELL] = [one for w in worlds for one in self.grid.index(w.queens)]
         foods = [food_sources.at_start(world) for world in worlds] if self.n_food_sources else []
         return {
             # The start cells and headings of ants, by world and number.
             "start_cells": cells,
             "start_headings": np.array([headings for _, headings in starts], np.int8),
+            "start_nests": nests[:, : n * (self.n_nests > 1)].astype(np.int8),
             # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
             # The clock at which a cell's trail has evaporated; if dense, its level.
-            "level" if self.pheromone.dense else "trail": levels.reshape(-1),
+            array_of(0, self.pheromone.dense): levels.reshape(-1),
+            # The same for each further field, which is empty at the start.
+            **{
+                array_of(number, field.dense): np.zeros(
+                    len(worlds), np.float32 if field.dense else np.int32
+                )
+                for number, field in enumerate(self.fields.values(), start=1)
+            },
             "worlds": rows,
+            "nests": of_nests,
+            **self._foods_at_start(ground),
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, self.n_food_sources, self.grid.size),
+        }
+
+    def _foods_at_start(self, ground: np.ndarray) -> Arrays:
+        """Return the kind of the food in each cell, its loads, and deliveries by nest and kind.
+
+        Arrays that a kernel does not need are tiny. `ground` is (W, grid.size).
+        """
+        kinds = self._of_each(World.kinds_by_cell)
+        loads = np.array([food.loads for food in self.task.foods.values()] or [1], np.int32)
+        here = np.where(ground == FOOD, loads[kinds], 0).astype(np.int32)
+        apart = len(self.worlds) * self.n_nests * self.n_kinds
+        return {
+            "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
+            "loads": here.reshape(-1) if self.task.has_loads else np.zeros(1, np.int32),
+            "deliveries_apart": np.zeros(apart, np.int32),
         }
 
     def _of_episode(self) -> Arrays:
         """Return the arrays that change in an episode, at its start."""
         n_worlds, dense = len(self.worlds), self.pheromone.dense
         slots, cells = n_worlds * self.capacity, n_worlds * self.grid.size
-        unused = {"state"} if self.task.sees.name == "paper" else set()  # the percept is the state
+        noise = self.task.noise
+        unused = set() if noise.slip else {"executed"}
+        if self.task.sees.name == "paper" and not noise.misread:
+            unused.add("state")  # the percept is the state
         if not self.ants_change:
             unused.add("age")
         if not self.draws_ahead:
             unused.add("next_action")
+        if self.n_nests == 1:
+            unused.add("nest")
+        if self.n_kinds == 1:
+            unused.add("kind")
         made = {
             **{name: array.copy() for name, array in self._at_start().items()},
             "trail": np.zeros(1 if dense else cells, np.int32),
             "level": np.zeros(cells if dense else 1, np.float32),
+            **{
+                array_of(number, field.dense): np.zeros(
+                    cells, np.float32 if field.dense else np.int32
+                )
+                for number, field in enumerate(self.fields.values(), start=1)
+            },
         }
         for names, dtype in ((INTEGER_COLUMNS, np.int32), (BYTE_COLUMNS, np.int8)):
             used = [name for name in names if name not in unused]
@@ -496,17 +673,19 @@ class ColonyState:
             if name in arrays
         }
         for name, array in column.items():
-            array[which] = -1 if name in ("number", "action", "next_action") else 0
+            array[which] = -1 if name in _UNKNOWN else 0
         n = self.at_start["start_cells"].shape[1]
         column["cell"][which, :n] = self.at_start["start_cells"][which]
         column["heading"][which, :n] = self.at_start["start_headings"][which]
+        if "nest" in column:
+            column["nest"][which, :n] = self.at_start["start_nests"][which]
         column["number"][which, :n] = np.arange(n)
         column["stage"][which, :n] = Stage.LIVING
 
     def _lasting(self, q_values: np.ndarray | None) -> Arrays:
         """Return the arrays that last through all episodes."""
         slots, memory, n_worlds = self.capacity, self.memory, len(self.seeds)
-        owners = n_worlds * (slots if self.one_a_slot else 1)
+        owners = n_worlds * self.owners
         sizes = ((1 + memory.tables) * self.task.n_states * ROW, memory.floats, memory.integers)
         if owners * max(sizes) > _MOST_NUMBERS:
             raise AntsError(
@@ -537,8 +716,8 @@ class ColonyState:
 
     def _tables(self, q_values: np.ndarray | None) -> np.ndarray:
         """Return the tables of all worlds or slots, with `q_values` or the initial value."""
-        n_worlds, own = len(self.seeds), self.one_a_slot
-        slots, n_states = self.capacity if own else 1, self.task.n_states
+        n_worlds, slots, n_states = len(self.seeds), self.owners, self.task.n_states
+        own = self.one_a_slot or slots > 1
         q = np.zeros((n_worlds, slots, 1 + self.memory.tables, n_states, ROW), np.float32)
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
@@ -546,8 +725,8 @@ class ColonyState:
             if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
                 raise AntsError(
                     f"q_values has shape {q_values.shape}; give ({form}), ({n_worlds}, {form}) for "
-                    f"one table per world, or with independent ants ({n_worlds}, {slots}, {form}) "
-                    "for one table per slot."
+                    f"one table per world, or ({n_worlds}, {slots}, {form}) for one table per slot "
+                    "or nest."
                 )
             given = q_values.reshape(*leading, *[1] * (2 - len(leading)), 1, n_states, N_ACTIONS)
             q[..., :N_ACTIONS] = given
@@ -556,22 +735,31 @@ class ColonyState:
     def _constants(self) -> Arrays:
         """Return constants of worlds and settings, and scratch arrays of a tick."""
         chunks = len(self.seeds) * self.chunks
-        pairs = self.task.n_states * ROW if self.sharing == "shared" else 0
+        tables = self.n_nests if self.sharing == "shared" else 0
+        pairs = self.task.n_states * ROW * tables
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
             **self._ground_constants(),
             "compass": compass_of(self.grid),  # see `rules.actions`
             "seeds": words_of(self.seeds),
             "rewards": self.task.rewards.by_event(),
+            "choice": self.task.choice.numbers(),
+            "food_numbers": _food_numbers(self.task),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
             # By n: the weight of the mean of n errors in an update; see `set_learning_rate`.
             "weights": np.zeros(2, np.float32),
             # By cell: the mark of what its ant wants, see `rules.conflicts`.
             "wants": np.zeros(cells, np.uint8),
             "spare": np.zeros_like(self.arrays["level"]),  # the next levels, with diffusion
+            **{
+                f"spare_{number}": np.zeros(cells, np.float32)
+                for number, field in enumerate(self.fields.values(), start=1)
+                if field.dense
+            },
             "orders": np.zeros(len(Order), np.int32),
             "barrier": np.zeros(24, np.int64),  # see `kernels.wait_for_all`
             "tallies": np.zeros(chunks * TALLY_WIDTH, np.int64),
+            "delivered": np.zeros(chunks * NESTS_BY_KINDS, np.int32),  # by nest and kind
             # By chunk and pair: fixed-point sums of TD errors, the last error, and `SumRow`.
             "sums": np.zeros(sums, np.int64),
             "errors": np.zeros(sums, np.float32),
@@ -586,7 +774,7 @@ class ColonyState:
             # 1 for rocks and outside.
             "walls": (self._of_each(World.ground) == OBSTACLE).astype(np.uint8).reshape(-1),
             # By cell: a bit for each heading that leads nearer to the queen.
-            "closer": self._of_each(World.closer).reshape(-1),
+            "closer": self._of_each(_closer_to_each).reshape(-1),
         }
 
     def _of_each(self, make: Callable[[World], np.ndarray]) -> np.ndarray:
@@ -610,7 +798,7 @@ class ColonyState:
         numbers = {world: number for number, world in enumerate(dict.fromkeys(self.worlds))}
         facts = {
             "task": self.task.as_dict(),
-            "training": None if self.is_given_actions else self.training.as_dict(),
+            "training": self.training.as_dict() if self.has_training else None,
             "worlds": [world.as_dict() for world in numbers],
             "world_of": [numbers[world] for world in self.worlds],
             "one_a_slot": self.one_a_slot,
@@ -681,10 +869,25 @@ class ColonyState:
     __hash__ = None  # type: ignore[assignment]  # it changes with each tick
 
 
+def _closer_to_each(world: World) -> np.ndarray:
+    """Return `World.closer` of all nests, uint8 (nests, grid.size)."""
+    return np.stack([world.closer(nest) for nest in range(world.n_nests)])
+
+
+def _food_numbers(task: Task) -> np.ndarray:
+    """Return the settings of the kinds of food, int32 (FoodRow, kinds)."""
+    kinds = task.foods.values()
+    numbers = np.zeros((len(FoodRow), max(1, len(kinds))), np.int32)
+    for k, food in enumerate(kinds):
+        grows = -1 if food.regrowth is None else food.regrowth
+        numbers[:, k] = food.pick_up, food.deliver, food.loads, grows
+    return numbers
+
+
 def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:
     """Return one world per seed; AntsError if their number is wrong or their ranges differ."""
     given = entries_of(world) or [world] * n_seeds
-    worlds = tuple(checks.checked_world(one, learns) for one in given)
+    worlds = tuple(checks.checked_world(one, learns, several=True) for one in given)
     if len(worlds) != n_seeds:
         raise AntsError(
             f"there are {len(worlds)} worlds for {n_seeds} seeds; give one world per seed."

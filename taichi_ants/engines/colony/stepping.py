@@ -83,7 +83,7 @@ class Stepper:
             self._share_ticks(state, min(end - state.ticks, interval - state.ticks % interval))
 
     def launch(self, state: ColonyState, name: str) -> None:
-        """Launch a kernel: the phases of this name in `kernels`, or "ticks"."""
+        """Launch a kernel by name: "ticks", or a group of phases in `kernels`."""
         runtime.start()  # the caller may have reset Taichi, or forked the process
         if name not in self._launches:
             self._launches[name] = self._prepared(state, name)
@@ -132,23 +132,49 @@ def features_of(state: ColonyState) -> Features:
     """Return the features of a colony for which kernels are compiled."""
     from taichi_ants.engines.colony import kernels
 
-    task, pheromone = state.task, state.pheromone
+    task, pheromones = state.task, state.pheromones
+    outbound, homing = task.number_of(task.outbound_cue), task.number_of(task.homing_cue)
     return kernels.Features(
         learner=state.learner,
         own_tables=state.one_a_slot,
         is_given_actions=state.is_given_actions,
         observation=task.sees,
-        dense=pheromone.dense,
-        view=pheromone.view,
+        dense=tuple(one.dense for one in pheromones),
+        # Only the views of cues are compiled.
+        views=tuple(
+            one.view if number in (outbound, homing) else "half"
+            for number, one in enumerate(pheromones)
+        ),
+        outbound=outbound,
+        homing=homing,
+        reads=tuple(task.number_of(name) for name in task.sees.reads),
         traffic=task.traffic,
         ants_change=state.ants_change,
         food_changes=state.food_changes,
+        choice=task.choice.rule,
+        slips=task.noise.slip > 0,
+        misreads=task.noise.misread > 0,
+        n_nests=state.n_nests,
+        n_kinds=state.n_kinds,
+        has_foods=bool(task.foods),
+        has_loads=task.has_loads,
     )
 
 
 def _has_barrier(running: runtime.Runtime) -> bool:
     """Return whether threads can wait for each other, which a GPU does not allow."""
     return running.arch == "cpu"
+
+
+def _field_numbers(state: ColonyState) -> dict[str, Any]:
+    """Return the numbers of further fields, empty without fields."""
+    fields = state.fields.values()
+    counts = {"counts_without_food": int(any(one.counts_without_food for one in fields))}
+    return (counts if fields else {}) | {
+        f"{name}_{number}": value
+        for number, field in enumerate(fields, start=1)
+        for name, value in field.numbers.items()
+    }
 
 
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
@@ -163,6 +189,7 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "size": state.grid.size,
         "length": state.length,
         **state.pheromone.numbers,
+        **_field_numbers(state),
         **state.task.numbers,
         "ends_at_delivery": int(state.ends_at_delivery),
         "initial_q": state.training.initial_q,

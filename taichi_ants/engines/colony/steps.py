@@ -1,10 +1,17 @@
 """Observations and actions of the ants of a colony in a tick, phase by phase; see `rules`.
 
+In a tick, an ant draws from its random stream in this order, and only what applies: its action,
+unless that was drawn in the last tick or is given; whether the action slips; the choice among
+several food items. Then, when it observes: whether it misreads each cell in view, in the order of
+the observation's cells. Then its next action, if its learner draws ahead; and draws of the learner.
+
 Each ant writes a mark of what it wants into `wants` at its own cell, see `rules.conflicts`. The
 marks do not change while ants act; each ant removes its mark when it observes at the end of the
 tick. If ants can enter cells with ants, see `Traffic`, an additional phase marks the winners before
 all ants act.
 """
+
+from typing import Any
 
 import taichi as ti
 from taichi.math import popcnt
@@ -12,17 +19,37 @@ from taichi.math import popcnt
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
+    NESTS_BY_KINDS,
     TALLY_WIDTH,
+    FoodRow,
     FoodSourceRow,
+    NestRow,
     Tally,
+    WorldRow,
 )
-from taichi_ants.engines.colony.trail import deposit, level_in_view, level_of, level_that_counts
+from taichi_ants.engines.colony.trail import (
+    deposit,
+    lay,
+    level_in_view,
+    level_of,
+    level_that_counts,
+    occasions_of,
+)
 from taichi_ants.engines.views import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
-from taichi_ants.task.constants import EMPTY, FORWARD, LEFT, OBSTACLE, PICK_UP, RIGHT, ROW
+from taichi_ants.task.constants import (
+    EMPTY,
+    FORWARD,
+    LEFT,
+    OBSTACLE,
+    PICK_UP,
+    QUEEN,
+    RIGHT,
+    SEES_LURE,
+)
 from taichi_ants.task.events import Event
-from taichi_ants.task.rules import conflicts, vision
+from taichi_ants.task.rules import conflicts, noise, vision
 from taichi_ants.task.rules.actions import (
     is_open,
     move_event,
@@ -32,7 +59,14 @@ from taichi_ants.task.rules.actions import (
     turned_by,
 )
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
-from taichi_ants.task.rules.policy import bit_number, choose_in_crowd, lowest_bit_number
+from taichi_ants.task.rules.policy import (
+    attraction,
+    bit_number,
+    choose_cell,
+    choose_in_crowd,
+    choose_softly,
+    lowest_bit_number,
+)
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
 
@@ -58,96 +92,279 @@ def state_index_of(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def observe(c: ti.template(), v: ti.template(), w, ant, clock):
-    """Return the percept and the state index of an ant."""
+def observe(c: ti.template(), v: ti.template(), w, ant, tick):
+    """Return the percept and the state index of an ant, which may misread cells."""
     percept, state = 0, 0
-    if ti.static(v.sees_percept):
-        percept = see(c, v, w, ant, clock)
+    if ti.static(v.is_papers):
+        percept = see(c, v, w, ant, tick)
         state = percept
+        if ti.static(v.misreads):
+            state, c.streams[ant] = noise.misread_percept(percept, c.streams[ant], c.misread_below)
     else:
-        view = view_around(c, v, w, ant, clock)
+        view = view_around(c, v, w, ant, tick)
         percept = view.percept
+        if ti.static(v.misreads):
+            c.streams[ant] = noise.misread_view(
+                view, v.observation, c.streams[ant], c.misread_below
+            )
         state = v.encode(view)
     return percept, state
 
 
 @ti.func
-def see(c: ti.template(), v: ti.template(), w, ant, clock):
+def see(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the percept, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     left = here + step_towards(c.compass, heading, LEFT)
     forward = here + step_towards(c.compass, heading, FORWARD)
     right = here + step_towards(c.compass, heading, RIGHT)
-    ground_left, ground_forward = looks_of(c.ground[left]), looks_of(c.ground[forward])
-    ground_right = looks_of(c.ground[right])
+    queen = own_queen(c, v, w, ant)
+    ground_left, ground_forward = looks_of(c, v, left, queen), looks_of(c, v, forward, queen)
+    ground_right = looks_of(c, v, right, queen)
     percept = 0
     if trait(c.carries, ant) == 1:
-        nearer = vision.nearer_from(c.closer[here], heading)
-        percept = vision.percept_carrying(ground_left, ground_forward, ground_right, nearer)
+        if ti.static(v.has_compass):
+            nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+            percept = vision.percept_carrying(ground_left, ground_forward, ground_right, nearer)
+        else:
+            homing = ti.static(v.field(c, v.homing))
+            percept = vision.percept_homing(
+                homing.half,
+                ground_left,
+                ground_forward,
+                ground_right,
+                level_in_view(c, homing, left, tick),
+                level_in_view(c, homing, forward, tick),
+                level_in_view(c, homing, right, tick),
+                strongest_of(c, homing, left, forward, right, tick),
+            )
     else:
+        outbound = ti.static(v.field(c, v.outbound))
         percept = vision.percept_foraging(
             v.half,
             ground_left,
             ground_forward,
             ground_right,
-            level_in_view(c, v, left, clock),
-            level_in_view(c, v, forward, clock),
-            level_in_view(c, v, right, clock),
-            strongest_of(c, v, left, forward, right, clock),
+            level_in_view(c, outbound, left, tick),
+            level_in_view(c, outbound, forward, tick),
+            level_in_view(c, outbound, right, tick),
+            strongest_of(c, outbound, left, forward, right, tick),
         )
     return percept
 
 
 @ti.func
-def strongest_of(c: ti.template(), v: ti.template(), left, forward, right, clock):
+def strongest_of(c: ti.template(), field: ti.template(), left, forward, right, tick):
     """Return the largest level that counts among the three cells ahead."""
-    others = ti.max(level_that_counts(c, v, forward, clock), level_that_counts(c, v, right, clock))
-    return ti.max(level_that_counts(c, v, left, clock), others)
+    others = ti.max(
+        level_that_counts(c, field, forward, tick), level_that_counts(c, field, right, tick)
+    )
+    return ti.max(level_that_counts(c, field, left, tick), others)
 
 
 @ti.func
-def view_around(c: ti.template(), v: ti.template(), w, ant, clock):
+def cue_level(c: ti.template(), v: ti.template(), carries, place, tick):
+    """Return the level of a cell in the pheromone that an ant with this load follows.
+
+    If ants have a compass, this is the outbound cue for all ants.
+    """
+    level = ti.cast(level_of(ti.static(v.field(c, v.outbound)), place, tick), v.level_type)
+    if ti.static(not v.has_compass):
+        homing = ti.cast(level_of(ti.static(v.field(c, v.homing)), place, tick), v.level_type)
+        level = ti.select(carries == 1, homing, level)
+    return level
+
+
+@ti.func
+def strongest_cue(c: ti.template(), v: ti.template(), carries, here, heading, tick):
+    """Return the largest level that counts ahead, in the pheromone of `cue_level`."""
+    left = here + step_towards(c.compass, heading, LEFT)
+    forward = here + step_towards(c.compass, heading, FORWARD)
+    right = here + step_towards(c.compass, heading, RIGHT)
+    outbound = ti.static(v.field(c, v.outbound))
+    level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
+    if ti.static(not v.has_compass):
+        field = ti.static(v.field(c, v.homing))
+        homing = ti.cast(strongest_of(c, field, left, forward, right, tick), v.level_type)
+        level = ti.select(carries == 1, homing, level)
+    return level
+
+
+@ti.func
+def view_around(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the view of an ant."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
-    nearer = vision.nearer_from(c.closer[here], heading)
-    view = v.view_type(carries=trait(c.carries, ant), own_level=level_of(c, v, here, clock))
+    nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+    carries, queen = trait(c.carries, ant), own_queen(c, v, w, ant)
+    view = v.view_type(carries=carries, own_level=cue_level(c, v, carries, here, tick))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
         place = here + step_around(c.compass, heading, cells[k])
-        standable = (looks_of(c.ground[place]) == EMPTY) | (c.ground[place] >= ANT_GROUND)
-        view.levels[k] = ti.select(standable, level_of(c, v, place, clock), 0)
+        held = ti.cast(c.ground[place] >> 4, ti.i32)  # 0 without an ant
+        standable = (c.ground[place] & 15 == EMPTY) | (held != 0)
+        view.levels[k] = ti.select(standable, cue_level(c, v, carries, place, tick), 0)
         # 0 without an ant, 1 with a forager, 2 with a carrier.
-        view.ants[k] = (ti.cast(c.ground[place] >> 4, ti.i32) + 1) >> 3
-        view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
-        view.codes[k] = looks_of(c.ground[place])
-    view.strongest = strongest_of(
-        *(c, v, here + step_towards(c.compass, heading, LEFT)),
-        here + step_towards(c.compass, heading, FORWARD),
-        here + step_towards(c.compass, heading, RIGHT),
-        clock,
-    )
-    judge(v.half, view, v.observation)
+        view.ants[k] = (held + 1) >> 3
+        if ti.static(v.n_nests > 1):
+            ours = held & ANT_STANDS == ANT_STANDS - nest_of(c, v, ant)
+            view.ants[k] = ti.select(ours, 1 + (held >> 3), 0)
+            view.strangers[k] = ti.cast((held != 0) & (not ours), ti.i32)
+        if ti.static(v.has_compass):
+            view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
+        else:
+            view.nearer[k] = ti.cast(view.levels[k] > view.own_level, ti.i32)
+        view.codes[k] = looks_of(c, v, place, queen)
+        read_fields(c, v, view, k, place, standable, tick)
+    read_own_levels(c, v, view, here, tick)
+    view.strongest = strongest_cue(c, v, carries, here, heading, tick)
+    judge(v.half, v.homing_view, view, v.observation)
     return view
 
 
+def entry_of(view: Any, name: str) -> Any:
+    """Return a vector of a view by its name, while a kernel compiles."""
+    return getattr(view, name)
+
+
+def set_entry(view: Any, name: str, level: Any) -> None:
+    """Set the level of the ant's own cell in a view, while a kernel compiles."""
+    getattr(view, f"own_{name}")._assign(level)
+
+
+# Taichi requires this attribute, with any value, of Python functions that kernels call.
+entry_of._is_taichi_function = set_entry._is_taichi_function = False  # type: ignore[attr-defined]
+
+
 @ti.func
-def looks_of(ground):
-    """Return the ground of a cell, without the mark of the ant on it: u8 -> i32."""
-    return ti.cast(ground & 15, ti.i32)
+def read_fields(c: ti.template(), v: ti.template(), view: ti.template(), k, place, standable, tick):
+    """Set the levels of cell number k of a view in the pheromones that the observation reads."""
+    for i in ti.static(range(len(v.reads))):
+        level = level_of(ti.static(v.field(c, v.reads[i])), place, tick)
+        entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
+
+
+@ti.func
+def read_own_levels(c: ti.template(), v: ti.template(), view: ti.template(), here, tick):
+    """Set the levels of the ant's own cell in the pheromones that the observation reads."""
+    for i in ti.static(range(len(v.reads))):
+        level = level_of(ti.static(v.field(c, v.reads[i])), here, tick)
+        set_entry(view, v.observation.reads[i], level)
+
+
+@ti.func
+def looks_of(c: ti.template(), v: ti.template(), place, queen):
+    """Return the ground of a cell, i32, as an ant sees it whose queen is on the cell `queen`.
+
+    Ants, and the queens of other nests, look like obstacles.
+    """
+    ground = ti.cast(c.ground[place] & 15, ti.i32)
+    if ti.static(v.n_nests > 1):
+        ground = ti.select((ground == QUEEN) & (place != queen), OBSTACLE, ground)
+    return ground
+
+
+@ti.func
+def nest_of(c: ti.template(), v: ti.template(), ant):
+    """Return the nest of an ant."""
+    nest = 0
+    if ti.static(v.n_nests > 1):
+        nest = trait(c.nest, ant)
+    return nest
+
+
+@ti.func
+def holds_nestmate(c: ti.template(), v: ti.template(), ant, place):
+    """Return whether an ant of the same nest is on a cell; others are obstacles."""
+    held = ti.cast(c.ground[place] >> 4, ti.i32)
+    holds = held != 0
+    if ti.static(v.n_nests > 1):
+        holds = held & ANT_STANDS == ANT_STANDS - nest_of(c, v, ant)
+    return holds
+
+
+@ti.func
+def own_queen(c: ti.template(), v: ti.template(), w, ant):
+    """Return the place of an ant's queen in `ground`; -1 with one nest, which needs none."""
+    queen = -1
+    if ti.static(v.n_nests > 1):
+        column = w * v.n_nests + nest_of(c, v, ant)
+        queen = w * c.size + c.nests[NestRow.QUEEN_CELL, column]
+    return queen
+
+
+@ti.func
+def own_map(c: ti.template(), v: ti.template(), w, ant):
+    """Return the place of an ant's cell in the map of its nest in `closer`."""
+    return (w * v.n_nests + nest_of(c, v, ant)) * c.size + c.cell[ant]
 
 
 @ti.func
 def table_of(c: ti.template(), v: ti.template(), owner):
     """Return the start of the tables of an ant, or of a world whose ants share a table."""
-    return owner * c.tables * (v.observation.n_states * ROW)
+    return owner * c.tables * v.n_numbers
+
+
+@ti.func
+def owner_of(c: ti.template(), v: ti.template(), w, ant):
+    """Return the owner of the table by which an ant chooses: its slot, or its world and nest."""
+    return ant if ti.static(v.own_tables) else w * v.n_nests + nest_of(c, v, ant)
 
 
 @ti.func
 def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
-    table = table_of(c, v, ant if ti.static(v.own_tables) else w)
-    values, bits = values_of(c.q, table, state), bits_of(random_state)
-    return choose_in_crowd(c.compass, values, bits, c.explore_below)
+    action, bits = 0, bits_of(random_state)
+    if ti.static(v.choice == "deneubourg"):
+        action = draw_cell(c, v, w, ant, state, bits)
+    else:
+        table = table_of(c, v, owner_of(c, v, w, ant))
+        values = values_of(c.q, table, state)
+        if ti.static(v.choice == "softmax"):
+            action = choose_softly(values, bits, c.explore_below, c.choice[0])
+        else:
+            action = choose_in_crowd(c.compass, values, bits, c.explore_below)
+    return action
+
+
+@ti.func
+def draw_cell(c: ti.template(), v: ti.template(), w, ant, state, bits):
+    """Return the ant's action by the rule "deneubourg", with 64 random bits.
+
+    `state` is the paper's state as the ant sees it. A cell that it misreads looks as if it had no
+    trail, and is nearer to the queen if it looks S. A cell with an ant is open if the traffic rules
+    ever let an ant with this load enter it. With a field as homing cue, no cell is nearer.
+    """
+    percept, heading, carries = trait(c.percept, ant), trait(c.heading, ant), trait(c.carries, ant)
+    here = w * c.size + c.cell[ant]
+    tick = c.worlds[WorldRow.TICKS, w]
+    nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+    codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
+    weights = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
+    for i in ti.static((LEFT, FORWARD, RIGHT)):
+        place = here + step_towards(c.compass, heading, i)
+        code = vision.code_in_view(state, i)
+        is_true = code == vision.code_in_view(percept, i)
+        codes[i] = code
+        opens[i] = ti.cast(is_open(code), ti.i32)
+        nears[i] = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(v.has_compass))
+        if ti.static(v.traffic.shared):
+            if is_true & holds_nestmate(c, v, ant, place):
+                opens[i] = 1 if ti.static(v.traffic.follow) else carries
+                nears[i] = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(v.has_compass))
+        level = cue_level(c, v, carries, place, tick)
+        weights[i] = attraction(ti.select(is_true, level, 0), c.choice[1], c.choice[2])
+    return choose_cell(carries, codes, opens, nears, weights, bits)
+
+
+@ti.func
+def executed_by(c: ti.template(), v: ti.template(), ant):
+    """Return the action that an ant executes in this tick."""
+    action = 0
+    if ti.static(v.slips):
+        action = trait(c.executed, ant)
+    else:
+        action = trait(c.action, ant)
+    return action
 
 
 @ti.func
@@ -166,11 +383,15 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if action < 0:
         random_state = advance(random_state)
         action = draw_action(c, v, w, ant, state_index_of(c, v, ant), random_state)
+    put(c.action, ant, action)
+    if ti.static(v.slips):
+        action, random_state = noise.slipped(action, random_state, c.slip_below)
+        put(c.executed, ant, action)
     heading = turned_by(c.compass, trait(c.heading, ant), action)
     ahead = cell + step_towards(c.compass, heading, FORWARD)
     enters = is_open(vision.code_in_view(percept, ti.min(action, RIGHT)))
     if ti.static(v.traffic.shared):
-        enters = enters | (c.ground[w * c.size + ahead] >> 4 != 0)
+        enters = enters | holds_nestmate(c, v, ant, w * c.size + ahead)
     enters = enters & (action <= RIGHT)
     wanted = ti.select(enters, ahead, cell)
     mark = ti.select(enters, conflicts.ENTER + heading, v.idle)
@@ -184,7 +405,6 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         mark = conflicts.TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
     c.streams[ant] = random_state
     put(c.heading, ant, heading)
-    put(c.action, ant, action)
     c.want[ant] = wanted
     if ti.static(v.traffic.shared):
         takes = ti.select(mark >= conflicts.TAKE, conflicts.TAKES_FOOD, 0)
@@ -203,7 +423,7 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
     c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, conflicts.WINS, 0), ti.u8)
     c.want[ant] = ti.select(won, wanted, cell)
-    put(c.event, ant, event_of(c, v, base, ant, tick * c.evaporates))
+    put(c.event, ant, event_of(c, v, base, ant, tick))
 
 
 @ti.func
@@ -213,25 +433,36 @@ def step_ahead(c: ti.template(), ant):
 
 
 @ti.func
-def event_of(c: ti.template(), v: ti.template(), base, ant, clock):
+def event_of(c: ti.template(), v: ti.template(), base, ant, tick):
     """Return the event of a successful move; a cell with an ant is a lure if it is better."""
-    action, percept = trait(c.action, ant), trait(c.percept, ant)
+    action, percept = executed_by(c, v, ant), trait(c.percept, ant)
     event = move_event(vision.code_in_view(percept, ti.min(action, RIGHT)))
     here = base + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
-        rises = level_of(c, v, ahead, clock) > level_of(c, v, here, clock)
-        nearer = ti.cast(c.closer[here], ti.i32) >> trait(c.heading, ant) & 1 == 1
-        better = ti.select(trait(c.carries, ant) == 1, nearer, rises)
+        better = is_stronger(ti.static(v.field(c, v.outbound)), ahead, here, tick)
+        if trait(c.carries, ant) == 1:
+            if ti.static(v.has_compass):
+                closer = ti.cast(c.closer[own_map(c, v, base // c.size, ant)], ti.i32)
+                better = closer >> trait(c.heading, ant) & 1 == 1
+            else:
+                better = is_stronger(ti.static(v.field(c, v.homing)), ahead, here, tick)
         event = ti.select(better, Event.ENTERED_LURE, Event.ENTERED_EMPTY)
     return event
 
 
 @ti.func
+def is_stronger(field: ti.template(), place, other, tick):
+    """Return whether the level of a cell is higher than that of another one."""
+    return level_of(field, place, tick) > level_of(field, other, tick)
+
+
+@ti.func
 def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Do the action of an ant: move or pick up if it has won, or deliver; and deposit."""
-    base, clock = w * c.size, tick * c.evaporates
-    action, percept = trait(c.action, ant), trait(c.percept, ant)
+    base = w * c.size
+    trail = ti.static(v.field(c, 0))
+    action, percept = executed_by(c, v, ant), trait(c.percept, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
     moves = action <= RIGHT
@@ -253,41 +484,89 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if not filled:
         c.ground[base + cell] = EMPTY
     c.want[ant] = cell  # the cell with the ant's mark
+    had_food, age = carries, c.carried[ant]
     if carries == 1:
         carried = c.carried[ant]
         if goes != cell:
-            deposit(c, v, base + goes, clock, carried)
+            deposit(trail, base + goes, tick, carried)
         elif can_give(action, percept):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
             put(c.carries, ant, 0)
             put(c.heading, ant, heading_after_delivery(heading, c.turns_at_queen))
             tally(c, Tally.DELIVERIES, chunk, 1)
+            count_apart(c, v, ant, chunk)
         c.carried[ant] = carried + 1
     elif takes:
         event, carries = ti.cast(Event.PICKED_UP, ti.i32), 1
         put(c.carries, ant, 1)
         c.carried[ant] = 1
-        c.ground[base + wanted] = EMPTY
-        take_from_source(c, base + wanted, tick)
-        deposit(c, v, base + wanted, clock, 0)
-        deposit(c, v, base + cell, clock, 0)
+        take_load(c, v, ant, base + wanted, tick)
+        deposit(trail, base + wanted, tick, 0)
+        deposit(trail, base + cell, tick, 0)
         put(c.heading, ant, turn_round(heading))
+    if ti.static(len(v.pheromones) > 1):
+        age = ti.select(carries == had_food, age, 0)
+        occasions = occasions_of(had_food, percept, action, event, goes != cell)
+        for field in ti.static(v.further_fields(c)):
+            lay(field, occasions, base, cell, goes, wanted, tick, age)
+        if c.counts_without_food == 1:
+            c.carried[ant] = age + 1
     ground = ANT_GROUND
-    if ti.static(v.sees_ants):
-        ground = OBSTACLE | (ANT_STANDS << 4) + (carries << 7)
+    if ti.static(v.sees_ants or v.n_nests > 1):
+        ground = OBSTACLE | ((ANT_STANDS - nest_of(c, v, ant)) << 4) + (carries << 7)
     c.ground[base + goes] = ti.cast(ground, ti.u8)
     c.cell[ant] = goes
     put(c.event, ant, event)
     tally(c, Tally.MOVES, chunk, ti.cast(moves, ti.i32))
     tally(c, Tally.BLOCKED, chunk, ti.cast(moves & (not enters), ti.i32))
-    tally(c, Tally.RETURNS, chunk, c.rewards[event])
+    tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
 
 
 @ti.func
 def tally(c: ti.template(), state, chunk, n):
     """Add n to a tally of a chunk, which one thread processes; `+=` would be atomic and slower."""
     c.tallies[chunk * TALLY_WIDTH + state] = c.tallies[chunk * TALLY_WIDTH + state] + n
+
+
+@ti.func
+def count_apart(c: ti.template(), v: ti.template(), ant, chunk):
+    """Count a delivery by nest and kind of food, if there are several."""
+    if ti.static(v.counts_apart):
+        place = chunk * NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
+        if ti.static(v.n_kinds > 1):
+            place += trait(c.kind, ant)
+        c.delivered[place] = c.delivered[place] + 1
+
+
+@ti.func
+def reward_of(c: ti.template(), v: ti.template(), ant):
+    """Return the reward of the last event of an ant, i32."""
+    event = trait(c.event, ant)
+    reward = c.rewards[event]
+    if ti.static(v.has_foods):
+        if (event == Event.PICKED_UP) | (event == Event.DELIVERED):
+            kind = 0
+            if ti.static(v.n_kinds > 1):
+                kind = trait(c.kind, ant)
+            reward = c.food_numbers[FoodRow.PICK_UP, kind]
+            if event == Event.DELIVERED:
+                reward = c.food_numbers[FoodRow.DELIVER, kind]
+    return reward
+
+
+@ti.func
+def take_load(c: ti.template(), v: ti.template(), ant, place, tick):
+    """Take a load of food from a cell, which becomes empty with its last load."""
+    left = 0
+    if ti.static(v.n_kinds > 1):
+        put(c.kind, ant, ti.cast(c.kind_of[place], ti.i32))
+    if ti.static(v.has_loads):
+        left = c.loads[place] - 1
+        c.loads[place] = left
+    if left == 0:
+        c.ground[place] = EMPTY
+        take_from_source(c, place, tick)
 
 
 @ti.func

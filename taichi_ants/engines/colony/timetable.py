@@ -38,7 +38,8 @@ class Timetable:
         self._measures = {
             one.measure: measures.get(one.measure) for one in self._events if isinstance(one, When)
         }
-        self._check_colony()
+        if self._events:
+            self._check_colony()
 
     def _check_colony(self) -> None:
         """Raise an AntsError if an intervention cannot happen in this colony."""
@@ -57,6 +58,8 @@ class Timetable:
                 one.check_in(colony.grid, colony.task)
 
     def __enter__(self) -> None:
+        if not self._events:
+            return
         colony = self._colony
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
@@ -65,6 +68,8 @@ class Timetable:
         self._q = colony.arrays["q"].copy() if replaces else None
 
     def __exit__(self, *_: object) -> None:
+        if not self._events:
+            return
         colony, (task, training, epsilon, learning_rate) = self._colony, self._before
         if colony.task != task:
             Interventions(colony, lasting=False).set_task(task)

@@ -1,61 +1,145 @@
-"""The trails of a colony: expiry clocks in the array `trail`, or levels in `level` if dense."""
+"""The pheromones of a colony: expiry clocks, or levels if dense, by cell.
+
+Number 0 is the trail, in the array `trail`, or `level` if dense; 1, 2, ... are further fields, in
+`field_1`, `field_2`, ... Ants deposit in further fields on an `Occasion`. An ant deposits on its
+last or its present cell, or on the cell of the food that it takes, so that no two ants deposit on
+one cell of a field in a tick.
+"""
+
+from typing import Any, NamedTuple
 
 import taichi as ti
 
-from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD
-from taichi_ants.task.constants import EMPTY
-from taichi_ants.task.rules import pheromone
+from taichi_ants.engines.colony.layout import array_of
+from taichi_ants.task.constants import EMPTY, PICK_UP
+from taichi_ants.task.events import Event
+from taichi_ants.task.field import Occasion
+from taichi_ants.task.rules import pheromone, vision
+
+_NUMBERS = (
+    *("deposits", "deposit_level", "cap", "slope", "fades_after"),
+    *("evaporates", "decay", "share"),
+)
+
+
+class Pheromone(NamedTuple):
+    """A pheromone in kernels: whether it is dense, its view, its arrays, `Pheromone.numbers`."""
+
+    dense: bool
+    half: bool
+    under_carriers: bool
+    levels: Any
+    spare: Any  # the next levels, with diffusion
+    deposits: Any
+    deposit_level: Any
+    cap: Any
+    slope: Any
+    fades_after: Any
+    evaporates: Any
+    decay: Any
+    share: Any
+    laid: Any  # the occasions of deposits; None for the trail
+
+
+def pheromone_of(c: Any, number: int, dense: bool, view: str) -> Pheromone:
+    """Return a pheromone with the arrays and numbers of an argument pack."""
+    end = f"_{number}" if number else ""
+    return Pheromone(
+        dense,
+        view == "half",
+        view == "strongest_under_carriers",
+        getattr(c, array_of(number, dense)),
+        getattr(c, f"spare{end}") if dense else None,
+        *(getattr(c, name + end) for name in _NUMBERS),
+        laid=getattr(c, f"laid{end}") if number else None,
+    )
 
 
 @ti.func
-def level_of(c: ti.template(), v: ti.template(), place, clock):
-    """Return the trail of a cell: i32, or f32 if dense."""
-    return c.level[place] if ti.static(v.dense) else pheromone.level_left(c.trail[place], clock)
-
-
-@ti.func
-def level_in_view(c: ti.template(), v: ti.template(), place, clock):
-    """Return the trail that an ant sees in a cell: 0 unless the cell is empty."""
-    # Read without a branch, because the processor cannot predict which cells are empty.
-    return ti.select(c.ground[place] & 15 == EMPTY, level_of(c, v, place, clock), 0)
-
-
-@ti.func
-def level_that_counts(c: ti.template(), v: ti.template(), place, clock):
-    """Return the trail of a cell as it counts for the strongest one, 0 if it does not count."""
-    level = level_in_view(c, v, place, clock)
-    if ti.static(v.view == "strongest_under_carriers"):
-        carrier = c.ground[place] >> 4 == STANDS_WITH_FOOD
-        level = ti.select(carrier, level_of(c, v, place, clock), level)
+def level_of(field: ti.template(), place, tick):
+    """Return the level of a cell in a tick: i32, or f32 if dense."""
+    level = field.levels[place]
+    if ti.static(not field.dense):
+        level = pheromone.level_left(level, tick * field.evaporates)
     return level
 
 
 @ti.func
-def deposit(c: ti.template(), v: ti.template(), place, clock, carried):
-    """Deposit, by the task's rule, the trail of an ant that has carried its food for some ticks."""
-    if c.deposits != pheromone.NONE:
-        laid = pheromone.level_after_deposit(c, c.deposits, level_of(c, v, place, clock), carried)
-        if ti.static(v.dense):
-            c.level[place] = laid
-        else:
-            c.trail[place] = clock + laid
+def level_in_view(c: ti.template(), field: ti.template(), place, tick):
+    """Return the level that an ant sees in a cell: 0 unless the cell is empty."""
+    # Read without a branch, because the processor cannot predict which cells are empty.
+    return ti.select(c.ground[place] & 15 == EMPTY, level_of(field, place, tick), 0)
 
 
 @ti.func
-def evaporate(c: ti.template(), place):
-    """Evaporate the dense trail of a cell for one tick."""
-    c.level[place] = pheromone.evaporated(c.level[place], c.decay)
+def level_that_counts(c: ti.template(), field: ti.template(), place, tick):
+    """Return the level of a cell as it counts for the strongest one, 0 if it does not count."""
+    level = level_in_view(c, field, place, tick)
+    if ti.static(field.under_carriers):
+        carrier = c.ground[place] >> 7 == 1  # of any nest
+        level = ti.select(carrier, level_of(field, place, tick), level)
+    return level
 
 
 @ti.func
-def diffuse(c: ti.template(), place):
-    """Compute the level of a cell after one tick of diffusion."""
-    if c.share > 0.0:
-        c.spare[place] = pheromone.diffused(c.level, c.walls, c.compass, place, c.share)
+def deposit(field: ti.template(), place, tick, carried):
+    """Deposit, by the rule of a pheromone, what an ant lays after some ticks with its load."""
+    if field.deposits != pheromone.NONE:
+        level = level_of(field, place, tick)
+        laid = pheromone.level_after_deposit(field, field.deposits, level, carried)
+        if ti.static(not field.dense):
+            laid += tick * field.evaporates
+        field.levels[place] = laid
 
 
 @ti.func
-def settle(c: ti.template(), place):
-    """Set the level of a cell to the result of `diffuse`."""
-    if c.share > 0.0:
-        c.level[place] = c.spare[place]
+def occasions_of(had_food, percept, action, event, has_moved):
+    """Return the occasions of an ant in a tick, by its load and percept before it acted."""
+    found = 0
+    if has_moved:
+        found = ti.select(had_food == 1, Occasion.MOVED_WITH_FOOD, Occasion.MOVED_WITHOUT_FOOD)
+    if event == Event.PICKED_UP:
+        found |= Occasion.PICKED_UP
+    if event == Event.DELIVERED:
+        found |= Occasion.DELIVERED
+    if had_food == 0:
+        if percept == vision.DEAD_END:
+            found |= Occasion.DEAD_END
+        if (action == PICK_UP) & (event == Event.FAILED):
+            found |= Occasion.FAILED_PICK_UP
+    return found
+
+
+@ti.func
+def lay(field: ti.template(), occasions, base, cell, goes, food, tick, carried):
+    """Deposit in a further field on the cell that an ant leaves or enters, or on its food's."""
+    laid = field.laid & occasions  # a single one, see `Field.laid`
+    if laid != 0:
+        deposit(field, base + ti.select(laid == Occasion.DEAD_END, cell, goes), tick, carried)
+        if laid == Occasion.PICKED_UP:
+            deposit(field, base + food, tick, carried)
+
+
+@ti.func
+def evaporate(c: ti.template(), v: ti.template(), place):
+    """Evaporate the dense pheromones of a cell for one tick."""
+    for field in ti.static(v.dense_fields(c)):
+        field.levels[place] = pheromone.evaporated(field.levels[place], field.decay)
+
+
+@ti.func
+def diffuse(c: ti.template(), v: ti.template(), place):
+    """Compute the levels of a cell after one tick of diffusion."""
+    for field in ti.static(v.dense_fields(c)):
+        if field.share > 0.0:
+            field.spare[place] = pheromone.diffused(
+                field.levels, c.walls, c.compass, place, field.share
+            )
+
+
+@ti.func
+def settle(c: ti.template(), v: ti.template(), place):
+    """Set the levels of a cell to the results of `diffuse`."""
+    for field in ti.static(v.dense_fields(c)):
+        if field.share > 0.0:
+            field.levels[place] = field.spare[place]

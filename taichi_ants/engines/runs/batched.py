@@ -22,7 +22,8 @@ _PER_CHUNK = 256  # ants that one thread steps in a row
 _OF_ANTS: dict[type, tuple[str, ...]] = {
     np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
     + ("final_states",),
-    np.uint8: ("commands", "actions", "headings", "carries", "changed", "percepts", "events")
+    np.uint8: ("commands", "actions", "executed", "headings", "carries", "changed", "percepts")
+    + ("events",)
     + ("terminations", "truncations", "reasons", "final_percepts"),
     np.uint64: ("random_states",),
     np.float64: ("rewards_of",),
@@ -40,8 +41,8 @@ class BatchedEnvironments:
     Attributes:
         arrays: Arrays by name, with one row per ant. States: percepts uint8, states int32. Results
             of the last action: rewards_of float64, terminations and truncations uint8, events uint8
-            (`Event`), reasons uint8 (`Reason`). Last states of an episode that `step` has
-            restarted: final_states int32, final_percepts uint8.
+            (`Event`), reasons uint8 (`Reason`), executed uint8 if actions slip. Last states of an
+            episode that `step` has restarted: final_states int32, final_percepts uint8.
     """
 
     def __init__(
@@ -110,11 +111,11 @@ class BatchedEnvironments:
             if self._launch is None:
                 runtime.start()  # configures Taichi before the imports below
                 from taichi_ants.engines.arguments import Launch
-                from taichi_ants.engines.runs.kernels import step_kernel
+                from taichi_ants.engines.runs.kernels import failures_of, step_kernel
 
                 half, serial = self.task.pheromone.view == "half", self.n <= _PER_CHUNK
                 rules = self.task.sees, self.arrays["deposits"], half, serial
-                self._launch = Launch(partial(step_kernel, *rules))
+                self._launch = Launch(partial(step_kernel, *rules, failures_of(self.task)))
             self._launch(self.arrays)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -109,7 +109,7 @@ class Runs:
     def following(
         cls, tables: np.ndarray, seeds: np.ndarray, numbers: np.ndarray, epsilon: float
     ) -> Runs:
-        """Return runs that follow tables (n, n_states, 5), in the rollouts `numbers` of each."""
+        """Return runs that follow tables (n, n_states, 5) in the rollouts of these `numbers`."""
         state = RunState.empty((len(tables),), tables.shape[-2])
         state.q[:, 0, :, :N_ACTIONS] = tables
         state.epsilon[:] = epsilon
@@ -130,6 +130,7 @@ def laid_out(worlds: Sequence[World], task: Task, falls: bool) -> dict[str, Any]
         **(task.pheromone if falls else task.pheromone.lasting).numbers,
         **task.numbers,
         "rewards": task.rewards.by_event(),
+        "choice": task.choice.numbers(),
         # For each world: packed cells and all trails (also under food) at the start of an episode;
         # per cell a bit for each heading that leads nearer to the queen.
         "world": np.concatenate([pack_cells(world) for world in worlds]),
@@ -147,7 +148,7 @@ class Launcher:
     ) -> None:
         # Imported here, because Taichi must be configured first; see `runtime`.
         from taichi_ants.engines.arguments import Launch
-        from taichi_ants.engines.runs.kernels import run_kernel
+        from taichi_ants.engines.runs.kernels import failures_of, run_kernel
         from taichi_ants.engines.runs.step import EXTRA_CELLS
 
         self._runs = runs
@@ -155,7 +156,8 @@ class Launcher:
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
         learns, pheromone = runs.learner is not None, task.pheromone
         deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
-        self._launch = Launch(partial(run_kernel, runs.learner, task.sees, deposits, half, traced))
+        rules = runs.learner, task.sees, deposits, half, traced, failures_of(task)
+        self._launch = Launch(partial(run_kernel, *rules, task.choice.rule == "softmax"))
         falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self._values = {**_NO_WORK, **laid_out([world], task, falls), "max_steps": max_steps}
         self._launch(self._values)  # compiles the kernel

@@ -8,7 +8,7 @@ with given actions.
 from collections.abc import Callable
 from dataclasses import fields
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import taichi as ti
 
@@ -37,18 +37,37 @@ from taichi_ants.engines.runs.step import (
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, read_rates, values_of
+from taichi_ants.task import Task
 from taichi_ants.task.constants import FOOD, FORWARD, PICK_UP, QUEEN, ROW
 from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.actions import step_towards
 from taichi_ants.task.rules.delivery import step_end
+from taichi_ants.task.rules.noise import slipped
 from taichi_ants.task.rules.pheromone import FADING
-from taichi_ants.task.rules.policy import chance_of, choose
+from taichi_ants.task.rules.policy import (
+    chance_of,
+    chance_of_softly,
+    choose,
+    choose_softly,
+)
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
 # The largest index into arrays, see `engine.size_of_launch`. The mask tells the compiler that
 # indices are not negative.
 _PLACES = 2**30 - 1
+
+
+class Failures(NamedTuple):
+    """The kinds of noise that are compiled into a kernel; see `task.Noise`."""
+
+    slips: bool = False
+    misreads: bool = False
+
+
+def failures_of(task: Task) -> Failures:
+    """Return the kinds of noise of a task."""
+    return Failures(task.noise.slip > 0, task.noise.misread > 0)
 
 
 @cache
@@ -58,11 +77,14 @@ def run_kernel(
     deposit: int,
     half: bool,
     traced: bool,
+    failures: Failures,
+    softly: bool,
     arguments: Any,
 ) -> Callable[..., None]:
     """Return the kernel for runs that learn, or that follow a fixed policy if `learner` is None.
 
-    For `deposit` and `half`, see `rules.pheromone` and `Pheromone.view`. If `traced`, the kernel
+    For `deposit` and `half`, see `rules.pheromone` and `Pheromone.view`. If `softly`, ants choose
+    by the rule "softmax". Random draws are in the order of a colony's. If `traced`, the kernel
     also records each step, in `n_episodes * max_steps` rows per run. `arguments` is the type of the
     argument pack.
     """
@@ -73,7 +95,7 @@ def run_kernel(
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
     read = read_rates(hyperparameters)
     columns = N_SETTINGS + len(fields(hyperparameters))
-    state_of = state_seen(observation, half)
+    state_of = state_seen(observation, half, failures.misreads)
     n_states = observation.n_states
     table = n_states * ROW
 
@@ -81,13 +103,30 @@ def run_kernel(
     def decide(a: ti.template(), begin, ant, state, explore_below):
         """Return the next action, the stream after the draw and, if traced, the probability."""
         rng, values = advance(ant.random_state), values_of(a.q, begin, state)
-        action, chance = choose(values, bits_of(rng), explore_below), ti.f64(0.0)
-        if ti.static(traced):
-            chance = chance_of(values, action, explore_below)
+        action, chance = 0, ti.f64(0.0)
+        if ti.static(softly):
+            action = choose_softly(values, bits_of(rng), explore_below, a.choice[0])
+            if ti.static(traced):
+                chance = chance_of_softly(values, action, explore_below, a.choice[0])
+        else:
+            action = choose(values, bits_of(rng), explore_below)
+            if ti.static(traced):
+                chance = chance_of(values, action, explore_below)
         return action, rng, chance
 
     @ti.func
-    def record(a: ti.template(), n, episode, step, before, percept, taken, after, seen):
+    def observe(a: ti.template(), base, ant, clock):
+        """Return the percept and the state of an ant, and the stream after possible draws."""
+        percept, state = percept_of(half, a, base, ant, clock), 0
+        after = ant.random_state
+        if ti.static(failures.misreads):
+            state, after = state_of(a, base, ant, clock, percept)
+        else:
+            state = state_of(a, base, ant, clock, percept)
+        return percept, state, after
+
+    @ti.func
+    def record(a: ti.template(), n, episode, step, before, percept, taken, executed, after, seen):
         """Record the integers of a step."""
         a.trace[n, 0], a.trace[n, 1] = episode, step
         a.trace[n, 2], a.trace[n, 3] = before.cell, before.heading
@@ -95,6 +134,7 @@ def run_kernel(
         a.trace[n, 6], a.trace[n, 7] = taken.action, a.rewards[after.event]
         a.trace[n, 8], a.trace[n, 9] = seen, taken.next_state
         a.trace[n, 10], a.trace[n, 11] = taken.terminated, after.event
+        a.trace[n, 12] = executed
 
     @ti.kernel
     def run(a: arguments):
@@ -127,8 +167,7 @@ def run_kernel(
                 explore_below = ti.cast(exploration * 4294967296.0, ti.u64)
                 step, clock, total, next_action = 0, 0, 0, -1
                 next_chance = ti.f64(0.0)  # probability of a next action drawn before learning
-                percept = percept_of(half, a, base, ant, clock)
-                state = state_of(a, base, ant, clock, percept)
+                percept, state, ant.random_state = observe(a, base, ant, clock)
                 if ti.static(on_policy):
                     next_action, ant.random_state, next_chance = decide(
                         a, at.table, ant, state, explore_below
@@ -141,13 +180,15 @@ def run_kernel(
                         )
                     if ti.static(traced):
                         a.trace_chances[n_recorded] = chance
+                    executed = action
+                    if ti.static(failures.slips):
+                        executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
                     before = ant
-                    ant = act(deposit, a, base, ant, percept, action, clock)
+                    ant = act(deposit, a, base, ant, percept, executed, clock)
                     clock += a.evaporates
                     reward = a.rewards[ant.event]
                     total += reward
-                    seen = percept_of(half, a, base, ant, clock)
-                    next_state = state_of(a, base, ant, clock, seen)
+                    seen, next_state, ant.random_state = observe(a, base, ant, clock)
                     last = ti.cast(step + 1 == a.max_steps, ti.i32)
                     terminated, truncated = step_end(ant.event, a.delivery_terminates, 1, last)
                     if ti.static(on_policy):
@@ -175,7 +216,11 @@ def run_kernel(
                                 for k in range(table):
                                     a.trace_tables[n_recorded * table + k] = a.q[at.table + k]
                     if ti.static(traced):
-                        record(a, n_recorded, episode, step, before, percept, taken, ant, seen)
+                        record(
+                            *(a, n_recorded, episode, step, before, percept, taken, executed),
+                            ant,
+                            seen,
+                        )
                         n_recorded += 1
                     percept, state = seen, next_state
                     step += 1
@@ -219,13 +264,19 @@ def reason_of(a: ti.template(), base, before, after, action):
 
 @cache
 def step_kernel(
-    observation: Observation, deposit: int, half: bool, serial: bool, arguments: Any
+    observation: Observation,
+    deposit: int,
+    half: bool,
+    serial: bool,
+    failures: Failures,
+    arguments: Any,
 ) -> Callable[..., None]:
     """Return the kernel of a step, in which ants act, observe and restart; see `run_kernel`.
 
-    If `serial`, one thread does all the work, because waking others would take longer.
+    If `serial`, one thread does all the work, because waking others would take longer. With
+    failures, each ant draws from its stream in the order of a colony's.
     """
-    state_of = state_seen(observation, half)
+    state_of = state_seen(observation, half, failures.misreads)
 
     @ti.func
     def put(a: ti.template(), i, ant):
@@ -240,7 +291,12 @@ def step_kernel(
         """Store the percept and state of an ant; the cells of its world start at `base`."""
         percept = percept_of(half, a, base, ant, clock)
         a.percepts[i] = ti.cast(percept, ti.u8)
-        a.states[i] = state_of(a, base, ant, clock, percept)
+        if ti.static(failures.misreads):
+            seeing = ant
+            seeing.random_state = a.random_states[i]
+            a.states[i], a.random_states[i] = state_of(a, base, seeing, clock, percept)
+        else:
+            a.states[i] = state_of(a, base, ant, clock, percept)
 
     @ti.func
     def begin(a: ti.template(), i, own, origin):
@@ -253,8 +309,12 @@ def step_kernel(
         observe(a, i, origin, ant, 0)
 
     @ti.func
-    def do(a: ti.template(), i, own, origin, action):
+    def do(a: ti.template(), i, own, origin, chosen):
         """Do an action of an ant, and return whether the episode has ended."""
+        action = chosen
+        if ti.static(failures.slips):
+            action, a.random_states[i] = slipped(chosen, a.random_states[i], a.slip_below)
+            a.executed[i] = ti.cast(action, ti.u8)
         before = Ant(origin=origin, cell=a.ant_cells[i], heading=ti.cast(a.headings[i], ti.i32))
         before.carries = ti.cast(a.carries[i], ti.i32)
         if ti.static(deposit == FADING):

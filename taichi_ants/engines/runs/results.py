@@ -19,6 +19,7 @@ from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Memory
+from taichi_ants.measures.tidy import Measured, Tidy, seed_array
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
@@ -79,7 +80,10 @@ class RunState(Record):
         return state
 
     def part(self, configs: slice | list[int]) -> RunState:
-        """Return runs of some configurations with one leading axis: views of a slice, or copies."""
+        """Return the runs of some configurations, in arrays (runs, ...).
+
+        The arrays are views if `configs` is a slice, else copies.
+        """
         n, arrays = self.epsilon[configs].size, vars(self).items()
         return RunState(
             **{name: array[configs].reshape(n, *array.shape[2:]) for name, array in arrays}
@@ -102,7 +106,7 @@ def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TrainingResult(Record):
+class TrainingResult(Record, Tidy):
     """The result of `train`: C configurations, S seeds, E episodes.
 
     Two results are equal if everything except `seconds` is equal.
@@ -148,6 +152,11 @@ class TrainingResult(Record):
         for name, (kind, shape) in forms.items():
             array = arrays[name]
             check_array(f"the array {name} of a result", array, kind, shape)
+
+    def measured(self) -> Measured:
+        """Return the values of the measures of each episode of each run."""
+        arrays = {name: getattr(self, name) for name in OUTCOMES}
+        return _measured(arrays, self.seeds, _labels(self.configs))
 
     @property
     def episodes(self) -> int:
@@ -212,9 +221,71 @@ class TrainingResult(Record):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rollouts(Record):
-    """The result of `evaluate`: int32 arrays of shape q_values.shape[:-2] + (rollouts,)."""
+class Rollouts(Record, Tidy):
+    """The result of `evaluate`: int32 arrays of shape q_values.shape[:-2] + (rollouts,).
+
+    `seeds` has the seed of each table, in the order of the last of its leading axes.
+    """
 
     returns: np.ndarray
     steps: np.ndarray
     deliveries: np.ndarray
+    seeds: tuple[int, ...] = field(default=(), compare=False, repr=False)
+
+    def measured(self) -> Measured:
+        """Return the values of the measures of each rollout; `configuration` numbers the tables.
+
+        Tables are numbered along all leading axes except the last one, which is that of the seeds.
+        """
+        rollouts, leading = self.returns.shape[-1], self.returns.shape[:-1]
+        shape = (-1, leading[-1] if leading else 1, rollouts)
+        arrays = {name: getattr(self, name).reshape(shape) for name in OUTCOMES}
+        n, several = arrays["returns"].shape[:2]
+        names = ("",) if n == 1 else tuple(f"table {number}" for number in range(n))
+        return _measured(arrays, self.seeds or tuple(range(several)), names)
+
+
+def _measured(
+    arrays: dict[str, np.ndarray], seeds: tuple[int, ...], groups: tuple[str, ...]
+) -> Measured:
+    """Return the measures of lone ants from arrays (configurations, seeds, episodes) by name."""
+    steps, deliveries = arrays["steps"].ravel(), arrays["deliveries"].ravel()
+    configurations, places, episodes = (
+        one.ravel().astype(np.int32) for one in np.indices(arrays["steps"].shape)
+    )
+    return Measured(
+        index={
+            "configuration": configurations,
+            "seed": seed_array(seeds)[places],
+            "episode": episodes,
+            "tick": steps,
+        },
+        values={
+            **{name: array.ravel() for name, array in arrays.items()},
+            "first_delivery": steps,  # an episode ends at its first delivery, or without one
+            "efficiency": deliveries / steps,
+        },
+        of_seed=places,
+        of_group=configurations,
+        seeds=seeds,
+        groups=groups,
+        usual=("returns", "steps"),
+        units={"steps": "ticks", "first_delivery": "ticks", "efficiency": "per ant and tick"},
+    )
+
+
+def _labels(configs: Sequence[TrainingConfig]) -> tuple[str, ...]:
+    """Return a short name of each configuration: the settings that differ."""
+    rows = [{**one.as_dict(), **dict(one.hyperparameters)} for one in configs]
+    for row in rows:
+        row.pop("hyperparameters", None)
+    names = dict.fromkeys(name for row in rows for name in row)
+    differ = [name for name in names if len({str(row.get(name)) for row in rows}) > 1]
+    return tuple(
+        ", ".join(
+            str(row[name]) if name == "learner" else f"{name.replace('_', ' ')} {row[name]}"
+            for name in differ
+            if name in row
+        )
+        for row in rows
+    )

@@ -12,7 +12,7 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import FORWARD, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.events import Event
 from taichi_ants.task.observations import Observation
-from taichi_ants.task.rules import vision
+from taichi_ants.task.rules import noise, vision
 from taichi_ants.task.rules.actions import is_open, move_event, step_towards, turn, turn_round
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, level_left
@@ -87,16 +87,20 @@ def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
 
 
 @cache
-def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
-    """Return a `ti.func` (a, base, ant, clock, percept) that returns the ant's state index."""
+def state_seen(observation: Observation, half: bool, misreads: bool = False) -> Callable[..., Any]:
+    """Return a `ti.func` (a, base, ant, clock, percept) that returns the ant's state index.
+
+    With `misreads`, it may misread cells, and returns the state index and the random stream after
+    the draws; see `rules.noise`.
+    """
     if observation.name == "paper":  # no view is needed
-        return _percept_itself
+        return _percept_misread if misreads else _percept_itself
     in_view = observation.cells
     left, forward, right = observation.ahead
     view_of, encode = view_type(observation, False), encode_function(observation)
 
     @ti.func
-    def see(a: ti.template(), base, ant, clock, percept):
+    def see(a: ti.template(), base, ant, clock):
         here = base + ant.cell
         nearer = vision.nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
         view = view_of(carries=ant.carries, own_level=level_left(a.cells[here], clock))
@@ -108,15 +112,30 @@ def state_seen(observation: Observation, half: bool) -> Callable[..., Any]:
             view.codes[k] = ground_of(cell)
         ahead = ti.max(view.levels[left], view.levels[forward])
         view.strongest = ti.max(ahead, view.levels[right])
-        judge(half, view, observation)
-        return encode(view)
+        judge(half, "", view, observation)
+        return view
 
-    return see
+    @ti.func
+    def see_state(a: ti.template(), base, ant, clock, percept):
+        return encode(see(a, base, ant, clock))
+
+    @ti.func
+    def misread_state(a: ti.template(), base, ant, clock, percept):
+        view = see(a, base, ant, clock)
+        after = noise.misread_view(view, observation, ant.random_state, a.misread_below)
+        return encode(view), after
+
+    return misread_state if misreads else see_state
 
 
 @ti.func
 def _percept_itself(a: ti.template(), base, ant, clock, percept):
     return percept
+
+
+@ti.func
+def _percept_misread(a: ti.template(), base, ant, clock, percept):
+    return noise.misread_percept(percept, ant.random_state, a.misread_below)
 
 
 @ti.func

@@ -57,6 +57,7 @@ class Trace(Record):
         percepts, states: Percept, see `taichi_ants.task.states`; state index, which is the percept
             with the paper's observation.
         actions, rewards, events: Action, 0 to 4; its reward; its result, see `Event`.
+        executed: Action as executed, which differs from the chosen one only if actions slip.
         next_percepts, next_states: Percept and state index after the step.
         terminated: bool (n,), whether the learner treated the next state as terminal.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
@@ -80,6 +81,7 @@ class Trace(Record):
     q_values: np.ndarray
     td_errors: np.ndarray | None = None
     tables: np.ndarray | None = None
+    executed: np.ndarray | None = None
     made: Made | None = field(default=None, compare=False, repr=False)
 
     def __len__(self) -> int:
@@ -159,6 +161,7 @@ def trace_training(
     several = checks.checked_configs(config)
     if len(several) > 1:
         raise AntsError(f"config has {len(several)} configurations; pass a single one.")
+    checks.check_choices(several, task)
     seeds = checks.checked_seeds_for(seed, ())
     state = RunState.fresh(several, seeds.tolist(), task.n_states).part([0])
     runs = Runs.learning(several, seeds.tolist(), state)

@@ -57,6 +57,7 @@ def train(
     seeds = checks.checked_seeds(seeds)
     checks.checked_world(world, learns=True)
     task = checks.checked_runs_task(task)
+    checks.check_choices(configs, task)
     none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
     start = TrainingResult(
         world=world,
@@ -191,4 +192,6 @@ def evaluate(
     runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
     outcomes = np.empty((3, len(runs), rollouts), np.int32)
     do_episodes(checks.checked_world(world), task, max_steps, runs, outcomes, progress)
-    return Rollouts(*outcomes.reshape(3, *shape, rollouts))
+    returns, steps, deliveries = outcomes.reshape(3, *shape, rollouts)
+    of_tables = tuple(run_seeds[: shape[-1] if shape else 1].tolist())
+    return Rollouts(returns, steps, deliveries, of_tables)

@@ -23,6 +23,10 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 # Tables of this many rows have 5 * 2**20 values; kernels index several tables with 32 bits.
 MAX_STATES = 1 << 20
 AHEAD = (-1, 0, 1)
+_VIEW = (
+    *("carries", "percept", "codes", "levels", "ants", "nearer", "strongest", "own_level"),
+    *("entries", "keys", "items"),  # methods of a view in kernels
+)
 _VIEWS = 3000  # the number of views, and of names of states, that a check tries
 
 
@@ -37,8 +41,14 @@ class Observation:
     - `codes` (k): 0 E, 1 O, 2 T or S, 3 F or Q, relative to the strongest trail ahead.
     - `levels` (k): The trail level if the cell is empty or has an ant on it, else 0.
     - `ants` (k): 0 for no ant, 1 for an ant without food, 2 for an ant with food.
+    - `strangers` (k): 1 if an ant of another nest is on the cell, where `ants` is 0.
     - `nearer` (k): 1 if the cell is nearer to the queen than the ant's own.
     - `strongest`: The level of the strongest trail ahead; `own_level`: the ant's own cell.
+    - `NAME` (k), for each NAME in `reads`: The level of this field, like `levels`; `own_NAME`: that
+      of the ant's own cell.
+
+    Trails and levels are those of the outbound cue of the task. If the homing cue is a field, those
+    of ants with food are its levels, and `nearer` is 1 if the level exceeds `own_level`.
 
     Attributes:
         name: The name that tasks use.
@@ -46,12 +56,14 @@ class Observation:
         encode: A function of the view that returns the state index, from 0 to n_states - 1. It is
             compiled for the kernels. It computes with whole numbers: arithmetic, comparisons, `if`,
             and `for` over a `range`, without imports and calls. Its only `return` is its last line.
+        reads: The names of fields to read, or "trail"; the task must have these fields.
         cells: The cells in view, as headings relative to the ant's, each from -2 to 3. They must
             include -1, 0 and 1, the cells ahead.
         name_of: A function that returns the name of a state for people.
         summary: A line for listings.
         letters: The meaning of letters in names other than the paper's E, O, T, S, F and Q.
-        shape: The sizes of the digits of a state index if it has several, for neural networks.
+        shape: The number of values of each part of a state index, if it has several parts.
+            Environments show neural networks each part.
     """
 
     name: str
@@ -62,6 +74,7 @@ class Observation:
     summary: str = ""
     letters: str = ""
     shape: tuple[int, ...] = ()
+    reads: tuple[str, ...] = ()
 
     def __reduce__(self) -> Any:
         # A pickle holds only the name, because reading it requires the registered observation.
@@ -70,7 +83,7 @@ class Observation:
 
     @property
     def parts(self) -> tuple[int, ...]:
-        """The sizes of the digits of a state index: `shape`, or (n_states,) if it has only one."""
+        """The number of values of each part of a state index: `shape`, or (n_states,)."""
         return self.shape or (self.n_states,)
 
     @property
@@ -83,7 +96,7 @@ _OBSERVATIONS: dict[str, Observation] = {}
 
 
 def register(observation: Observation) -> Observation:
-    """Return an observation after registering it, in place of your own one of the same name.
+    """Return an observation after registering it; it replaces your own one of the same name.
 
     Raises AntsError if the name is not an identifier or belongs to a built-in observation, a field
     does not have the right form, or a state index is outside its range.
@@ -108,6 +121,7 @@ def register(observation: Observation) -> Observation:
             "-2, 2 and 3, each once."
         )
     expect(f"summary of {name!r}", observation.summary, str)
+    _check_reads(observation)
     shape = observation.shape
     expect(f"shape of {name!r}", shape, tuple)
     if shape and math.prod(checked_whole(f"shape of {name!r}", n) for n in shape) != (
@@ -121,6 +135,19 @@ def register(observation: Observation) -> Observation:
         _try_functions(observation)
     _OBSERVATIONS[name] = observation
     return observation
+
+
+def _check_reads(observation: Observation) -> None:
+    reads = observation.reads
+    expect(f"reads of {observation.name!r}", reads, tuple)
+    taken = {*_VIEW, *(f"own_{name}" for name in reads if isinstance(name, str))}
+    for name in reads:
+        if not isinstance(name, str) or not name.isidentifier() or name in taken:
+            raise AntsError(
+                f"reads of {observation.name!r} contains {shown(name)}; it must contain names of "
+                "fields, each once, other than the names in a view."
+            )
+        taken.add(name)
 
 
 def _is_built_in(name: str) -> bool:
@@ -193,8 +220,11 @@ def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
             levels=_Vector(levels),
             strongest=strongest,
             ants=_Vector(ants[n]),
+            strangers=_Vector((ants[n] == 0) & (ground[n] == OBSTACLE) & (trails[n] > 1)),
             nearer=_Vector(nearer[n]),
             own_level=trail[0],
+            **{name: _Vector(np.roll(levels, 1 + r)) for r, name in enumerate(observation.reads)},
+            **{f"own_{name}": trail[-1] for name in observation.reads},
         )
 
 

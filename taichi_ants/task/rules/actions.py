@@ -46,7 +46,7 @@ def turn(compass: ti.template(), heading, move):
 
 @ti.func
 def turned_by(compass: ti.template(), heading, action):
-    """Return the heading after any action, without a branch, which crowds would mispredict."""
+    """Return the heading after any action. A branch would be slow, because ants act differently."""
     return compass[_TURNS_AT + N_HEADINGS * action + heading]
 
 

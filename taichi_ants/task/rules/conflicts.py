@@ -35,7 +35,7 @@ def conflict_key(cell, tick):
 
 @ti.func
 def wanting(kind, heading):
-    """Return the mark of an ant that wants a cell from which it is at `heading`."""
+    """Return the mark of an ant that wants a cell; seen from this cell, the ant is at `heading`."""
     return kind | 1 + turn_round(heading)
 
 

@@ -1,10 +1,17 @@
-"""The choice among the five actions."""
+"""The choice among the five actions.
+
+Each choice takes one draw of 64 bits. The upper word decides whether an ant explores, if its rule
+has epsilon. The lower word breaks ties, or chooses by weights: with u = word * 2^-32 * (sum of the
+weights), the first choice is taken whose cumulative sum of weights exceeds u. Weights and sums are
+f64, and sums are from the first weight to the last.
+"""
 
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.constants import GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT, SEES_GOAL
 from taichi_ants.task.rules.actions import bit_number_in
+from taichi_ants.task.rules.numbers import exponential, power
 from taichi_ants.task.rules.random_bits import below, high_word, low_word
 
 
@@ -86,3 +93,78 @@ def chance_of(values, action, explore_below):
     if not values[action] < best:
         chance += (1.0 - explores) / ti.cast(ties, ti.f64)
     return chance
+
+
+@ti.func
+def chosen_by(weights: ti.template(), n: ti.template(), word):
+    """Return the index of one of n weights (f64), with probabilities proportional to them."""
+    total = ti.f64(0.0)
+    for i in ti.static(range(n)):
+        total = total + weights[i]
+    drawn = ti.cast(word, ti.f64) / ti.f64(4294967296.0) * total
+    index, cumulative = 0, ti.f64(0.0)
+    for i in ti.static(range(n - 1)):
+        cumulative = cumulative + weights[i]
+        index += ti.cast(cumulative <= drawn, ti.i32)
+    return index
+
+
+@ti.func
+def softmax_weights(values, temperature):
+    """Return exp((value - largest value) / temperature) of five action values, f64."""
+    best = ti.cast(best_value(values), ti.f64)
+    weights = ti.Vector([ti.f64(0.0) for _ in ti.static(range(N_ACTIONS))])
+    for a in ti.static(range(N_ACTIONS)):
+        weights[a] = exponential((ti.cast(values[a], ti.f64) - best) / temperature)
+    return weights
+
+
+@ti.func
+def choose_softly(values, bits, explore_below, temperature):
+    """Return an action by the rule "softmax"; arguments are those of `choose`."""
+    action = below(low_word(bits), N_ACTIONS)
+    if not high_word(bits) < explore_below:
+        action = chosen_by(softmax_weights(values, temperature), N_ACTIONS, low_word(bits))
+    return action
+
+
+@ti.func
+def chance_of_softly(values, action, explore_below, temperature):
+    """Return the probability (f64) with which `choose_softly` returns this action."""
+    weights = softmax_weights(values, temperature)
+    total = ti.f64(0.0)
+    for a in ti.static(range(N_ACTIONS)):
+        total = total + weights[a]
+    explores = ti.cast(explore_below, ti.f64) / 4294967296.0
+    return explores / ti.cast(N_ACTIONS, ti.f64) + (1.0 - explores) * (weights[action] / total)
+
+
+@ti.func
+def attraction(level, k, exponent):
+    """Return the weight of an open cell by the rule "deneubourg": (k + level)^exponent, f64."""
+    return power(k + ti.cast(level, ti.f64), exponent)
+
+
+@ti.func
+def choose_cell(carries, codes: ti.template(), is_open_at, is_nearer, weights, bits):
+    """Return an action by the rule "deneubourg".
+
+    `codes` are those seen left, forward and right. For each of these cells, `is_open_at` is 1 if
+    the ant can try to enter it, `is_nearer` is 1 if it is nearer to the queen, and `weights` is its
+    `attraction`. An ant with food considers only nearer cells if any of these is open. An ant
+    without an open cell turns left or right.
+    """
+    word = low_word(bits)
+    action = below(word, 2) * RIGHT
+    if (codes[0] == SEES_GOAL) | (codes[1] == SEES_GOAL) | (codes[2] == SEES_GOAL):
+        action = ti.select(carries == 1, GIVE, PICK_UP)
+    elif is_open_at.sum() > 0:
+        considered = is_open_at
+        if carries == 1:
+            if (is_open_at * is_nearer).sum() > 0:
+                considered = is_open_at * is_nearer
+        chosen = weights
+        for i in ti.static(range(3)):
+            chosen[i] = ti.select(considered[i] == 1, weights[i], ti.f64(0.0))
+        action = LEFT + chosen_by(chosen, 3, word)
+    return action

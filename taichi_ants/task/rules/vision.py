@@ -3,14 +3,16 @@
 import taichi as ti
 
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import EMPTY, SEES_LURE
+from taichi_ants.task.constants import EMPTY, SEES_LURE, SEES_OBSTACLE
+
+DEAD_END = SEES_OBSTACLE << 4 | SEES_OBSTACLE << 2 | SEES_OBSTACLE  # of an ant without food
 
 
 @ti.func
-def see_foraging(half: ti.template(), ground, level, strongest):
-    """Return the code of a cell for an ant without food; `ground` is the content of the cell.
+def see_by_level(half: ti.template(), code, level, strongest):
+    """Return the code of a cell for an ant that follows a pheromone; `code` is 0 if it is empty.
 
-    An empty cell is a trail if its `level` is at least 1 and at least the `strongest` in view, or
+    An empty cell is a lure if its `level` is at least 1 and at least the `strongest` in view, or
     half of it if `half`. The level of cells that are not empty is 0 or less.
     """
     lure = 0
@@ -18,7 +20,13 @@ def see_foraging(half: ti.template(), ground, level, strongest):
         lure = ti.cast(2 * level >= ti.max(strongest, 2), ti.i32)
     else:
         lure = ti.cast(level >= ti.max(strongest, 1), ti.i32)
-    return ground & 3 | lure * SEES_LURE  # the code of an empty cell is 0
+    return code | lure * SEES_LURE
+
+
+@ti.func
+def see_foraging(half: ti.template(), ground, level, strongest):
+    """Return the code of a cell for an ant without food; `ground` is the content of the cell."""
+    return see_by_level(half, ground & 3, level, strongest)
 
 
 @ti.func
@@ -37,6 +45,19 @@ def percept_foraging(
         see_foraging(half, left, trail_left, strongest),
         see_foraging(half, forward, trail_forward, strongest),
         see_foraging(half, right, trail_right, strongest),
+    )
+
+
+@ti.func
+def percept_homing(
+    half: ti.template(), left, forward, right, trail_left, trail_forward, trail_right, strongest
+):
+    """Return the percept of an ant with food that follows a pheromone, see `percept_foraging`."""
+    return state_index(
+        1,
+        see_by_level(half, left >> 2, trail_left, strongest),
+        see_by_level(half, forward >> 2, trail_forward, strongest),
+        see_by_level(half, right >> 2, trail_right, strongest),
     )
 
 

@@ -6,32 +6,109 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_colonies import RandomColony, random_colony
+from random_choices import NOISE
+from random_colonies import RandomColony, random_colony, with_nests
 from random_rewards import random_rewards
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
 from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.observations import OBSERVATIONS, cells_in_view
 from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.observations import registry
 
 # Each entry takes kernels of its own, so that there are few: learner, sharing, observation, dense,
-# and where these are not the paper's the traffic and which trails are seen.
+# and where these are not the paper's the traffic, which trails are seen, and further `MORE`.
 # For all but the first, ants and food come and go: what stays the same is left out of kernels.
+UNDER = "strongest_under_carriers"
+SOFT, BY_TRAIL, MISREADS = {"choice": "softmax"}, {"choice": "deneubourg"}, {"noise": "misread"}
+
+
+def with_fields(names, outbound="trail", homing="compass"):
+    return {"fields": names, "cues": (outbound, homing)}
+
+
 KERNELS = [
     ("q_learning", "shared", "paper", False),
-    ("sarsa", "shared", "ants_seen", True),
+    ("sarsa", "shared", "ants_seen", True, "blocking", "half", with_fields("Ab", "b", "compass")),
     ("expected_sarsa", "shared", "five_cells", False),
-    ("dyna_q", "shared", "trail_levels", True),
+    ("dyna_q", "shared", "trail_levels", True, "blocking", "half", with_fields("aBc", "B", "c")),
     ("dyna_q", "independent", "ants_seen", False),
-    ("double_q", "independent", "paper", True),
+    (
+        "double_q",
+        "independent",
+        "paper",
+        True,
+        "blocking",
+        "half",
+        with_fields("ABc", "A", "trail"),
+    ),
     ("sarsa_lambda", "independent", "paper", False),
-    ("n_step_sarsa", "independent", "paper", False),
-    ("prioritized_sweeping", "independent", "trail_levels", False),
-    ("q_learning", "frozen", "six_cells", False),
-    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
-    ("q_learning", "shared", "queues", False, "following", "strongest_under_carriers"),
-    ("q_learning", "frozen", "paper", True, "following", "strongest_under_carriers"),
+    (
+        "n_step_sarsa",
+        "independent",
+        "paper",
+        False,
+        "blocking",
+        "half",
+        with_fields("abC", "a", "C"),
+    ),
+    (
+        "prioritized_sweeping",
+        "independent",
+        "trail_levels",
+        False,
+        "blocking",
+        "half",
+        with_fields("a"),
+    ),
+    (
+        "q_learning",
+        "frozen",
+        "six_cells",
+        False,
+        "blocking",
+        "strongest",
+        with_fields("A", homing="A"),
+    ),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest", with_fields("ab", homing="b")),
+    ("q_learning", "shared", "queues", False, "following", UNDER, with_fields("Ab", "A", "b")),
+    ("q_learning", "frozen", "paper", True, "following", UNDER, with_fields("ab", "b", "b")),
+    ("sarsa", "shared", "ants", False, "right_of_way", "half", SOFT | {"noise": NOISE}),
+    ("q_learning", "frozen", "paper", False, "right_of_way", "half", BY_TRAIL | {"noise": NOISE}),
+    ("q_learning", "shared", "paper", False, "blocking", "half", SOFT),
+    ("sarsa", "independent", "trail_levels", True, "blocking", "half", SOFT | MISREADS),
+    (
+        "dyna_q",
+        "shared",
+        "six_cells",
+        False,
+        "blocking",
+        "half",
+        with_fields("ab", "b") | {"noise": NOISE},
+    ),
+    ("expected_sarsa", "shared", "queues", False, "following", "strongest", {"noise": NOISE}),
+    (
+        "n_step_sarsa",
+        "independent",
+        "ants_seen",
+        False,
+        "blocking",
+        "half",
+        SOFT | {"noise": "slip"},
+    ),
+    ("double_q", "independent", "paper", True, "blocking", "half", MISREADS),
+    ("q_learning", "frozen", "paper", True, "blocking", "half", BY_TRAIL),
+    ("q_learning", "frozen", "paper", True, "following", "half", BY_TRAIL | MISREADS),
+    (
+        "q_learning",
+        "frozen",
+        "paper",
+        False,
+        "blocking",
+        "half",
+        BY_TRAIL | with_fields("aB", "a", "B"),
+    ),
 ]
 
 
@@ -47,7 +124,7 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK = (0, 1, 7, 10, 11)
+QUICK = (0, 1, 7, 10, 11, 13, 14)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 MARKED = [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in KERNELS]
 
@@ -65,6 +142,7 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
             learner=learner,
             observation=observation,
             dense=dense,
+            **(rules[2] if len(rules) > 2 else {}),
             **dict(zip(("traffic", "view"), rules, strict=False)),
             changes=kernel is not KERNELS[0],
         )
@@ -88,7 +166,78 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
                 record.deliveries > 0,
                 record.blocked > 0,
             ]
-    assert (happened >= [1, 3, 3, 2, 12]).all(), happened
+    rarely = "noise" in str(rules)  # ants that slip or misread deliver rarely
+    assert (happened >= [not rarely, 3, 3, 1 if rarely else 2, 12]).all(), happened
+
+
+# Learner, sharing, observation, dense, traffic, view; nests, kinds of food, several loads.
+NESTS = [
+    ("q_learning", "shared", "paper", False, "blocking", "half", 2, 1, False),
+    ("dyna_q", "shared", "queues", False, "following", "strongest_under_carriers", 3, 2, True),
+    ("sarsa", "shared", "ants", True, "right_of_way", "strongest", 2, 3, False),
+    ("sarsa_lambda", "independent", "ants_seen", False, "blocking", "half", 4, 1, True),
+    ("q_learning", "frozen", "strangers", False, "right_of_way", "half", 2, 2, True),
+]
+QUICK_NESTS = [
+    one if k in (1, 4) else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(NESTS)
+]
+
+
+def with_strangers(view):
+    """The load, and for each cell ahead 0, 1 for an ant of the nest, or 2 for one of another."""
+    index = view.carries
+    for k in range(3):
+        code = 2 * view.strangers[k]
+        if view.ants[k] != 0:
+            code = 1
+        index = 3 * index + code
+    return index
+
+
+@pytest.mark.parametrize("kernel", QUICK_NESTS, ids=str)
+def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers):
+    """Deliveries by nest and kind, loads, regrowth, births by nest: two episodes each."""
+    learner, sharing, observation, dense, traffic, view, nests, kinds, loads = kernel
+    happened = np.zeros(5, dtype=int)
+    for seed in range(60):
+        drawn = random_colony(
+            seed,
+            sharing=sharing,
+            learner=learner,
+            observation="paper" if observation == "strangers" else observation,
+            dense=dense,
+            traffic=traffic,
+            view=view,
+            changes=True,
+        )
+        drawn = with_nests(drawn, seed, nests, kinds, loads)
+        if observation == "strangers":
+            table = np.random.default_rng(seed).random((54, 5)).astype(np.float32)
+            drawn = replace(drawn, task=replace(drawn.task, observation="strangers"))
+            drawn = replace(drawn, q_values=table)
+        if drawn.world.n_nests != nests:
+            continue  # kernels are compiled for a number of nests
+        colony, plain = both(drawn)
+        for ticks in (13, 9):
+            colony.begin_episode(ticks)
+            plain.begin_episode()
+            assert_equal(colony, plain)
+            for tick in range(ticks):
+                if not plain.over:
+                    colony.tick()
+                    plain.tick(last=tick == ticks - 1)
+                    assert_equal(colony, plain)
+            colony.end_episode()
+            plain.end_episode()
+            record, nests_of = plain.records[-1], [nest for nest, _ in plain.records[-1].apart]
+            happened += [
+                record.births > 0,
+                record.deaths > 0,
+                record.regrown > 0,
+                record.deliveries > 0,
+                max(nests_of, default=0) > 0,
+            ]
+    assert (happened >= [1, 3, 3, 2, 1]).all(), happened
 
 
 def test_each_learner_and_observation_is_compared():
@@ -101,6 +250,23 @@ def crowd(view):
     index = 0
     for k in range(6):
         index = 3 * index + view.ants[k]
+    return index
+
+
+@pytest.fixture
+def seen_strangers(monkeypatch):
+    """The observation, registered for one test."""
+    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+    monkeypatch.setitem(OBSERVATIONS, "strangers", strangers_seen)
+    return observations.register(Observation("strangers", 54, with_strangers))
+
+
+def strangers_seen(world, ant):
+    """The observation in plain Python."""
+    index = int(ant.carries)
+    for cell in cells_in_view(ant):
+        other = world.ants.get(cell)
+        index = 3 * index + (0 if other is None else 1 + (other.nest != ant.nest))
     return index
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
 from taichi_ants.checks import MAX_ANTS
 from taichi_ants.engines import arguments
-from taichi_ants.engines.colony.layout import WorldRow
+from taichi_ants.engines.colony.layout import NestRow
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import colony_snapshots
 from taichi_ants.task import Life, Pheromone, Task, foraging
@@ -106,7 +106,7 @@ def test_births_fill_the_slots_and_no_more():
     outcome = colony.run(1, 3000)
     assert outcome.living[0, 0] == 4
     assert outcome.births[0, 0] == 3
-    stored = colony.arrays["worlds"][WorldRow.STORE, 0]
+    stored = colony.arrays["nests"][NestRow.STORE, 0]
     assert stored == outcome.deliveries[0, 0] - 3 > 0
 
 
@@ -137,7 +137,7 @@ def test_births_fill_the_slots_and_no_more():
         ),
         ({"task": Task("trail_levels"), "q_values": np.zeros((128, 5))}, "(432, 5)"),
         ({"sharing": "some"}, "'some'"),
-        ({"sharing": "frozen"}, "sharing is 'frozen', but q_values is None; these ants"),
+        ({"sharing": "frozen"}, "sharing is 'frozen', but q_values is None; give the action"),
         ({"world": World((3, 3, 3), (0, 0, 0))}, "the world has no food"),
         ({"seeds": []}, "seeds"),
         ({"seeds": [1, 1]}, "1"),
@@ -205,7 +205,7 @@ def test_both_schedules_agree_where_places_stay_vacant():
         colony = Colony(worlds.paper(), task, TRAINING, 3, ants=5, capacity=9, schedule=schedule)
         colony.begin_episode()
         colony.tick(100)
-        deliveries.append(vars(colony.outcome()))
+        deliveries.append(colony.outcome().counts())
     for name, counted in deliveries[0].items():
         np.testing.assert_array_equal(counted, deliveries[1][name], name)
 

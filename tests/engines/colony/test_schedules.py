@@ -9,10 +9,15 @@ from taichi_ants import Colony, TrainingConfig, runtime, train, worlds
 from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.layout import Order
 from taichi_ants.engines.colony.stepping import ThreadChoice
-from taichi_ants.task import Life, Pheromone, Task
+from taichi_ants.task import Field, Life, Pheromone, Task
 
 LIVELY = Task(
     pheromone=Pheromone("exponential", half_life=20, diffusion=0.2, deposit="add"),
+    fields={
+        "home": Field(laid="without_food", deposit="fading"),
+        "wide": Field(laid="always", diffusion=0.3),
+    },
+    homing_cue="home",
     evaporation_in_training=True,
     life=Life(births=True, lifespan=60, regrowth=2, wander=9),
 )
@@ -75,7 +80,7 @@ def test_threads_that_do_not_come_are_not_waited_for_without_end(monkeypatch):
     assert given_up == 4
 
 
-@pytest.mark.parametrize("spins", [0, 20, 4000])
+@pytest.mark.parametrize("spins", [0, 20, 4000, 100_000])
 def test_giving_up_at_any_barrier_gives_the_same(spins, monkeypatch):
     """With so little patience, threads give up here and there, and the rest follows on one."""
     monkeypatch.setattr(stepping, "_SPINS", spins)

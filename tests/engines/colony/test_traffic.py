@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from taichi_ants import Colony, TrainingConfig, World
-from taichi_ants.engines.colony.layout import STANDS_WITH_FOOD
+from taichi_ants.engines.colony.layout import ANT_GROUND
 from taichi_ants.learners.policies import random_policy
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Pheromone, Rewards, Task, Traffic
-from taichi_ants.task.constants import FORWARD, GIVE, OBSTACLE, PICK_UP, RIGHT
+from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP, RIGHT
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
 BEYOND = (9, 3, 0)  # the queen at the end of the row: +1 for each step along it with food
@@ -68,7 +68,7 @@ def after_a_tick(
         plain.observe(ant)
         arrays["carries"][slot], arrays["percept"][slot] = one.food, ant.percept
         if one.food:
-            arrays["ground"][arrays["cell"][slot]] = OBSTACLE | STANDS_WITH_FOOD << 4
+            arrays["ground"][arrays["cell"][slot]] = ANT_GROUND | 8 << 4
     kernels.act(np.array([[one.action for one in row]]))
     plain.tick()
     cells = kernels.snapshot().grid.cells(arrays["cell"])

@@ -8,6 +8,7 @@ import numpy as np
 import plain_runs
 import pytest
 from plain_runs import train_with_tables
+from random_choices import NO_NOISE, NOISE, random_choice, random_noise
 from random_rewards import random_rewards
 from random_worlds import random_world
 
@@ -41,6 +42,14 @@ KERNELS = [
 # Those of the first deposits, and the paper's, are compared at once; the others later.
 LATER = KERNELS[4:-3]
 MARKED = [pytest.param(*one, marks=[pytest.mark.slow] * (one in LATER)) for one in KERNELS]
+# The same with a rule of choice and noise.
+NOISY = [
+    ("sarsa", "ants", "set", "softmax", NOISE),
+    pytest.param("q_learning", "paper", "fading", "softmax", NO_NOISE, marks=pytest.mark.slow),
+    pytest.param("expected_sarsa", "paper", "add", "greedy", NOISE, marks=pytest.mark.slow),
+    pytest.param("sarsa_lambda", "trail_levels", "set", "greedy", "slip", marks=pytest.mark.slow),
+    pytest.param("dyna_q", "six_cells", "set", "softmax", "misread", marks=pytest.mark.slow),
+]
 
 
 def random_config(seed: int, learner: str) -> TrainingConfig:
@@ -66,7 +75,13 @@ def random_config(seed: int, learner: str) -> TrainingConfig:
     )
 
 
-def random_task(seed: int, observation: str = "paper", deposit: str = "set") -> Task:
+def random_task(
+    seed: int,
+    observation: str = "paper",
+    deposit: str = "set",
+    choice: str = "greedy",
+    noise: str = NO_NOISE,
+) -> Task:
     """A task that independent runs can have."""
     rng = np.random.default_rng([seed, 2])
     evaporation, level = str(rng.choice(["linear", "none"])), int(rng.choice([1, 7, 250]))
@@ -86,6 +101,8 @@ def random_task(seed: int, observation: str = "paper", deposit: str = "set") -> 
         turns_at_queen=bool(rng.random() < 0.3),
         evaporation_in_training=bool(rng.random() < 0.7),
         evaporation_in_evaluation=bool(rng.random() < 0.7),
+        choice=random_choice(seed, choice),
+        noise=random_noise(seed, noise),
     )
 
 
@@ -106,6 +123,7 @@ def assert_equal_steps(world, config, seed, episodes, max_steps, task):
 def assert_equal_step(ours, k, step):
     assert (tuple(ours.cells[k]), ours.headings[k]) == (step.cell, step.heading)
     assert (ours.states[k], ours.actions[k]) == (step.state, step.action)
+    assert ours.executed[k] == step.executed
     assert (ours.rewards[k], ours.next_states[k]) == (step.reward, step.next_state)
     assert ours.delivered[k] == (step.event is Event.DELIVERED)
 
@@ -121,6 +139,28 @@ def test_every_step_in_random_worlds(learner, observation, deposit):
         plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
         delivered += sum(plain.deliveries)
     assert delivered > 3
+
+
+@pytest.mark.parametrize(("learner", "observation", "deposit", "choice", "noise"), NOISY)
+def test_every_step_with_rules_of_choice_and_noise(learner, observation, deposit, choice, noise):
+    """Actions that slip, and cells that are misread, in training and in rollouts."""
+    slipped = misread = 0
+    for seed in range(16 if observations.get(observation).n_states < 1000 else 8):
+        task = random_task(seed, observation, deposit, choice, noise)
+        config, world = random_config(seed, learner), random_world(seed)
+        plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
+        slipped += sum(step.action != step.executed for step in plain.trace)
+        table = np.random.default_rng(seed).integers(0, 3, (task.n_states, 5)).astype(np.float32)
+        ours = rollout(world, table, seed, 1, 40, task, 0.1)
+        rolled = plain_runs.rollout(world, table, seed, 1, 40, task, 0.1)
+        for k, step in enumerate(rolled.trace):
+            assert_equal_step(ours, k, step)
+        misread += int((ours.percepts != ours.states).sum())
+        outcome = evaluate(world, table, 2, seed, 40, task, epsilon=0.1)
+        assert outcome.returns[1] == rolled.returns[0]
+    assert (slipped > 10) == ("slip" in noise)
+    if observation == "paper":
+        assert (misread > 10) == ("misread" in noise)
 
 
 @pytest.mark.parametrize("delivery", DELIVERIES)
@@ -196,6 +236,7 @@ def test_percepts_are_the_papers_states_whatever_the_observation():
         (Task(pheromone=Pheromone(evaporation="exponential")), "evaporation='exponential'"),
         (Task(pheromone=Pheromone(diffusion=0.1)), "diffusion=0.1"),
         (Task(life=Life(births=True)), "births=True"),
+        (Task(choice="deneubourg"), "is 'deneubourg'"),
     ],
 )
 def test_what_runs_cannot_do_is_refused_by_name(task, says):

@@ -1,0 +1,277 @@
+"""Summaries, figures and comparisons of the results of `Colony.run`, `train` and `evaluate`.
+
+The unit of all statistics is the seed. Intervals are bootstrap intervals of the mean over seeds,
+see `statistics`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants.analysis import style
+from taichi_ants.analysis.statistics import RESAMPLES, bootstrap_interval
+from taichi_ants.analysis.tables import Table, plain_text, sentence
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
+from taichi_ants.measures.tidy import Measured, Tidy, checked_measure, last_rows
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_RESAMPLES = 4000  # of figures, which have many intervals
+_MOST_LINES = 8
+_WIDE = 100  # the number of columns of a table in a terminal
+_EPISODES, _TICKS = "episode", "tick"
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Means over seeds with 95 % intervals; `print` shows a table.
+
+    Attributes:
+        rows: For each configuration and measure, a mapping with the keys configuration, measure,
+            unit, seeds (the number of seeds that have a value), mean, low and high.
+    """
+
+    rows: tuple[dict[str, Any], ...]
+
+    def __repr__(self) -> str:
+        several = len({row["configuration"] for row in self.rows}) > 1
+        lines = [
+            [
+                *([row["configuration"]] if several else []),
+                f"{row['measure']} ({row['unit']})" if row["unit"] else row["measure"],
+                *(f"{row[name]:.4g}" for name in ("mean", "low", "high")),
+                str(row["seeds"]),
+            ]
+            for row in self.rows
+        ]
+        headers = ["Measure", "Mean", "Low", "High", "Seeds"]
+        headers = ["Configuration", *headers] if several else headers
+        return plain_text([Table("", headers, lines, text_columns=1 + several)], _WIDE)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A paired comparison of two results over the same seeds; `print` shows it in a line.
+
+    Attributes:
+        measure: The name of the measure.
+        first, second: The means over seeds of the two results.
+        difference: The mean of first minus second.
+        low, high: The ends of the interval of the difference; nan for a single seed.
+        level: The probability with which the interval contains the true difference.
+        seeds: The number of seeds that have a value in both results.
+        differences: The difference of each of these seeds.
+    """
+
+    measure: str
+    first: float
+    second: float
+    difference: float
+    low: float
+    high: float
+    level: float
+    seeds: int
+    differences: tuple[float, ...]
+
+    def __repr__(self) -> str:
+        return (
+            f"Comparison({self.measure}: {self.first:.4g} and {self.second:.4g}, difference "
+            f"{self.difference:.4g} [{self.low:.4g}, {self.high:.4g}], {100 * self.level:g} % "
+            f"interval over {self.seeds} paired seeds)"
+        )
+
+
+def compare(
+    a: Tidy,
+    b: Tidy,
+    measure: str = "deliveries",
+    *,
+    configurations: tuple[int, int] = (0, 0),
+    last: int | None = None,
+    level: float = 0.95,
+) -> Comparison:
+    """Return the difference of a measure between two results, a minus b, paired by seed.
+
+    The value of a seed is its mean over episodes, at the last tick of each.
+
+    Args:
+        a, b: Results of `Colony.run`, `train` or `evaluate` with the same seeds.
+        measure: The name of a measure that both results have.
+        configurations: The numbers of the configurations of a and b; 0 for colonies.
+        last: The number of episodes to use, from the last one; None uses all.
+        level: The probability with which the bootstrap interval contains the true difference.
+
+    Raises:
+        AntsError: The seeds differ, a result does not have the measure or the configuration, or no
+            seed has a value in both results.
+    """
+    for name, result in (("a", a), ("b", b)):
+        if not isinstance(result, Tidy):
+            raise AntsError(
+                f"{name} is {shown(result)}; give a result of Colony.run, train or evaluate."
+            )
+    if not isinstance(level, (int, float)) or not 0 < level < 1:
+        raise AntsError(f"level is {shown(level)}; it must be a number between 0 and 1.")
+    tables = a.measured(), b.measured()
+    if tables[0].seeds != tables[1].seeds:
+        raise AntsError(
+            f"the seeds of a are {shown(tables[0].seeds)}, those of b are "
+            f"{shown(tables[1].seeds)}; compare results with the same seeds in the same order."
+        )
+    values = []
+    for table, number in zip(tables, configurations, strict=True):
+        most = len(table.groups) - 1
+        group = checked_whole("a configuration", number, least=0, most=max(0, most))
+        values.append(of_seeds(table, measure, last)[group])
+    both = ~np.isnan(values[0] - values[1])
+    if not both.any():
+        raise AntsError(f"no seed has a value of {measure!r} in both results; run more ticks.")
+    first, second = (one[both] for one in values)
+    differences = first - second
+    low, high = (float(end[0]) for end in bootstrap_interval(differences[None], level))
+    return Comparison(
+        measure=measure,
+        first=float(first.mean()),
+        second=float(second.mean()),
+        difference=float(differences.mean()),
+        low=low,
+        high=high,
+        level=float(level),
+        seeds=len(differences),
+        differences=tuple(differences.tolist()),
+    )
+
+
+def summary(result: Tidy, last: int | None = None) -> Summary:
+    """Return means over seeds with intervals; see `Tidy.summary`."""
+    table, rows = result.measured(), []
+    for name in table.values:
+        for group, values in zip(table.groups, of_seeds(table, name, last), strict=True):
+            mean, low, high = (float(one[0]) for one in _means(values[None]))
+            rows.append({
+                "configuration": group, "measure": name, "unit": table.units.get(name, ""),
+                "seeds": int(np.count_nonzero(~np.isnan(values))),
+                "mean": mean, "low": low, "high": high,
+            })  # fmt: skip
+    return Summary(tuple(rows))
+
+
+def plot(result: Tidy, measures: Sequence[str], path: str | Path | None = None) -> Figure:
+    """Return a figure of means over seeds with intervals; see `Tidy.plot`."""
+    if path is not None:
+        expect("path", path, str, Path)
+        check_one_of("the suffix of path", Path(path).suffix, (".png",))
+    table = result.measured()
+    names = list(measures) or list(table.usual)
+    if not names:
+        raise AntsError("the result has no numbers to plot; run the colony with other measures.")
+    if len(table.groups) > _MOST_LINES:
+        raise AntsError(
+            f"the result has {len(table.groups)} configurations; a figure shows at most "
+            f"{_MOST_LINES}, so plot the columns of to_pandas()."
+        )
+    across = _TICKS if _has_series(table) else _EPISODES
+    with style.styled():
+        figure = style.new_figure(1.2 + 1.8 * len(names))
+        panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
+        for axes, name in zip(panels, names, strict=True):
+            for number, (x, values) in enumerate(curves(table, name, across)):
+                colour = style.COLOURS[number % len(style.COLOURS)]
+                mean, low, high = _means(values, _RESAMPLES)
+                marker = "o" if len(x) < 2 else None
+                axes.plot(x, mean, color=colour, marker=marker, label=table.groups[number])
+                axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
+            unit = table.units.get(name, "")
+            whole, _, part = name.partition(".")
+            words = sentence(whole.replace("_", " ")) + (f" ({part})" if part else "")
+            axes.set_ylabel(f"{words},\n{unit}" if unit else words)
+        panels[-1].set_xlabel(sentence(across))
+        several = len(table.groups) > 1
+        entries = style.legend_entries([panels[0]]) if several else {}
+        n = len(table.seeds)
+        caption = f"Means over {n} seeds with 95 % intervals." if n > 1 else "One seed."
+        style.frame(figure, f"Measures by {across}", caption, entries)
+    if path is not None:
+        style.save(figure, Path(path))
+    return figure
+
+
+def of_seeds(table: Measured, measure: str, last: int | None = None) -> np.ndarray:
+    """Return the mean over episodes at the last tick of each, float64 (configurations, seeds).
+
+    Episodes without a value do not count; a seed without any value is nan.
+    """
+    values, where = checked_measure(table, measure), last_rows(table)
+    if last is not None:
+        episodes = table.index["episode"]
+        n = checked_whole("last", last, most=int(episodes.max(initial=0)) + 1)
+        where &= episodes > episodes.max(initial=0) - n
+    where &= ~np.isnan(values)
+    shape = len(table.groups), len(table.seeds)
+    sums, counts = np.zeros(shape), np.zeros(shape)
+    place = table.of_group[where], table.of_seed[where]
+    np.add.at(sums, place, values[where])
+    np.add.at(counts, place, 1.0)
+    return np.divide(sums, counts, out=np.full(shape, math.nan), where=counts > 0)
+
+
+def curves(table: Measured, measure: str, across: str) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield x and values (x, seeds) of each configuration, by "tick" or "episode".
+
+    By tick, values are means over episodes, and an episode that has ended keeps its last value. By
+    episode, the value is that at the last tick. Values are nan where there are none.
+    """
+    values, ticks, episodes = (
+        checked_measure(table, measure),
+        table.index["tick"],
+        table.index["episode"],
+    )
+    order = np.lexsort((ticks, episodes, table.of_seed, table.of_group))
+    if across == _EPISODES:
+        order = order[last_rows(table)[order]]
+    for group in range(len(table.groups)):
+        ours = order[table.of_group[order] == group]
+        x, begins = np.unique(table.index[across][ours], return_inverse=True)
+        ends = begins + 1
+        if across == _TICKS:  # a value holds until the next row of the episode
+            runs = np.stack([table.of_seed[ours], episodes[ours]])
+            goes_on = np.append((runs[:, 1:] == runs[:, :-1]).all(axis=0), False)
+            ends = np.where(goes_on, np.roll(begins, -1), len(x))
+        sums, counts = np.zeros((2, len(x), len(table.seeds)))
+        for value, seed, begin, end in zip(
+            values[ours], table.of_seed[ours], begins, ends, strict=True
+        ):
+            if not np.isnan(value):
+                sums[begin:end, seed] += value
+                counts[begin:end, seed] += 1
+        yield x, np.divide(sums, counts, out=np.full(sums.shape, math.nan), where=counts > 0)
+
+
+def _has_series(table: Measured) -> bool:
+    """Return whether an episode of a seed has several rows."""
+    return not bool(last_rows(table).all())
+
+
+def _means(values: np.ndarray, resamples: int = RESAMPLES) -> tuple[np.ndarray, ...]:
+    """Return the mean and the ends of its interval by row (rows, seeds), without nan."""
+    known = ~np.isnan(values)
+    found = np.full((3, len(values)), math.nan)
+    whole = known.all(axis=1)
+    if whole.any():
+        found[:, whole] = (
+            values[whole].mean(axis=1),
+            *bootstrap_interval(values[whole], resamples=resamples),
+        )
+    for row in np.flatnonzero(known.any(axis=1) & ~whole):
+        some = values[row, known[row]][None]
+        found[:, row] = np.ravel(
+            [some.mean(axis=1), *bootstrap_interval(some, resamples=resamples)]
+        )
+    return tuple(found)

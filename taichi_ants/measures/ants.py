@@ -1,0 +1,82 @@
+"""The ants of a colony: their number, loads and places."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants.errors import AntsError, array_of, expect, shown
+from taichi_ants.grid.hexgrid import normal_form
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.records import Snapshot
+
+
+def living(snapshot: Snapshot) -> int:
+    """Return the number of living ants."""
+    return len(snapshot.ant_cells)
+
+
+def carriers(snapshot: Snapshot) -> float:
+    """Return the share of the living ants that carry food; nan without ants."""
+    return share_of(snapshot.ant_carries)
+
+
+def distance(snapshot: Snapshot) -> float:
+    """Return the mean distance of the ants to the nearest queen in steps; nan without ants."""
+    if not len(snapshot.ant_cells):
+        return math.nan
+    return int(snapshot.distances[snapshot.ant_cells].sum(dtype=np.int64)) / len(snapshot.ant_cells)
+
+
+def occupancy(snapshot: Snapshot) -> np.ndarray:
+    """Return the number of ants on each cell, int32 (grid.size,)."""
+    return np.bincount(snapshot.ant_cells, minlength=snapshot.grid.size).astype(np.int32)
+
+
+def share_in(regions: Mapping[str, Any]) -> Callable[[Snapshot], dict[str, float]]:
+    """Return a function for `register`: the share of the ants in each region, by its name.
+
+    Args:
+        regions: The cells of each region, (n, 3) in cube coordinates, by name.
+
+    The shares refer to the living ants on any cell, and are nan without ants. Regions can share
+    cells.
+
+        short, long = worlds.double_bridge.branch_cells()
+        measures.register("branch", measures.share_in({"short": short, "long": long}))
+
+    Raises:
+        AntsError: A region does not have cells of this form. The first use raises it if a cell is
+            outside the world.
+    """
+    expect("regions", regions, Mapping)
+    listed = {str(name): _checked_cells(str(name), cells) for name, cells in regions.items()}
+    if not listed:
+        raise AntsError("regions is empty; give the cells of at least one region by its name.")
+
+    def share_in_regions(snapshot: Snapshot) -> dict[str, float]:
+        return {
+            name: share_of(np.isin(snapshot.ant_cells, snapshot.grid.index(cells)))
+            for name, cells in listed.items()
+        }
+
+    return share_in_regions
+
+
+def _checked_cells(name: str, cells: Any) -> np.ndarray:
+    given = array_of(f"the region {shown(name)}", cells)
+    if given.ndim != 2 or given.shape[-1] != 3 or given.dtype.kind not in "iu" or not len(given):
+        raise AntsError(
+            f"the region {shown(name)} is {shown(cells)}; give cells (x, y, z) in whole numbers, "
+            "an array of shape (n, 3)."
+        )
+    return normal_form(given)
+
+
+def share_of(which: np.ndarray) -> float:
+    """Return the share of true entries; nan for an empty array."""
+    return int(np.count_nonzero(which)) / len(which) if len(which) else math.nan

@@ -1,0 +1,168 @@
+"""Results as tidy rows, one value a row, for pandas, Parquet, CSV, summaries and figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants import files
+from taichi_ants.errors import AntsError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas
+    from matplotlib.figure import Figure
+
+    from taichi_ants.analysis.results import Summary
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Values of measures in R rows, with a column for each measure.
+
+    Attributes:
+        index: The columns that identify a row, (R,), in the order of tables. "seed", "episode"
+            and "tick" are always among them.
+        values: The values of each measure by name, (R,), nan if there is none.
+        of_seed: The position of the row's seed in `seeds`, (R,).
+        of_group: The number of the row's configuration, (R,); 0 for colonies.
+        seeds: The seeds, in the order of the result.
+        groups: The names of the configurations; one empty name for colonies.
+        usual: The measures in a figure, if you name none.
+        units: The unit of each measure by name; missing if it has none.
+    """
+
+    index: dict[str, np.ndarray]
+    values: dict[str, np.ndarray]
+    of_seed: np.ndarray
+    of_group: np.ndarray
+    seeds: tuple[int, ...]
+    groups: tuple[str, ...] = ("",)
+    usual: tuple[str, ...] = ()
+    units: dict[str, str] = field(default_factory=dict)
+
+
+class Tidy:
+    """Base of results with tidy rows; a class defines `measured`."""
+
+    def measured(self) -> Measured:
+        """Return the values of all measures, with a column for each."""
+        raise NotImplementedError
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield tidy rows: columns such as world, seed, episode and tick, then measure and value.
+
+        They are ordered by measure. A value that does not exist is nan.
+        """
+        table = self.measured()
+        index = [array.tolist() for array in table.index.values()]
+        for name, values in table.values.items():
+            for *where, value in zip(*index, values.tolist(), strict=True):
+                yield {**dict(zip(table.index, where, strict=True)), "measure": name,
+                       "value": float(value)}  # fmt: skip
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return the columns of the tidy rows, arrays (rows,) by name."""
+        table = self.measured()
+        n, rows = len(table.values), len(table.of_seed)
+        found = {name: np.concatenate([array] * n) if n else array[:0]
+                 for name, array in table.index.items()}  # fmt: skip
+        found["measure"] = np.repeat(np.array([*table.values], object), rows)
+        several = [np.asarray(values, float) for values in table.values.values()]
+        return {**found, "value": np.concatenate([np.empty(0), *several])}
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Return the tidy rows as a `pandas.DataFrame`; AntsError if pandas is not installed."""
+        table = _imported("pandas", "pandas")
+        return table.DataFrame(self.columns()).astype({"measure": "category"})
+
+    def to_csv(self, path: files.PathLike) -> None:
+        """Write the tidy rows to a file of comma-separated values, with an empty field for nan."""
+        names = [*self.measured().index, "measure", "value"]
+        files.write_csv(path, self.rows(), names)
+
+    def to_parquet(self, path: files.PathLike) -> None:
+        """Write the tidy rows to a Parquet file; AntsError if pyarrow is not installed."""
+        arrow, parquet = _imported("pyarrow", "parquet"), _imported("pyarrow.parquet", "parquet")
+        columns: dict[str, Any] = self.columns()
+        columns["measure"] = arrow.array(columns["measure"].tolist()).dictionary_encode()
+        if columns["seed"].dtype == object:  # beyond 63 bits
+            columns["seed"] = arrow.array([str(seed) for seed in columns["seed"]])
+        table = arrow.table(columns)
+        files.write_atomically(path, lambda file: parquet.write_table(table, file))
+
+    def summary(self, last: int | None = None) -> Summary:
+        """Return means over seeds with 95 % intervals, for each configuration and measure.
+
+        The value of a seed is its mean over episodes, at the last tick of each.
+
+        Args:
+            last: The number of episodes to use, from the last one; None uses all.
+        """
+        return _presentation().summary(self, last)
+
+    def plot(self, *measures: str, path: str | Path | None = None) -> Figure:
+        """Return a figure of means over seeds with 95 % intervals, a panel for each measure.
+
+        The horizontal axis is the tick if episodes have several rows, which are then averaged over
+        episodes; otherwise it is the episode.
+
+        Args:
+            measures: Names of measures; none for the usual ones.
+            path: A PNG file, to which the figure is written as well.
+
+        Raises:
+            AntsError: The result does not have a measure, or the file cannot be written.
+        """
+        return _presentation().plot(self, measures, path)
+
+
+def seed_array(seeds: Any) -> np.ndarray:
+    """Return seeds as int64, or as Python integers if one does not fit."""
+    try:
+        return np.array(seeds, np.int64)
+    except OverflowError:
+        return np.array(seeds, object)
+
+
+def checked_measure(table: Measured, name: object) -> np.ndarray:
+    """Return the values of a measure; AntsError if the result does not have it."""
+    if not isinstance(name, str) or name not in table.values:
+        raise AntsError(
+            f"the result has no measure {name!r}; choose one of {', '.join(table.values)}, or run "
+            "the colony with measures=[...]."
+        )
+    return np.asarray(table.values[name], float)
+
+
+def last_rows(table: Measured) -> np.ndarray:
+    """Return whether each row is the last one of its configuration, seed and episode, bool (R,)."""
+    ticks, last = table.index["tick"].tolist(), dict[tuple, float]()
+    keys = list(zip(table.of_group.tolist(), table.of_seed.tolist(),
+                    table.index["episode"].tolist(), strict=True))  # fmt: skip
+    for key, tick in zip(keys, ticks, strict=True):
+        last[key] = max(tick, last.get(key, -math.inf))
+    return np.array([last[key] == tick for key, tick in zip(keys, ticks, strict=True)], bool)
+
+
+def _presentation() -> Any:
+    """Return the module of figures and intervals."""
+    import taichi_ants  # here, because `analysis` builds on the results that use this module
+
+    return import_module(".results", taichi_ants.analysis.__name__)
+
+
+def _imported(name: str, extra: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise AntsError(
+            f"{name.partition('.')[0]} is not installed; install it with pip install "
+            f"'taichi-ants[{extra}]'."
+        ) from error

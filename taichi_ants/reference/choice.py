@@ -1,0 +1,123 @@
+"""The choice of actions, and failures of actions and observations.
+
+Every choice, every action that may slip and every cell that may be misread takes one draw. Its high
+word decides whether the ant explores, slips or misreads; its low word decides everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from taichi_ants.grid.constants import N_HEADINGS
+from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.geometry import neighbour
+from taichi_ants.reference.numbers import exponential, power
+from taichi_ants.reference.observations import is_better, nestmate
+from taichi_ants.reference.random_stream import RandomStream, pick
+from taichi_ants.reference.world_state import WorldState
+from taichi_ants.task.constants import (
+    FORWARD,
+    GIVE,
+    LEFT,
+    N_ACTIONS,
+    PICK_UP,
+    RIGHT,
+    SEES_EMPTY,
+    SEES_GOAL,
+    SEES_LURE,
+)
+
+if TYPE_CHECKING:
+    from taichi_ants.task import Choice, Traffic
+
+_WORDS = 4294967296.0
+
+
+def choose_action(
+    values: Sequence[np.float32], epsilon: float, stream: RandomStream, choice: Choice | None = None
+) -> int:
+    """Return an action: any with probability epsilon, else one by these 5 values.
+
+    That is one with the largest value or, by the rule "softmax", action a with a probability
+    proportional to exp(values[a] / temperature).
+    """
+    high, low = stream.draw()
+    if high < int(epsilon * _WORDS):
+        return pick(low, N_ACTIONS)
+    best_value = max(values)
+    if choice is not None and choice.rule == "softmax":
+        assert choice.temperature is not None
+        weights = [
+            exponential((float(value) - float(best_value)) / choice.temperature) for value in values
+        ]
+        return weighted(weights, low)
+    best = [action for action in range(N_ACTIONS) if values[action] == best_value]
+    return best[pick(low, len(best))]
+
+
+def weighted(weights: Sequence[float], word: int) -> int:
+    """Return the index of a weight, with probabilities proportional to the weights."""
+    total = 0.0
+    for weight in weights:
+        total = total + weight
+    drawn = word / _WORDS * total
+    cumulative = 0.0
+    for index, weight in enumerate(weights[:-1]):
+        cumulative = cumulative + weight
+        if cumulative > drawn:
+            return index
+    return len(weights) - 1
+
+
+def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -> int:
+    """Return an action by the rule of Deneubourg et al. (1990), which needs no action values."""
+    assert choice.k is not None
+    assert choice.exponent is not None
+    _, low = ant.stream.draw()
+    seen = [ant.state >> 4 & 3, ant.state >> 2 & 3, ant.state & 3]
+    if SEES_GOAL in seen:
+        return GIVE if ant.carries else PICK_UP
+    weights, nearer = [0.0, 0.0, 0.0], [False, False, False]
+    for side in (LEFT, FORWARD, RIGHT):
+        cell = neighbour(ant.cell, (ant.heading + side - 1) % N_HEADINGS)
+        misread = side - 1 in ant.misread
+        nearer[side] = seen[side] == SEES_LURE
+        enters = seen[side] in (SEES_EMPTY, SEES_LURE)
+        if nestmate(world, ant, cell) and not misread and traffic.shared:
+            enters = ant.carries or traffic.follow
+            nearer[side] = ant.carries and is_better(world, ant, cell)
+        if enters:
+            level = 0.0 if misread else float(world.cue(ant).level(cell))
+            weights[side] = power(choice.k + level, choice.exponent)
+    if not any(weights):
+        return (LEFT, RIGHT)[pick(low, 2)]
+    if (
+        ant.carries
+        and world.homing == "compass"
+        and any(weights[side] and nearer[side] for side in range(3))
+    ):
+        weights = [weights[side] if nearer[side] else 0.0 for side in range(3)]
+    return weighted(weights, low)
+
+
+def slipped(action: int, slip: float, stream: RandomStream) -> int:
+    """Return the action that an ant executes instead of the one it chose."""
+    if slip == 0:
+        return action
+    high, low = stream.draw()
+    return pick(low, N_ACTIONS) if high < int(slip * _WORDS) else action
+
+
+def misread_codes(
+    codes: Sequence[int], turns: Sequence[int], misread: float, stream: RandomStream
+) -> dict[int, int]:
+    """Return the codes that an ant sees instead of the true ones, by turns from its heading."""
+    seen = {}
+    for code, turn in zip(codes, turns, strict=True):
+        high, low = stream.draw()
+        if high < int(misread * _WORDS):
+            seen[turn] = [one for one in range(4) if one != code][pick(low, 3)]
+    return seen

@@ -1,0 +1,90 @@
+"""The settings by which ants choose actions, and by which their actions and observations fail."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal, get_args
+
+from taichi_ants.settings import Is, Settings, Share
+
+if TYPE_CHECKING:
+    import numpy as np
+
+ChoiceRule = Literal["greedy", "softmax", "deneubourg"]
+CHOICE_RULES: tuple[str, ...] = get_args(ChoiceRule)
+
+
+@dataclass(frozen=True)
+class Choice(Settings, path="task.choice"):
+    """The rule by which ants choose actions.
+
+    - "greedy" takes an action with the largest value, and breaks ties at random.
+    - "softmax" takes action a with a probability proportional to exp(Q(s, a) / temperature).
+    - "deneubourg" needs no action values. The ant gives at the queen, picks up food in view, and
+      otherwise enters an open cell ahead with a probability proportional to (k + level)^exponent,
+      after Deneubourg et al. (1990). See `docs/colony.md`. Only colonies support it.
+
+    With "greedy" and "softmax", ants also explore: with probability epsilon, any action is taken.
+    """
+
+    rule: Annotated[ChoiceRule, Is("rule by which ants choose actions")] = "greedy"
+    temperature: Annotated[
+        float | None,
+        Is("difference of action values that makes an action e times as likely"),
+        Is(least=1e-6, most=1e6, usual=1.0, only=("rule", "softmax")),
+    ] = None
+    k: Annotated[
+        float | None,
+        Is("attraction of a cell without a trail", unit="units of trail level"),
+        Is(least=0.001, most=1e6, usual=20.0, only=("rule", "deneubourg")),
+    ] = None
+    exponent: Annotated[
+        float | None,
+        Is("exponent of the attraction of a cell; larger values follow stronger trails more"),
+        Is(least=0, most=20, usual=2.0, only=("rule", "deneubourg")),
+    ] = None
+
+    @classmethod
+    def named(cls) -> Mapping[str, Choice]:
+        """Return the named values: "greedy", "softmax" and "deneubourg"."""
+        return {rule: cls(rule) for rule in CHOICE_RULES}  # type: ignore[arg-type]
+
+    @property
+    def needs_table(self) -> bool:
+        """Whether ants choose by action values."""
+        return self.rule != "deneubourg"
+
+    def numbers(self) -> np.ndarray:
+        """Return temperature, k and exponent as kernels read them, float64 (3,); 0 is unused."""
+        import numpy as np
+
+        return np.array([self.temperature or 0.0, self.k or 0.0, self.exponent or 0.0])
+
+
+@dataclass(frozen=True)
+class Noise(Settings, path="task.noise"):
+    """Failures of actions and observations; by default, there are none.
+
+    With probability `slip`, an ant executes one of the five actions, drawn uniformly, instead of
+    the action that it chose. Learners learn about the chosen action. With probability `misread`, an
+    ant sees a cell in view as another of the four codes, drawn uniformly. This changes the state
+    index by which ants choose and learn, but not the results and rewards of actions.
+    """
+
+    slip: Annotated[
+        Share, Is("probability that an ant executes a random action instead of the chosen one")
+    ] = 0.0
+    misread: Annotated[
+        Share, Is("probability with which a cell in view is seen as another of the four codes")
+    ] = 0.0
+
+    @property
+    def numbers(self) -> dict[str, np.uint64]:
+        """The probabilities as kernels read them: bounds of a random 32-bit word."""
+        import numpy as np
+
+        return {
+            "slip_below": np.uint64(self.slip * 4294967296.0),
+            "misread_below": np.uint64(self.misread * 4294967296.0),
+        }

@@ -1,0 +1,72 @@
+"""Further pheromones: their settings, and the occasions on which ants lay them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+from typing import Annotated, Literal
+
+from taichi_ants.settings import Is
+from taichi_ants.task.pheromone import Pheromone
+
+Laid = Literal["with_food", "without_food", "always", "dead_end", "failed_pick_up", "never"]
+TRAIL, COMPASS = "trail", "compass"  # the names of the cues that are not fields
+
+
+class Occasion(IntFlag):
+    """Occasions of an ant in a tick: it enters a cell, picks up, delivers, or is stuck."""
+
+    MOVED_WITH_FOOD = 1
+    PICKED_UP = 2
+    MOVED_WITHOUT_FOOD = 4
+    DELIVERED = 8
+    DEAD_END = 16
+    FAILED_PICK_UP = 32
+
+
+_WITH_FOOD = Occasion.MOVED_WITH_FOOD | Occasion.PICKED_UP
+_WITHOUT_FOOD = Occasion.MOVED_WITHOUT_FOOD | Occasion.DELIVERED
+OCCASIONS: dict[str, Occasion] = {
+    "with_food": _WITH_FOOD,
+    "without_food": _WITHOUT_FOOD,
+    "always": _WITH_FOOD | _WITHOUT_FOOD,
+    "dead_end": Occasion.DEAD_END,
+    "failed_pick_up": Occasion.FAILED_PICK_UP,
+    "never": Occasion(0),
+}
+
+
+@dataclass(frozen=True)
+class Field(Pheromone, path="task.fields.NAME"):
+    """The rules of a further pheromone, which has a level in each cell, 0 at the start.
+
+    All settings of `Pheromone` apply, and `laid` says when ants deposit. `view` has an effect only
+    if the field is a cue. By `laid`:
+
+    - "with_food": like the trail, on each cell that an ant enters with food and, when it picks up
+      food, on the cell of the food and on its own cell.
+    - "without_food": on each cell that an ant enters without food, and on its own cell when it
+      delivers.
+    - "always": on all these cells.
+    - "dead_end": on the cell of an ant without food that sees three obstacles, before it acts.
+    - "failed_pick_up": on the cell of an ant without food that fails to pick up food.
+
+    Deposits that fade count ticks since the ant's last pick-up, delivery or birth, or since the
+    start of the episode.
+    """
+
+    laid: Annotated[
+        Laid,
+        Is("occasions on which ants deposit; a cue that is never laid gives no direction"),
+    ] = "with_food"
+
+    @property
+    def counts_without_food(self) -> bool:
+        """Whether deposits depend on the time for which an ant has been without food."""
+        without = ~_WITH_FOOD & OCCASIONS[self.laid]
+        return self.deposit == "fading" and bool(without)
+
+    @property
+    def numbers(self) -> dict[str, int | float]:
+        """The settings as numbers for kernels, by name."""
+        return {**super().numbers, "laid": int(OCCASIONS[self.laid])}

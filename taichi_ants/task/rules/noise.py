@@ -1,0 +1,60 @@
+"""Failures of actions and observations: slips, and cells that ants misread; see `task.Noise`.
+
+A slip, and each cell in view, takes one draw of 64 bits. The upper word decides whether the action
+slips or the cell is misread. The lower word chooses the executed action among all five, or the code
+seen among the other three, in ascending order.
+"""
+
+import taichi as ti
+
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.rules.random_bits import advance, below, bits_of, high_word, low_word
+from taichi_ants.task.rules.vision import code_in_view, state_index
+
+
+@ti.func
+def slipped(action, random_state, slip_below):
+    """Return the action that an ant executes instead of the chosen one, and the stream after it."""
+    after = advance(random_state)
+    bits = bits_of(after)
+    slips = high_word(bits) < slip_below
+    return ti.select(slips, below(low_word(bits), N_ACTIONS), action), after
+
+
+@ti.func
+def misread_code(code, random_state, misread_below):
+    """Return the code that an ant sees instead of the true one, and the stream after it."""
+    after = advance(random_state)
+    bits = bits_of(after)
+    other = below(low_word(bits), 3)
+    other += ti.cast(other >= code, ti.i32)
+    return ti.select(high_word(bits) < misread_below, other, code), after
+
+
+@ti.func
+def misread_percept(percept, random_state, misread_below):
+    """Return the percept with misread codes, and the stream after its three draws."""
+    left, after = misread_code(code_in_view(percept, 0), random_state, misread_below)
+    forward, later = misread_code(code_in_view(percept, 1), after, misread_below)
+    right, last = misread_code(code_in_view(percept, 2), later, misread_below)
+    return state_index(percept >> 6, left, forward, right), last
+
+
+@ti.func
+def misread_view(view: ti.template(), observation: ti.template(), random_state, misread_below):
+    """Misread the cells of a view, and return the stream after a draw for each.
+
+    A misread cell has another code, no ant, no trail, and is not nearer to the queen. The percept
+    of the view consists of the codes seen. The strongest level ahead does not change.
+    """
+    after = random_state
+    for k in ti.static(range(len(observation.cells))):
+        code, after = misread_code(view.codes[k], after, misread_below)
+        if code != view.codes[k]:
+            view.codes[k], view.levels[k], view.nearer[k] = code, 0, 0
+            view.ants[k], view.strangers[k] = 0, 0
+    left, forward, right = ti.static(observation.ahead)
+    view.percept = state_index(
+        view.carries, view.codes[left], view.codes[forward], view.codes[right]
+    )
+    return after

@@ -1,0 +1,170 @@
+"""Sweeps with registered measures, series over time, and policies without learning."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_lines import assert_one_sentence, call
+
+from taichi_ants import Colony, TrainingConfig, measures, save_policy, worlds
+from taichi_ants.learners.policies import random_policy, trail_follower
+from taichi_ants.measures import registry
+from taichi_ants.studies.runner import EVALUATION_SEEDS
+from taichi_ants.studies.sweep import read_sweep
+from taichi_ants.task import Pheromone, Task
+
+FILE = """
+kind = "colony"
+measures = ["entropy", "deliveries", "path_length"]
+measure_every = 25
+seeds = 3
+ants = 6
+episodes = 0
+ticks = 60
+rollouts = 2
+policy = "trail_follower"
+
+[vary]
+task.pheromone.level = [20, 250]
+"""
+FROZEN = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
+
+
+@pytest.fixture
+def sweep(tmp_path, capsys, monkeypatch):
+    """Calls the command on a file of this text, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry, "_YOURS", {})
+
+    def called(text, *more):
+        Path("my.toml").write_text(text, "utf-8")
+        return call("sweep", ["my.toml", *more], capsys)
+
+    return called
+
+
+def read_csv(name):
+    with open(f"results/sweep-my/{name}", newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def run(level=250, table=None, **asked):
+    seeds = [EVALUATION_SEEDS + seed for seed in range(3)]
+    table = trail_follower() if table is None else table
+    rules = {"sharing": "frozen", "q_values": table}
+    task = Task(pheromone=Pheromone(level=level))
+    return Colony(worlds.paper(), task, FROZEN, seeds, 6, **rules).run(2, 60, **asked)
+
+
+def test_the_series_is_that_of_the_library(sweep):
+    status, out, err = sweep(FILE, "--no-figures")
+    assert (status, err) == (0, "")
+    assert "entropy.trail" in out
+    rows = read_csv("series.csv")
+    names = ["task.pheromone.level", "seed", "episode", "tick", "measure", "value"]
+    assert list(rows[0]) == names
+    found = {tuple(row[name] for name in names[:-1]): row["value"] for row in rows}
+    assert len(found) == len(rows) == 2 * 3 * 2 * 3 * 3
+    for level in (20, 250):
+        for one in run(level, measures=["entropy", "deliveries", "path_length"], every=25).rows():
+            seed = one["seed"] - EVALUATION_SEEDS
+            where = (level, seed, one["episode"], one["tick"], one["measure"])
+            value = found[tuple(map(str, where))]
+            assert value == ("" if np.isnan(one["value"]) else repr(one["value"]))
+
+
+def test_the_tables_have_means_over_rollouts_at_their_ends(sweep):
+    assert sweep(FILE)[0] == 0
+    rows = [row for row in read_csv("runs.csv") if row["task.pheromone.level"] == "250"]
+    assert list(rows[0])[2:] == ["entropy.trail", "deliveries", "path_length"]
+    result = run(measures=["entropy", "path_length"])
+    for name in ("entropy.trail", "path_length"):
+        values = result.series.values[name].reshape(2, 3)
+        assert [float(row[name]) for row in rows] == pytest.approx(np.nanmean(values, axis=0))
+    per_1000 = result.deliveries.mean(axis=0) * 1000 / 60
+    assert [float(row["deliveries"]) for row in rows] == pytest.approx(per_1000.tolist())
+    assert "entropy.trail_mean" in read_csv("summary.csv")[0]
+    assert Path("results/sweep-my/figures/entropy.trail.png").exists()
+
+
+def test_without_every_there_is_no_series(sweep):
+    assert sweep(FILE.replace("measure_every = 25\n", ""), "--no-figures")[0] == 0
+    assert not Path("results/sweep-my/series.csv").exists()
+    assert float(read_csv("runs.csv")[0]["entropy.trail"]) > 0
+
+
+def test_a_resumed_sweep_writes_the_same_series(sweep, tmp_path):
+    Path("my.toml").write_text(FILE, "utf-8")
+    asked, blocks = read_sweep(Path("my.toml")), tmp_path / "blocks"
+    blocks.mkdir()
+    texts = []
+    for _ in range(2):
+        asked.measured(blocks, lambda share: None, threads=1)
+        asked.write_series(blocks, tmp_path)
+        texts.append((tmp_path / "series.csv").read_bytes())
+        sorted(blocks.iterdir())[0].unlink()
+    assert texts[0] == texts[1]
+
+
+def test_policies_can_vary(sweep):
+    save_policy("mine.npz", trail_follower(), {})
+    text = FILE.replace('policy = "trail_follower"\n', "").replace("measure_every = 25\n", "")
+    vary = 'policy = ["mine.npz", "trail_follower", "random"]'
+    text = text.replace("task.pheromone.level = [20, 250]", vary)
+    assert sweep(text, "--no-figures")[0] == 0
+    found = {}
+    for row in read_csv("runs.csv"):
+        found.setdefault(row["policy"], []).append(float(row["deliveries"]))
+    assert found["mine.npz"] == found["trail_follower"]
+    expected = run(table=random_policy()).deliveries.mean(axis=0) * 1000 / 60
+    assert found["random"] == pytest.approx(expected.tolist())
+    save_policy("mine.npz", random_policy(), {})  # another table in the same file
+    status, _, err = sweep(text, "--no-figures")
+    assert status == 2
+    assert "policy.sha256" in err
+
+
+def test_a_plugin_can_register_a_measure(sweep):
+    Path("north.py").write_text(
+        "from taichi_ants import measures\n"
+        "measures.register('north', lambda s: (s.ant_headings == 0).mean(), 'share', 'north')\n"
+    )
+    text = FILE.replace('"entropy"', '"north"')
+    status, out, err = sweep(text, "--plugin", "north.py", "--no-figures")
+    assert (status, err) == (0, "")
+    assert "north" in out
+    assert measures.get("north").summary == "north"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('"entropy"', '"entropi"', ["measures is 'entropi'", "entropy", "no_delivery_rate"]),
+        ('"entropy"', '"occupancy"', ["measures is 'occupancy'"]),
+        ('"entropy"', '"entropy.home"', ["'entropy.home' is not a part", "trail"]),
+        ("measure_every = 25", "measure_every = 0", ["measure_every is 0"]),
+        (
+            "measure_every = 25",
+            'measure_every = "often"',
+            ["measure_every is 'often'", "whole number"],
+        ),
+        ("episodes = 0", "episodes = 2", ["'trail_follower'", "set episodes = 0"]),
+        ('policy = "trail_follower"\n', "", ["training.learner is missing"]),
+        ('"trail_follower"', '"follower"', ["trail_follower, random", ".npz"]),
+        ('"trail_follower"', '"none.npz"', ["cannot read 'none.npz'"]),
+        ('"trail_follower"', "3", ["policy is 3; it must be text"]),
+        ("[vary]", "[vary]\nmeasure_every = [5, 6]", ["measure_every cannot vary"]),
+        ('"entropy", "deliveries", "path_length"', '"per_ant"', ["no measure has a series"]),
+        ("[vary]", '[vary]\ntask.observation = ["five_cells"]', ["must be one of paper"]),
+    ],
+)
+def test_mistakes_end_in_one_sentence(old, new, words, sweep):
+    assert old in FILE
+    status, out, err = sweep(FILE.replace(old, new, 1))
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    for word in words:
+        assert word in err

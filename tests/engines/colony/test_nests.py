@@ -1,0 +1,177 @@
+"""Several nests and kinds of food: what always holds, files, other parts, and refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_colonies import RandomColony, random_colony, with_nests
+
+from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, World, train
+from taichi_ants.analysis.bounds.limits import limits_of
+from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.offline import record_colony
+from taichi_ants.rendering import colony_snapshots, frames
+from taichi_ants.task import Food
+from taichi_ants.task.constants import FOOD
+from taichi_ants.task.events import Event
+from taichi_ants.viewer.recorder import Recorder
+
+TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
+KINDS = {"seed": Food(pick_up=2, deliver=5, loads=3), "sugar": Food(deliver=20)}
+WORLD = World(
+    (8, 8, 8),
+    [(0, 0, 0), (6, 0, 0)],
+    foods=[((3, 1, 0), 0), ((4, 1, 0), 1), ((3, 2, 0), 1), ((2, 1, 0), 0)],
+)
+
+
+def made(drawn: RandomColony, **options) -> Colony:
+    return Colony(
+        drawn.world,
+        drawn.task,
+        drawn.training,
+        [drawn.seed, 7],
+        **drawn.population,
+        sharing=drawn.sharing,
+        q_values=drawn.q_values,
+        **options,
+    )
+
+
+def two_nests(**options) -> Colony:
+    given = {"ants": 12, "sharing": "frozen", "q_values": trail_follower("paper"), **options}
+    return Colony(WORLD, Task(foods=KINDS), TRAINING, **given)
+
+
+def drawn_nests(sharing: str = "frozen", most: int = 12):
+    """Yield random colonies of two nests and two kinds of food with several loads."""
+    for seed in range(most):
+        one = random_colony(seed, sharing=sharing, learner="q_learning", dense=False, changes=True)
+        one = with_nests(one, seed, 2, 2, loads=True)
+        if one.world.n_nests == 2:
+            yield one
+
+
+def loads_of(colony: Colony, world: int) -> np.ndarray:
+    """The loads in cells and of living carriers, by kind."""
+    size, kinds = colony.grid.size, np.zeros(colony.n_kinds, int)
+    here = np.flatnonzero(colony.snapshot(world).ground == FOOD) + world * size
+    loads = colony.arrays["loads"][here] if colony.task.has_loads else 1
+    np.add.at(kinds, colony.arrays["kind_of"][here], loads)
+    carries = colony.living[world] & (
+        colony.arrays["carries"].reshape(colony.living.shape)[world] == 1
+    )
+    np.add.at(kinds, colony.arrays["kind"].reshape(colony.living.shape)[world][carries], 1)
+    return kinds
+
+
+def test_loads_are_conserved():
+    delivered = regrown = 0
+    for drawn in drawn_nests():
+        colony = made(drawn)
+        grows = any(food.regrowth is not None for food in drawn.task.foods.values())
+        colony.begin_episode()
+        start = [loads_of(colony, world) for world in range(2)]
+        for _ in range(30):
+            colony.tick()
+            outcome = colony.outcome()
+            for world in range(2):
+                there = loads_of(colony, world) + outcome.food_deliveries[0, world]
+                assert there.sum() == start[world].sum() + outcome.regrown[0, world]
+                assert grows or (there == start[world]).all()
+                births = outcome.births[0, world]
+                stored = colony.arrays["nests"][1].reshape(2, 2)[world].sum()
+                assert births + stored == outcome.deliveries[0, world] * drawn.task.life.births
+        assert np.array_equal(outcome.nest_deliveries.sum(2), outcome.deliveries)
+        delivered, regrown = delivered + outcome.deliveries.sum(), regrown + outcome.regrown.sum()
+    assert min(delivered, regrown) > 20
+
+
+def test_ants_deliver_to_their_own_queen_alone():
+    happened = np.zeros(2, int)
+    for drawn in drawn_nests():
+        colony = made(drawn)
+        far = np.stack([drawn.world.distances(nest) for nest in range(2)])
+        colony.begin_episode()
+        for _ in range(30):
+            before, returns = colony.living.copy(), colony.outcome().returns
+            colony.tick()
+            acted = before & colony.living
+            delivers = acted & (colony.events == Event.DELIVERED)
+            nests = colony.nests[delivers]
+            assert (far[nests, colony.cells[delivers]] == 1).all()
+            happened += np.bincount(nests, minlength=2)
+            if not colony.ants_change:
+                gained = colony.outcome().returns - returns
+                assert (colony.rewards.sum(axis=1, where=acted) == gained).all()
+    assert happened.min() > 3
+
+
+@pytest.mark.parametrize("sharing", ["shared", "frozen"])
+def test_schedules_threads_and_files_change_nothing(sharing, tmp_path):
+    drawn = next(drawn_nests(sharing))
+    results = []
+    for schedule, threads in (("by_world", 1), ("by_chunk", 1), ("by_chunk", 2), ("by_world", 2)):
+        colony = made(drawn, schedule=schedule, threads=threads)
+        colony.begin_episode()
+        colony.tick(9)
+        if threads == 2:
+            colony.save(tmp_path / "colony.npz")
+            colony = Colony.load(tmp_path / "colony.npz", threads=threads)
+        colony.tick(21)
+        results.append((colony.outcome(), colony.q_values, colony.nests))
+    first, *others = results
+    for other in others:
+        for name in first[0].__dataclass_fields__:
+            assert np.array_equal(getattr(first[0], name), getattr(other[0], name)), name
+        assert np.array_equal(first[1], other[1])
+        assert np.array_equal(first[2], other[2])
+
+
+def test_each_nest_learns_into_its_own_table():
+    colony = Colony(WORLD, Task(foods=KINDS), TRAINING, [1, 2, 3], ants=12)
+    assert colony.run(1, 200).nest_deliveries.shape == (1, 3, 2)
+    tables = colony.q_values
+    assert tables.shape == (3, 2, 128, 5)
+    assert not np.array_equal(tables[:, 0], tables[:, 1])
+    frozen = Colony(WORLD, Task(foods=KINDS), TRAINING, [1, 2, 3], ants=12, sharing="frozen",
+                    q_values=tables)  # fmt: skip
+    assert np.array_equal(frozen.q_values, tables)
+
+
+def test_pictures_show_every_queen():
+    shots = [*colony_snapshots(begun(), 5, follow=1)]
+    assert next(iter(frames(shots))).ndim == 3
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: train(WORLD, TRAINING, 1, 1), "the world has 2 nests and 2 kinds of food; only"),
+        (lambda: limits_of(WORLD), "the world has 2 nests and 2 kinds of food"),
+        (lambda: limits_of(replace(WORLD, other_queens=(), food_kinds=()), Task(foods=KINDS)),
+         "`task.foods` is seed, sugar; the bounds hold for one kind of food"),
+        (lambda: Recorder(begun()), "the viewer supports one nest"),
+        (lambda: record_colony(two_nests(), 1, 5), "record_colony supports one nest"),
+        (lambda: Interventions(begun()), "the colony has several nests or kinds of food"),
+        (lambda: Colony(WORLD, Task(), TRAINING), "the world has 2 kinds of food, but the task 1"),
+        (lambda: Colony([WORLD, replace(WORLD, other_queens=())], Task(foods=KINDS), TRAINING,
+                        [1, 2]), "all worlds of a colony must have the same number"),
+        (lambda: Task(foods=KINDS, life=Life(regrowth=3)), "set the regrowth of each kind instead"),
+        (lambda: Task(foods=KINDS, life=Life(wander=3)), "with one load in a cell can wander"),
+        (lambda: Task(foods={f"kind_{k}": Food() for k in range(9)}), "at most 8 are allowed"),
+    ],
+)  # fmt: skip
+def test_refusals(make, message):
+    with pytest.raises(AntsError) as caught:
+        make()
+    assert message in str(caught.value)
+
+
+def begun() -> Colony:
+    colony = two_nests()
+    colony.begin_episode()
+    return colony

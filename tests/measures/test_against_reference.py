@@ -1,0 +1,92 @@
+"""Measures of colonies equal those of the reference, which computes them in plain Python."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from random_colonies import random_colony
+
+from taichi_ants import Colony, measures
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.measures import MEASURES, new_deliveries, occupancy, synchrony
+
+EVERY, EPISODES, TICKS = 3, 2, 20
+
+
+def same(one: float, other: float) -> bool:
+    return one == other or (one != one and other != other)
+
+
+def expected(plain: ReferenceColony) -> list[dict]:
+    """The rows of one world: those of every measure, and the map of the ants."""
+    rows = []
+    for episode in range(EPISODES):
+        plain.begin_episode()
+        active, delivered = [], []
+        while plain.record.ticks < TICKS and not plain.over:
+            plain.tick(last=plain.record.ticks == TICKS - 1)
+            tick = plain.record.ticks
+            if tick % EVERY and tick < TICKS and not plain.over:
+                continue
+            row = {name: function(plain) for name, function in MEASURES.items()}
+            active.append(row["activity"])
+            delivered.append(row["deliveries"])
+            row["synchrony"] = synchrony(active, len(plain.ants))
+            row["new_deliveries"] = new_deliveries(delivered)
+            rows.append({**row, "episode": episode, "tick": tick, "occupancy": occupancy(plain)})
+        plain.end_episode()
+    return rows
+
+
+@pytest.mark.parametrize(
+    ("schedule", "threads", "changes"),
+    [
+        ("by_world", 1, False),
+        ("by_chunk", 2, True),
+        pytest.param("by_chunk", 2, False, marks=pytest.mark.slow),
+        pytest.param("by_world", 2, True, marks=pytest.mark.slow),
+    ],
+)
+def test_measures_equal_the_reference(schedule, threads, changes):
+    """Drawn models, two worlds at once; births and deaths where ants and food change."""
+    happened = dict.fromkeys(MEASURES, 0)
+    for seed in range(12):
+        drawn = random_colony(
+            seed, sharing="frozen", learner="q_learning", dense=changes, changes=changes
+        )
+        rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
+        seeds = (drawn.seed, 7)
+        given = drawn.world, drawn.task, drawn.training
+        colony = Colony(*given, seeds, **rules, schedule=schedule, threads=threads)
+        series = colony.run(EPISODES, TICKS, measures=[*measures.BUILT_IN], every=EVERY).series
+        assert set(series.values) == {*MEASURES, "synchrony", "new_deliveries"}
+        for w, one in enumerate(seeds):
+            places = np.flatnonzero(series.worlds == w)
+            theirs = expected(ReferenceColony(*given, one, **rules))
+            assert series.ticks[places].tolist() == [row["tick"] for row in theirs]
+            assert series.episodes[places].tolist() == [row["episode"] for row in theirs]
+            for place, row in zip(places, theirs, strict=True):
+                for measure, values in series.values.items():
+                    assert same(float(values[place]), row[measure]), (seed, measure)
+                counts = series.maps["occupancy"][place]
+                cells = colony.grid.cells(np.flatnonzero(counts)).tolist()
+                found = dict(zip(map(tuple, cells), counts[counts > 0].tolist(), strict=True))
+                assert found == row["occupancy"]
+                for measure in MEASURES:
+                    happened[measure] += 0 < row[measure] < np.inf
+    assert min(happened.values()) > 10, happened
+
+
+@pytest.mark.parametrize("schedule", ["by_world", "by_chunk"])
+def test_reading_changes_nothing(schedule):
+    for seed in range(6):
+        drawn = random_colony(seed, sharing="shared", learner="q_learning", dense=False)
+        colonies, results = [], []
+        for asked in ({}, {"measures": measures.names(), "every": 1}):
+            given = drawn.world, drawn.task, drawn.training, (1, 2)
+            colony = Colony(*given, **drawn.population, schedule=schedule, threads=2)
+            results.append(colony.run(2, 15, **asked))
+            colonies.append(colony)
+        assert colonies[0] == colonies[1]
+        for name, array in results[0].counts().items():
+            np.testing.assert_array_equal(array, results[1].counts()[name])

@@ -1,0 +1,136 @@
+"""Registered measures: names, parts, arguments, and messages for wrong ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError, Colony, TrainingConfig, measures, worlds
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.measures import registry
+from taichi_ants.worlds.double_bridge import branch_cells
+
+FROZEN = {"sharing": "frozen", "q_values": trail_follower()}
+TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
+
+
+@pytest.fixture(autouse=True)
+def forget_others(monkeypatch):
+    monkeypatch.setattr(registry, "_YOURS", {})
+
+
+def colony(world=None, ants=5, seeds=(0, 1, 2)) -> Colony:
+    return Colony(world or worlds.paper(), None, TRAINING, seeds, ants, **FROZEN)
+
+
+def test_a_measure_of_a_snapshot_is_one_number():
+    ours = colony()
+    ours.begin_episode()
+    ours.tick(60)
+    for w, delivered in enumerate(ours.deliveries.tolist()):
+        assert measures.get("deliveries")(ours.snapshot(w)) == delivered
+    snapshot = ours.snapshot()
+    assert measures.get("entropy")(snapshot) == measures.get("entropy.trail")(snapshot) > 0
+    with pytest.raises(AntsError, match="it has trail"):
+        measures.get("entropy.home")(snapshot)
+    with pytest.raises(AntsError, match="array of shape"):
+        measures.get("occupancy")(snapshot)
+    with pytest.raises(AntsError, match="needs the series of 'activity'"):
+        measures.get("synchrony")(snapshot)
+    with pytest.raises(AntsError, match="has no parts"):
+        measures.get("deliveries.trail")(snapshot)
+
+
+def test_your_own_measure_is_read_as_the_others():
+    measures.register("north", lambda s: np.count_nonzero(s.ant_headings == 0), "ants")
+    measures.register("growth", lambda values, s: np.ptp(values), of="north")
+    measures.register("loads", lambda s: {"with": s.ant_carries.sum(), "without": None})
+    result = colony().run(1, 30, measures=["north", "growth", "loads", "loads.with"], every=10)
+    values = result.series.values
+    assert list(values) == ["north", "growth", "loads.with", "loads.without"]
+    by_world = values["north"].reshape(3, 3)
+    assert values["growth"].reshape(3, 3)[-1].tolist() == np.ptp(by_world, axis=0).tolist()
+    assert np.isnan(values["loads.without"]).all()
+    assert result.series.units["north"] == "ants"
+    assert "growth" in measures.names()
+
+
+def test_shares_in_regions():
+    """The two branches of a bridge, and all other cells."""
+    short, long = branch_cells()
+    bridge = worlds.build("double_bridge")
+    rest = [cell for cell in bridge.grid.cells(np.flatnonzero(bridge.grid.exists)).tolist()
+            if cell not in [*short.tolist(), *long.tolist()]]  # fmt: skip
+    shares = measures.share_in({"short": short, "long": long, "rest": rest})
+    measures.register("branch", shares)
+    series = colony(bridge, 40).run(1, 80, measures="branch", every=40).series
+    values = np.array([*series.values.values()])
+    assert list(series.values) == ["branch.short", "branch.long", "branch.rest"]
+    assert np.allclose(values.sum(axis=0), 1)
+    assert values[:2].max() > 0
+    lone = measures.share_in({"here": [(99, 0, 0)]})
+    with pytest.raises(AntsError, match="outside"):
+        colony().run(1, 1, measures=measures.Measure("there", lone))
+
+
+@pytest.mark.parametrize(
+    ("name", "function", "more", "message"),
+    [
+        ("deliveries", len, {}, "built-in measure"),
+        ("a b", len, {}, "must be a word"),
+        ("mine", 3, {}, r"must be a function of \(snapshot\)"),
+        ("mine", lambda: 1, {}, r"must be a function of \(snapshot\)"),
+        ("mine", lambda s: 1, {"of": "living"}, r"function of \(values, snapshot\)"),
+        ("mine", lambda v, s: 1, {"of": "synchrony"}, "reads a series itself"),
+        ("mine", lambda v, s: 1, {"of": "nothing"}, "there is no measure 'nothing'"),
+        ("mine", len, {"unit": 3}, "unit is 3; it must be text"),
+    ],
+)
+def test_wrong_measures_are_refused(name, function, more, message):
+    with pytest.raises(AntsError, match=message):
+        measures.register(name, function, **more)
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({"measures": ["deliveries", "deliverys"]}, "there is no measure 'deliverys'"),
+        ({"measures": 3}, "give a list of names"),
+        ({"measures": [3]}, "the measure is 3"),
+        ({"measures": ["living", "living"]}, "'living' more than once"),
+        ({"measures": ["living"], "every": 0}, "every is 0"),
+        ({"every": 10}, "measures is empty"),
+    ],
+)
+def test_wrong_requests_are_refused(asked, message):
+    with pytest.raises(AntsError, match=message):
+        colony().run(1, 5, **asked)
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        (lambda s: "much", "returned 'much'; it must return a number"),
+        (lambda s: {"a": "much"}, "returned 'much'"),
+        (lambda s: s.nothing, "failed with AttributeError"),
+        (lambda s: np.zeros(s.counts["ticks"] + 1), "arrays of different shapes"),
+    ],
+)
+def test_wrong_values_are_refused(function, message):
+    measures.register("mine", function)
+    with pytest.raises(AntsError, match=message):
+        colony().run(1, 10, measures="mine", every=5)
+
+
+def test_the_shortest_path_goes_around_obstacles():
+    """Hand-counted: five cells in a row, then the same with a detour, then with a wall."""
+    row = worlds.World((6, 1, 1), (0, 0, 0), foods=[(5, 0, 0), (4, 0, 0)])
+    assert measures.shortest_path(row) == 3  # food 4 steps away: 1 to pick up, 2 moves, 1 to give
+    near = worlds.World((3, 3, 1), (0, 0, 0), foods=[(1, 0, 0)])
+    assert measures.shortest_path(near) == 1
+    open_way = worlds.World((4, 3, 1), (0, 0, 0), foods=[(3, 0, 0)])
+    detour = worlds.World((4, 3, 1), (0, 0, 0), foods=[(3, 0, 0)], obstacles=[(1, 0, 0), (2, 0, 0)])
+    assert measures.shortest_path(open_way) == 2
+    assert measures.shortest_path(detour) == 3
+    closed = worlds.World((4, 1, 1), (0, 0, 0), foods=[(3, 0, 0)], obstacles=[(1, 0, 0)])
+    assert np.isnan(measures.shortest_path(closed))

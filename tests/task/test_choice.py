@@ -1,0 +1,234 @@
+"""Rules of choice and noise: frequencies of choices, closed forms, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chisquare
+
+from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, record, task, train, worlds
+from taichi_ants.analysis.bounds.episodes import EpisodeBounds
+from taichi_ants.envs.colony import ColonyWorlds
+from taichi_ants.envs.forage import LoneAnts
+from taichi_ants.envs.vector import Arguments
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.learners.policies import action_probabilities
+from taichi_ants.offline import record_colony
+from taichi_ants.reference.choice import weighted
+from taichi_ants.reference.numbers import power
+from taichi_ants.task import Choice, Noise
+from taichi_ants.task.constants import LEFT, N_ACTIONS, RIGHT
+
+N, GRID = 40_000, AxialGrid((10, 10, 2))
+PLAIN = TrainingConfig("q_learning", 0.5, 0.9, 0.0, 1.0)
+GREEDY_VALUES = np.tile(np.float32([0.0, 3.0, 1.0, 2.0, -1.0]), (128, 1))
+
+
+def lone_ant(trails=(), carries_home=False) -> World:
+    """A world in which an ant at (5, 5, 0), which faces away from the queen, can move freely."""
+    queen = (5, 8, 0) if carries_home else (0, 9, 0)
+    return World((10, 10, 2), queen, foods=[(9, 0, 0)], trails=trails, ants=[((5, 5, 0), 0)])
+
+
+def first_actions(rules: Task, world: World, n: int = N, **options) -> tuple[np.ndarray, ...]:
+    """Return the chosen and executed actions of n ants, each alone in its world, in a tick."""
+    colony = Colony(world, rules, seeds=range(n), sharing="frozen", **options)
+    colony.begin_episode()
+    colony.tick()
+    return colony.actions[:, 0].copy(), colony.executed[:, 0].copy(), colony.states[:, 0].copy()
+
+
+def assert_counts(values: np.ndarray, shares: np.ndarray) -> None:
+    counts = np.bincount(values, minlength=len(shares))
+    shares = np.asarray(shares, float) / np.sum(shares, dtype=float)
+    assert not counts[shares == 0].any()
+    possible = shares > 0
+    assert chisquare(counts[possible], shares[possible] * len(values)).pvalue > 0.001, counts
+
+
+@pytest.mark.parametrize("epsilon", [0.0, 0.3])
+def test_softmax_frequencies(epsilon):
+    """Also with exploration, whose actions are uniform."""
+    training = TrainingConfig("q_learning", 0.5, 0.9, epsilon, 1.0)
+    rules = Task(choice=Choice("softmax", temperature=1.5))
+    chosen, *_ = first_actions(rules, lone_ant(), training=training, q_values=GREEDY_VALUES)
+    weights = np.exp(GREEDY_VALUES[0].astype(float) / 1.5)
+    shares = epsilon / N_ACTIONS + (1 - epsilon) * weights / weights.sum()
+    assert_counts(chosen, shares)
+    known = action_probabilities(GREEDY_VALUES[0], epsilon, rules.choice)
+    np.testing.assert_allclose(known, shares, atol=1e-9)
+
+
+def test_a_low_temperature_is_greedy():
+    rules = Task(choice=Choice("softmax", temperature=1e-6))
+    chosen, *_ = first_actions(rules, lone_ant(), 500, training=PLAIN, q_values=GREEDY_VALUES)
+    assert (chosen == 1).all()
+
+
+@pytest.mark.parametrize(("k", "exponent"), [(20.0, 2.0), (20.0, 1.5), (1.0, 0.0)])
+def test_frequencies_of_deneubourgs_rule(k, exponent):
+    """Levels 0, 20 and 60 left, forward and right of an ant without food."""
+    around = GRID.index((5, 5, 0)) + GRID.offsets[[0, 1]]
+    forward, right = (tuple(cell) for cell in GRID.cells(around).tolist())
+    world = lone_ant([(forward, 20), (right, 60)])
+    rules = Task(choice=Choice("deneubourg", k=k, exponent=exponent))
+    chosen, *_ = first_actions(rules, world, training=None)
+    weights = (k + np.array([0, 20, 60])) ** exponent
+    assert_counts(chosen, weights / weights.sum())
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "share"), [(0, 0, 0.5), (20, 0, 0.8), (60, 20, 0.8), (100, 0, 0.973)]
+)
+def test_choice_function_of_the_literature(one, other, share):
+    """P(A) = (k + A)^n / ((k + A)^n + (k + B)^n) with k = 20 and n = 2."""
+    weights = [power(20.0 + level, 2.0) for level in (one, other)]
+    assert weights[0] / sum(weights) == pytest.approx(share, abs=5e-4)
+    last = [weighted(weights, word) for word in (0, int(2**32 * share * 0.999), 2**32 - 1)]
+    assert last == [0, 0, 1]
+
+
+def test_ants_without_an_open_cell_turn():
+    walled = World(
+        (10, 10, 2),
+        (0, 9, 0),
+        foods=[(9, 0, 0)],
+        obstacles=[
+            tuple(cell) for cell in GRID.cells(GRID.index((5, 5, 0)) + GRID.offsets).tolist()
+        ],
+        ants=[((5, 5, 0), 0)],
+    )
+    chosen, *_ = first_actions(Task(choice="deneubourg"), walled, training=None)
+    assert_counts(chosen, [0.5, 0, 0.5])
+    assert {LEFT, RIGHT} == set(chosen.tolist())
+
+
+def test_slips():
+    rules = Task(noise=Noise(slip=0.4))
+    chosen, executed, _ = first_actions(rules, lone_ant(), training=PLAIN, q_values=GREEDY_VALUES)
+    assert (chosen == 1).all()
+    assert_counts(executed, [0.08, 0.68, 0.08, 0.08, 0.08])
+
+
+def test_misread_cells():
+    """An ant sees a rock ahead of it as each other code equally often, and cells independently."""
+    rules = Task(noise=Noise(misread=0.3))
+    colony = Colony(lone_ant(), rules, PLAIN, range(N), sharing="frozen", q_values=GREEDY_VALUES)
+    colony.begin_episode()
+    states, percepts = colony.states[:, 0], colony.percepts[:, 0]
+    assert (percepts == 0).all()
+    codes = np.stack([states >> 4 & 3, states >> 2 & 3, states & 3])
+    for seen in codes:
+        assert_counts(seen, [0.7, 0.1, 0.1, 0.1])
+    assert_counts((codes > 0).sum(axis=0), [0.343, 0.441, 0.189, 0.027])
+
+
+def test_a_task_without_noise_draws_nothing():
+    """A rule that has no effect on these ants leaves their random streams as they are."""
+    one = Colony(worlds.paper(), Task(), PLAIN, 3, 9)
+    two = Colony(worlds.paper(), Task(choice=Choice("greedy"), noise=Noise(0, 0)), PLAIN, 3, 9)
+    for colony in (one, two):
+        colony.begin_episode()
+        colony.tick(30)
+    assert one == two
+
+
+def test_worlds_that_begin_again_do_not_misread_twice():
+    """A world that has begun but not ticked keeps what its ants see while others begin."""
+    rules = Task(noise=Noise(misread=0.5))
+    colony = Colony(worlds.paper(), rules, PLAIN, (1, 2), 9)
+    colony.begin_episode()
+    seen, streams = colony.states[1].copy(), colony.streams[1].copy()
+    colony.begin_some(np.array([True, False]))
+    assert (colony.states[1] == seen).all()
+    assert (colony.streams[1] == streams).all()
+
+
+def test_files_and_pickles_keep_rules_of_choice(tmp_path):
+    rules = task.foraging().but(
+        observation="paper", choice={"rule": "deneubourg", "k": 7.5}, noise={"slip": 0.1}
+    )
+    colony = Colony(worlds.paper(), rules, None, (1, 2), 20, sharing="frozen")
+    colony.begin_episode()
+    colony.tick(20)
+    colony.save(tmp_path / "colony.npz")
+    other = Colony.load(tmp_path / "colony.npz")
+    assert other == colony
+    colony.tick(20)
+    other.tick(20)
+    assert other == colony
+    assert "training: None" in repr(colony)
+
+
+def test_recorded_probabilities_are_those_of_softmax():
+    rules = Task(choice=Choice("softmax", temperature=2.0), noise=Noise(0.2, 0.2))
+    data = record(worlds.paper(), GREEDY_VALUES, 3, range(2), 50, rules, epsilon=0.1)
+    values = GREEDY_VALUES[data.state]
+    known = action_probabilities(values, 0.1, rules.choice)
+    known = known[np.arange(len(values)), data.action]
+    np.testing.assert_allclose(data.behaviour_probability, known, rtol=1e-6)
+    colony = Colony(worlds.paper(), rules, PLAIN, 1, 5, sharing="frozen", q_values=GREEDY_VALUES)
+    data = record_colony(colony, 1, 20)
+    known = action_probabilities(GREEDY_VALUES[data.state], 0.0, rules.choice)
+    known = known[np.arange(len(data.action)), data.action]
+    np.testing.assert_allclose(data.behaviour_probability, known, rtol=1e-6)
+
+
+CELLS = Task(choice="deneubourg")
+GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
+REFUSED = [
+    (lambda: Choice("greedy", temperature=2.0), "`task.choice.temperature` is 2.0; leave it out"),
+    (lambda: Choice("softmax", temperature=0), "`task.choice.temperature` is 0; it must be"),
+    (lambda: Choice("deneubourg", k=0), "`task.choice.k` is 0; it must be"),
+    (lambda: Choice("deneubourg", exponent=-1), "`task.choice.exponent` is -1; it must be"),
+    (lambda: Task(choice="boltzmann"), "`task.choice` is 'boltzmann'; it must be a Choice, or one"),
+    (lambda: Noise(slip=1.5), "`task.noise.slip` is 1.5; it must be between 0 and 1."),
+    (lambda: Task("ants", choice="deneubourg"), "`task.observation` is 'ants'; it must be 'paper'"),
+    (
+        lambda: Colony(worlds.paper(), CELLS, PLAIN),
+        "so ants choose without action values, but sharing is 'shared'",
+    ),
+    (
+        lambda: Colony(worlds.paper(), CELLS, PLAIN, sharing="frozen", q_values=GREEDY_VALUES),
+        'set sharing to "frozen" and training to None, and leave out q_values',
+    ),
+    (lambda: train(worlds.paper(), PLAIN, 0, 1, task=CELLS), "only colonies support it"),
+    (
+        lambda: train(
+            worlds.paper(),
+            TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0),
+            0,
+            1,
+            task=Task(choice="softmax"),
+        ),
+        "learner 'expected_sarsa' takes the mean over epsilon-greedy actions",
+    ),
+    (
+        lambda: Colony(
+            worlds.paper(),
+            Task(choice="softmax"),
+            TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0),
+        ),
+        "learner 'expected_sarsa'",
+    ),
+    (
+        lambda: LoneAnts(1, Task(choice="softmax"), None, GIVEN),
+        "the actions of an environment are given; leave `task.choice` out",
+    ),
+    (
+        lambda: ColonyWorlds(1, CELLS, GIVEN, ants=1, start="nest"),
+        "the actions of an environment are given",
+    ),
+    (lambda: EpisodeBounds(worlds.paper(), Task(noise=Noise(slip=0.1))), "a task without noise"),
+    (
+        lambda: record_colony(Colony(worlds.paper(), CELLS, None, sharing="frozen")),
+        "which has no action values",
+    ),
+]
+
+
+@pytest.mark.parametrize(("make", "says"), REFUSED, ids=[says[:40] for _, says in REFUSED])
+def test_refusals_name_the_setting(make, says):
+    with pytest.raises(AntsError) as caught:
+        make()
+    assert says in str(caught.value)
