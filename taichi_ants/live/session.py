@@ -139,7 +139,7 @@ class Session:
         self._spent = 0.0  # seconds of simulation so far
         self.interventions.length = self._length
         self.interventions.begin_episode()
-        self.colony.observe()  # has no effect, but compiles kernels for the first edit
+        self.colony.observe([])  # has no effect, but compiles kernels for the first edit
         # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
         self._recorder = Recorder(self.colony, title=title)

@@ -58,6 +58,10 @@ class Interventions:
 
         Rock and food first move ants on these cells aside.
         """
+        self._put(cells, what)
+        self._observe()
+
+    def _put(self, cells: Sequence[Cell], what: int) -> None:
         world = self.colony.world
         if what != EMPTY:
             self._move_aside(cells)
@@ -71,7 +75,6 @@ class Interventions:
             else:
                 self.colony.food_sources.end(cell)
         self._new_trail()
-        self._observe()
 
     def _move_aside(self, cells: Sequence[Cell]) -> None:
         """Move the ants on these cells to the nearest empty cells, within REACH."""
@@ -89,19 +92,21 @@ class Interventions:
         """Move rock, food or the queen to an empty cell, now and later; ants move aside."""
         world = self.colony.world
         what = world.ground[cell]
-        if what == EMPTY or world.ground[to] != EMPTY:
-            return
-        self._move_aside([to])
-        if to in world.ants:
-            return
-        if what == QUEEN:
-            self.move_queen(to)
-        else:
-            self.put([cell], EMPTY)
-            self.put([to], what)
+        if what != EMPTY and world.ground[to] == EMPTY:
+            self._move_aside([to])
+            if to not in world.ants and what == QUEEN:
+                self._move_queen(to)
+            elif to not in world.ants:
+                self._put([cell], EMPTY)
+                self._put([to], what)
+        self._observe()
 
     def move_queen(self, cell: Cell) -> None:
         """Move the queen to an empty cell, now and later; an ant there moves aside."""
+        self._move_queen(cell)
+        self._observe()
+
+    def _move_queen(self, cell: Cell) -> None:
         world = self.colony.world
         self._move_aside([cell])
         assert world.content(cell) == EMPTY
@@ -109,7 +114,6 @@ class Interventions:
             ground[world.queen], ground[cell] = EMPTY, QUEEN
         world.queen = cell
         self.colony.food_sources.end(cell)
-        self._observe()
 
     def _new_trail(self) -> None:
         """Make new trails with the same levels, for the present rocks and pheromones."""
@@ -193,7 +197,7 @@ class Interventions:
         by_number = sorted(colony.ants.values(), key=lambda ant: ant.number)
         if n < len(by_number):
             self.remove_ants([ant.cell for ant in by_number[n:]])
-        elif n > len(by_number):
+        else:
             self.add_some(n - len(by_number))
 
     def set_evaporation(self, falls: bool) -> None:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from taichi_ants import interventions as language
+import taichi_ants.interventions as language
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.protocol import At, Event, Every, When
 from taichi_ants.reference.colony import EpisodeRecord, ReferenceColony
 from taichi_ants.reference.geometry import Cell, normal_form
 from taichi_ants.reference.interventions import Interventions
+from taichi_ants.reference.measures import MEASURES
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 
-MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
-    "deliveries": lambda colony: colony.record.deliveries,
-    "living": lambda colony: len(colony.ants),
-}
 _CONTENTS = {"rock": OBSTACLE, "food": FOOD}
 
 
@@ -48,13 +45,14 @@ class Protocol:
         self._happened: set[int] = set()
         self._interventions = Interventions(colony)
         tables = copy.deepcopy([learner.rows for learner in colony.minds.tables])
-        self._before = colony.task, colony.pheromone, colony.epsilon, colony.learning_rate, tables
+        self._before = colony.task, colony.epsilon, colony.learning_rate, tables
+        self._pheromones = colony.pheromone, colony.fields
 
     def end_episode(self) -> None:
         """Undo changes of numbers and of policies, and end the episode."""
         colony = self._colony
-        task, pheromone, epsilon, learning_rate, tables = self._before
-        colony.task, colony.pheromone, colony.epsilon = task, pheromone, epsilon
+        colony.task, colony.epsilon, learning_rate, tables = self._before
+        colony.pheromone, colony.fields = self._pheromones
         colony.minds.pace(learning_rate)
         colony.learning_rate = learning_rate
         if colony.sharing == "frozen":

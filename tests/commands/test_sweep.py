@@ -470,7 +470,7 @@ WRONG_EVENTS = {
     "tick": ("tick = 20", "tick = 60", ["`at.tick` is 60, but episodes have 60 ticks"]),
     "name": ("trail = 0", "trial = 0", ["in [[at]] number 1, `at.trial` is not a setting"]),
     "share": ("[0.0, 0.5]", "[0.0, 1.5]", ["`remove_ants.share` is 1.5"]),
-    "cells": ("trail = 0", "clear = [[99, 0, 0]]", ["(99, 0, 0) is outside a world"]),
+    "cells": ("trail = 0", "clear = [[99, 0, 0]]", ["(99, 0, 0) is outside the world"]),
     "cell": ("trail = 0", "clear = [[9, 0]]", ["`clear.cells` has the cell [9, 0]"]),
     "no cells": ("trail = 0", 'place.what = "rock"', ["`place.cells` is missing; add it"]),
     "measure": ('"living"', '"height"', ["in [[when]] number 1", "'height'"]),

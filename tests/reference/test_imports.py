@@ -18,6 +18,10 @@ ALLOWED = {
     "taichi_ants.errors",
     "taichi_ants.learners.config",
     "taichi_ants.worlds.world",
+    # Records of settings, and the hand-written policies as tables.
+    "taichi_ants.interventions",
+    "taichi_ants.protocol",
+    "taichi_ants.learners.policies",
 }
 OUTSIDE = {
     "__future__",

@@ -40,7 +40,7 @@ def random_protocol(
             when |= {"stop": when["start"] + 5} if rng.random() < 0.5 else {}
         elif kind == "when":
             bound = str(rng.choice(["above", "below"]))
-            measure = str(rng.choice(["deliveries", "living"]))
+            measure = str(rng.choice(["deliveries", "living", "carriers", "distance"]))
             when = {"measure": measure, bound: float(rng.integers(-1, 7))}
             when |= {"interval": int(rng.integers(1, 5)), "once": bool(rng.random() < 0.5)}
         names = rng.choice(kinds, int(rng.integers(1, 3)), replace=False).tolist()

@@ -118,10 +118,15 @@ class Colony(ColonyState):
         self.begin(which)
         self._stepper.launch(self, "begin_phases")
 
-    def observe(self) -> None:
-        """Let all ants observe again, after interventions since the last tick."""
+    def observe(self, worlds: Sequence[int] | None = None) -> None:
+        """Let the ants of some or all worlds observe again, after interventions in these worlds."""
         self.check_begun()
+        row = self.arrays["worlds"][WorldRow.RUNNING]
+        running = row.copy()
+        if worlds is not None:
+            row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
         self._stepper.launch(self, "intervention_phases")
+        row[:] = running
 
     def check_same_kernels(self, task: Task) -> None:
         """Raise an AntsError if a task needs other kernels than the present one."""

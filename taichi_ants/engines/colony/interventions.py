@@ -2,8 +2,9 @@
 
 Changes of single ants and of trails last for the present episode. Changes of rock, food and the
 queen persist in later episodes that `Interventions.begin_episode` starts; `Colony.begin_episode`
-starts from the colony's own worlds. After each change the ants observe again, but still take the
-actions that they have already drawn.
+starts from the colony's own worlds. After each method that changes cells or ants, the ants of these
+worlds observe again once, also if nothing has changed, but still take the actions that they have
+already drawn.
 
 Rock, food and the queen move ants aside to empty cells up to `REACH` steps away. Candidate cells
 are tried by distance, then by cube coordinates. If none is empty, the ant and its cell do not
@@ -140,7 +141,7 @@ class Interventions:
         """
         for one in self._each():
             one.put(cells, what)
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def move_queen(self, cell: int) -> None:
         """Move the queen to a cell without rock or food; an ant there moves aside.
@@ -149,7 +150,7 @@ class Interventions:
         """
         for one in self._each():
             one.move_queen(cell)
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def move(self, cell: int, to: int) -> None:
         """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
@@ -158,13 +159,13 @@ class Interventions:
         """
         for one in self._each():
             one.move(cell, to)
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def lay_trail(self, cells: np.ndarray, level: int) -> None:
         """Set the trail of cells other than rocks."""
         for one in self._each():
             one.lay(cells[one.view("walls")[cells] == 0], level)
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
         """Put newborn ants on those of the cells that are empty, with random headings by default.
@@ -173,7 +174,7 @@ class Interventions:
         """
         for one in self._each():
             one.add(cells, heading)
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def add_some(self, number: int | None, share: float | None, heading: int | None = None) -> None:
         """Put a number of newborn ants, or a share of the living ones, on free start cells.
@@ -182,19 +183,19 @@ class Interventions:
         """
         for one in self._each():
             one.add_some(one.amount(number, share), heading)
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def remove_ants(self, cells: np.ndarray) -> None:
         """Remove the ants on these cells, with the food that they carry."""
         for one in self._each():
             one.remove(one.living_slots()[np.isin(one.cells[one.living_slots()], cells)])
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def remove_some(self, number: int | None, share: float | None) -> None:
         """Remove a number of random ants, or a share; all ants if there are fewer."""
         for one in self._each():
             one.remove_some(one.amount(number, share))
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def set_ants(self, n: int) -> None:
         """Set the number of ants, now and, if the changes are lasting, in later episodes.
@@ -211,7 +212,7 @@ class Interventions:
         if self.lasting:
             self._changed |= n != self.ants
             self.ants = n
-        self.colony.observe()
+        self.colony.observe(self.worlds)
 
     def set_task(self, task: Task) -> None:
         """Set a task that differs only in settings that kernels read as numbers."""
