@@ -22,7 +22,17 @@ import numpy as np
 from taichi_ants.errors import AntsError, check_one_of, entries_of, is_flag, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.policies import NAMED, checked_values, load_policy
-from taichi_ants.settings import Is, Settings, Share, all_of, declared, flat, nested, not_a_setting
+from taichi_ants.settings import (
+    Is,
+    Settings,
+    Share,
+    all_of,
+    declared,
+    flat,
+    named_groups,
+    nested,
+    not_a_setting,
+)
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.task.pheromone import MAX_DEPOSIT
@@ -35,6 +45,7 @@ One = TypeVar("One", bound="Record")
 _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
 _MOST = 2**24  # ants, see `checks.MAX_ANTS`
 _CELLS = Is("cells, each [x, y, z]")
+_NAMED = {one.name: one for one in named_groups(Task)}
 
 
 class Record(Settings):
@@ -287,9 +298,14 @@ class TaskNumbers(Intervention, path="task"):
             raise AntsError("`task` has no settings; name at least one, with its new value.")
         values = []
         for name, value in self.values:
-            if name not in known:
-                raise AntsError(f"`task.{name}` {not_a_setting(name, known)}")
-            values.append((name, known[name].checked(value)))
+            group, _, rest = name.partition(".")
+            of = rest.partition(".")[0]
+            here = known
+            if rest and group in _NAMED:
+                here = {f"{group}.{of}.{one.name}": one for one in declared(_NAMED[group].entry)}
+            if name not in here:
+                raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")
+            values.append((name, here[name].checked(value)))
         object.__setattr__(self, "values", tuple(sorted(values)))
 
     @classmethod
@@ -303,7 +319,12 @@ class TaskNumbers(Intervention, path="task"):
         return dict(self.values)
 
     def changed(self, task: Task) -> Task:
-        """Return the task with the new values."""
+        """Return the task with the new values; AntsError if they name a field it does not have."""
+        for name, _ in self.values:
+            group, _, rest = name.partition(".")
+            known, of = getattr(task, group), rest.partition(".")[0]
+            if group in _NAMED and of not in known:
+                raise AntsError(f"`task.{name}` {not_a_setting(of, known, f'task.{group}')}")
         return task.but(**nested(dict(self.values)))
 
     def check_in(self, grid: AxialGrid, task: Task) -> None:

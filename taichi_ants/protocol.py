@@ -141,7 +141,8 @@ class Every(Event, path="every"):
 class When(Event, path="when"):
     """Interventions when a measure of a world is above or below a bound.
 
-    Each world is checked for itself, every `interval` ticks. With `once`, the event happens at most
+    Each world is checked for itself, every `interval` ticks. While the measure has no value, the
+    event does not happen. With `once`, the event happens at most
     once in an episode, else at each check for which the condition holds.
     """
 
@@ -154,7 +155,12 @@ class When(Event, path="when"):
     def check(self) -> None:
         """Check all settings."""
         super().check()
-        measures.get(self.measure)
+        one = measures.get(self.measure)
+        if one.of is not None:
+            raise AntsError(
+                f"`when.measure` is {self.measure!r}, which needs the series of {one.of!r}; choose "
+                "a measure of a single state."
+            )
         if (self.above is None) == (self.below is None):
             raise AntsError("`when` needs a bound; give either `above` or `below`.")
 

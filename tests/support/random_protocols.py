@@ -105,6 +105,16 @@ def _change(rng: np.random.Generator, task: Task) -> dict[str, Any]:
         able.append(("pheromone.half_life", float(rng.uniform(0.5, 20))))
     if life.lifespan:
         able.append(("life.lifespan", int(rng.integers(1, 40))))
+    if task.noise.slip:
+        able += [("noise.slip", 0.5), ("noise.misread", 0.25)]
+    if task.choice.temperature:
+        able.append(("choice.temperature", float(rng.uniform(0.1, 5))))
+    for name, one in task.fields.items():
+        able.append((f"fields.{name}.laid", str(rng.choice(["always", "without_food"]))))
+        if one.deposit != "none":
+            able.append((f"fields.{name}.level", int(rng.integers(1, 100))))
+        if one.half_life:
+            able.append((f"fields.{name}.half_life", float(rng.uniform(0.5, 20))))
     if life.wander:
         able += [("life.wander", int(rng.integers(1, 9))), ("life.regrowth", 2)]
     return dict([able[int(rng.integers(len(able)))]])

@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from random_choices import NO_NOISE, NOISE
 from random_colonies import random_colony
 from random_protocols import random_protocol
 from same_colonies import assert_equal
@@ -24,8 +25,8 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 # Each entry takes kernels of its own, see test_against_reference.py.
 KERNELS = [
     ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),
-    ("sarsa", "shared", "ants", False, "right_of_way", "strongest"),
-    ("double_q", "independent", "ants_seen", True, "blocking", "half"),
+    ("sarsa", "shared", "ants", False, "right_of_way", "strongest", "ab", ("trail", "b")),
+    ("double_q", "independent", "ants_seen", True, "blocking", "half", "aB", ("a", "B")),
     ("q_learning", "frozen", "paper", True, "following", "strongest_under_carriers"),
 ]
 MARKED = [*KERNELS[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in KERNELS[2:])]
@@ -41,12 +42,15 @@ def several(world: World) -> list[World]:
 
 def drawn_cases(kernel, seed, n_worlds):
     """The arguments of a colony of some worlds, and a protocol."""
-    learner, sharing, observation, dense, traffic, view = kernel
+    learner, sharing, observation, dense, traffic, view, *fields = kernel
     drawn = random_colony(
         *(seed, 10, sharing, 5, None, learner, observation, dense),
         traffic=traffic,
         view=view,
         changes=True,
+        choice="softmax" if learner == "q_learning" else "greedy",
+        noise=NOISE if learner == "q_learning" else NO_NOISE,
+        **dict(zip(("fields", "cues"), fields, strict=False)),
     )
     rng = np.random.default_rng([seed, 7])
     population = {**drawn.population, "ends_at_delivery": False}
@@ -215,6 +219,8 @@ WRONG = [
     (lambda: Every(5, stop=2, trail=0), "`every.stop` is 2, before the first event"),
     (lambda: When("height", above=3, trail=0), "'height'"),
     (lambda: When("living", trail=0), "`when` needs a bound"),
+    (lambda: When("synchrony", above=1, trail=0), "needs the series of 'activity'"),
+    (lambda: At(3, task={"fields.a.levl": 3}), "`task.fields.a.levl` is not a setting"),
     (lambda: from_dict({"explode": 1}), "the name of an intervention is 'explode'"),
     (lambda: from_dict(3), "an intervention is 3; it must be a table"),
 ]
@@ -223,6 +229,8 @@ WRONG_IN_A_RUN = [
     (At(100, trail=0), "`at.tick` is 100, but episodes have 100 ticks; choose at most 99"),
     (At(9, clear=[[99, 0, 0]]), "(99, 0, 0) is outside"),
     (At(9, task={"observation": "paper"}), "cannot change its observation in an episode"),
+    (At(9, task={"fields.a.level": 3}), "is not a setting of task.fields"),
+    (At(9, task={"noise.slip": 0.1}), "cannot change its slips in an episode"),
     (At(9, add_ants=5), "after 9 ticks, 5 ants cannot join 20 ants, because the capacity"),
     (When("living", above=3, epsilon=0.3), "`when.epsilon` would change all 2 worlds"),
     (At(9, learning_rate=0.3), "the ants do not learn"),
