@@ -14,7 +14,7 @@ import time
 import numpy as np
 
 from taichi_ants import AntsError, Colony, Life, Pheromone, Task, TrainingConfig, runtime, worlds
-from taichi_ants.engines.colony.layout import FoodSourceRow, Stage, WorldRow
+from taichi_ants.engines.colony.layout import FoodSourceRow, NestRow, Stage, WorldRow
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import Traffic
 from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
@@ -53,7 +53,7 @@ def faults(colony: Colony) -> list[str]:
     taken = arrays["stage"] != Stage.VACANT
     ants = {name: arrays[name][taken] for name in colony.columns()}
     cells, numbers, ground = ants["cell"], ants["number"], colony.snapshot().ground
-    stored = world[WorldRow.STORE] + world[WorldRow.BIRTHS]
+    stored = arrays["nests"][NestRow.STORE, 0] + world[WorldRow.BIRTHS]
     foods = np.count_nonzero(ground == FOOD) + ants["carries"].sum(dtype=int)
     came, walls = len(colony.worlds[0].foods) + world[WorldRow.REGROWN], arrays["walls"] != 0
     trails = arrays["level"] if colony.pheromone.dense else arrays["trail"]
@@ -73,7 +73,7 @@ def faults(colony: Colony) -> list[str]:
         "cells and ants differ": (np.flatnonzero(arrays["ground"] > 15) == np.sort(cells)).all(),
         "an ant's cell is not empty": not walls[cells].any() and (ground[cells] == EMPTY).all(),
         "the queen is missing or misplaced": np.flatnonzero(ground == QUEEN).tolist()
-        == [world[WorldRow.QUEEN_CELL]],
+        == [arrays["nests"][NestRow.QUEEN_CELL, 0]],
         "a heading is not between 0 and 5": ((ants["heading"] >= 0) & (ants["heading"] < 6)).all(),
         "a trail is not finite, is negative, or is on rock": np.isfinite(trails).all()
         and trails.min() >= 0

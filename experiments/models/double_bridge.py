@@ -63,6 +63,7 @@ def shares(pheromone: Pheromone, long: int, opens: int, seeds: int) -> np.ndarra
 
 def main(settings: argparse.Namespace) -> None:
     """Print the table, and write the figure and its numbers."""
+    files.check_writable_folder(settings.out)
     rows, lines = [], []
     with style.styled(), progress_bar("Colonies on bridges") as progress:
         figure = style.new_figure(4.4)

@@ -15,7 +15,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from taichi_ants import Colony, Field, Task, TrainingConfig, worlds
-from taichi_ants.analysis.statistics import estimates
+from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.task import foraging
 
 WORLD = worlds.open_world(seed=1, ranges=(20, 20, 20))
@@ -52,15 +52,12 @@ def main() -> None:
     rows = ["model,deliveries,ci_low,ci_high"]
     figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
     for name, deliveries in measured(given.seeds).items():
-        by_episode = estimates(deliveries, uses_iqm=False)
-        axes.plot(by_episode["mean"], label=name)
-        axes.fill_between(
-            range(EPISODES), by_episode["ci_low"], by_episode["ci_high"], alpha=0.3, linewidth=0
-        )
-        last = estimates(deliveries[-5:].mean(axis=0, keepdims=True), uses_iqm=False)
-        rows.append(
-            f"{name},{last['mean'][0]:.1f},{last['ci_low'][0]:.1f},{last['ci_high'][0]:.1f}"
-        )
+        low, high = bootstrap_interval(deliveries)
+        axes.plot(deliveries.mean(axis=1), label=name)
+        axes.fill_between(range(EPISODES), low, high, alpha=0.3, linewidth=0)
+        last = deliveries[-5:].mean(axis=0, keepdims=True)
+        (low,), (high,) = bootstrap_interval(last)
+        rows.append(f"{name},{last.mean():.1f},{low:.1f},{high:.1f}")
     axes.set(xlabel="episode", ylabel=f"deliveries in {TICKS} ticks", ylim=(0, None))
     axes.legend()
     figure.savefig(given.out / "home_trail.png", dpi=150)

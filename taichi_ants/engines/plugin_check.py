@@ -75,7 +75,7 @@ def _check_in_child(learner: Learner, writer: int) -> None:
         for stream in (1, 2):
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
         runtime.start_for_plugin_check()
-        # Taichi's handlers print a trace, and can wait forever for a lock that the fork has copied.
+        # Taichi's handlers print a trace, and can wait forever for a lock that the fork copied.
         for fatal in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
             signal.signal(fatal, signal.SIG_DFL)
         os.write(writer, (_fault_of(learner, False) or _fault_of(learner, True)).encode())

@@ -335,7 +335,8 @@ def test_what_is_prepared_beside_can_be_done(draws):
     results.rehearse(point, None, {"threads": None, "arch": None}, draws)
 
 
-def test_who_asks_for_one_thread_gets_one_process(monkeypatch):
+def test_who_asks_for_one_thread_gets_one_process(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)  # where nothing is finished yet
     started = []
     monkeypatch.setattr(worker_process, "_started", lambda: started.append("process"))
     monkeypatch.setattr(worker_process, "available_threads", lambda: 2)

@@ -192,6 +192,8 @@ def _field(seed: int, name: str, view: str) -> Field:
     rules = vars(_pheromone(rng, name.isupper()))
     laid = rng.choice(["with_food", "without_food", "always", "dead_end", "failed_pick_up"])
     laid = laid if rng.random() < 0.9 else "never"
+    if name in "cC":  # so that two cues have different views
+        view = "strongest" if view == "half" else "half"
     return Field(**{**rules, "view": view, "laid": str(laid)})
 
 

@@ -72,7 +72,7 @@ class Features(NamedTuple):
 
 
 class Variant:
-    """What is compiled into a kernel: `v` in the functions of the colony."""
+    """The compile-time properties of a kernel: `v` in the functions of the colony."""
 
     def __init__(self, features: Features) -> None:
         learner, observation = features.learner, features.observation

@@ -174,8 +174,8 @@ class ColonyState:
     def __init__(
         self,
         world: World | Sequence[World],
-        task: Task | None,
-        training: TrainingConfig | None,
+        task: Task | None = None,
+        training: TrainingConfig | None = None,
         seeds: int | Sequence[int] = 0,
         ants: int = 1,
         capacity: int | None = None,
