@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import checks
+from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import WorldRow
-from taichi_ants.engines.colony.state import ColonyEpisodes, ColonyState, checked_worlds
+from taichi_ants.engines.colony.state import ColonyState, checked_worlds
 from taichi_ants.engines.colony.stepping import Stepper, features_of
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown

@@ -1,0 +1,76 @@
+"""The results of a colony's episodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from taichi_ants.engines.records import Record
+from taichi_ants.measures.series import Series
+from taichi_ants.measures.tidy import Measured, Tidy, seed_array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ColonyEpisodes(Record, Tidy):
+    """Results of episodes, arrays of shape (episodes, worlds).
+
+    `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
+    with food of all delivered loads, `living` ants at the end. `deliveries_apart` has deliveries by
+    nest and kind of food, (episodes, worlds, nests, kinds). Returns, moves, blocked and carried are
+    int64, all others int32. `seeds` has the seed of each world. `series` has the values of the
+    measures that you asked `Colony.run` for, else None.
+    """
+
+    returns: np.ndarray
+    ticks: np.ndarray
+    deliveries: np.ndarray
+    first_delivery: np.ndarray
+    moves: np.ndarray
+    blocked: np.ndarray
+    carried: np.ndarray
+    births: np.ndarray
+    deaths: np.ndarray
+    regrown: np.ndarray
+    living: np.ndarray
+    deliveries_apart: np.ndarray
+    seeds: tuple[int, ...] = ()
+    series: Series | None = field(default=None, repr=False)
+
+    @property
+    def nest_deliveries(self) -> np.ndarray:
+        """Deliveries by nest, (episodes, worlds, nests)."""
+        return self.deliveries_apart.sum(axis=3, dtype=np.int32)
+
+    @property
+    def food_deliveries(self) -> np.ndarray:
+        """Deliveries by kind of food, (episodes, worlds, kinds)."""
+        return self.deliveries_apart.sum(axis=2, dtype=np.int32)
+
+    def counts(self) -> dict[str, np.ndarray]:
+        """Return the arrays of all counts of worlds by name."""
+        arrays = (one for one in vars(self).items() if isinstance(one[1], np.ndarray))
+        return {name: array for name, array in arrays if array.ndim == 2}
+
+    def measured(self) -> Measured:
+        """Return the values of the measures, or all counts if `Colony.run` was asked for none."""
+        shape, series = self.returns.shape, self.series
+        if series is None:
+            episodes, worlds = (one.ravel().astype(np.int32) for one in np.indices(shape))
+            ticks = self.ticks.ravel()
+            values = {name: array.ravel() for name, array in self.counts().items()}
+            usual: tuple[str, ...] = ("deliveries",)
+        else:
+            worlds, episodes, ticks = series.worlds, series.episodes, series.ticks
+            values, usual = dict(series.values), tuple(series.values)
+        seeds = seed_array(self.seeds)[worlds]
+        index = {"world": worlds, "seed": seeds, "episode": episodes, "tick": ticks}
+        return Measured(
+            index=index,
+            values=values,
+            of_seed=worlds,
+            of_group=np.zeros(len(worlds), np.int32),
+            seeds=self.seeds,
+            usual=usual,
+            units={} if series is None else dict(series.units),
+        )
