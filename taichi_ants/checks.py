@@ -67,9 +67,27 @@ def check_one_nest(colony: Colony, who: str) -> None:
         )
 
 
+def check_own_rules(task: Task, who: str) -> None:
+    """Raise AntsError if a task uses rules that the user wrote, which `who` cannot have."""
+    if task.rules:
+        raise AntsError(
+            f"the task uses your rules {', '.join(task.rules)}; {who} supports only built-in "
+            "rules, so use a Colony, or leave them out."
+        )
+
+
+def check_rewards(task: Task, who: str) -> None:
+    """Raise AntsError if the rewards are by a rule that the user wrote, which `who` cannot have."""
+    if task.reward != "by_event":
+        raise AntsError(
+            f"`task.reward` is {task.reward!r}; {who} supports only 'by_event', so leave it out."
+        )
+
+
 def checked_runs_task(task: Task | None) -> Task:
     """Return the task, by default the paper's; AntsError if runs of one ant cannot have it."""
     task = checked_task(Task() if task is None else task)
+    check_own_rules(task, "a run of one ant")
     if task.life.changes:
         raise AntsError(
             f"life of the task is {task.life}; only colonies support it, so use a Colony."
@@ -147,11 +165,11 @@ def refuse_table(task: Task, sharing: str) -> None:
 
 
 def check_table(task: Task) -> None:
-    """Raise AntsError if the ants of a task do not choose by action values."""
-    if not task.choice.needs_table:
+    """Raise AntsError if the probabilities of actions do not follow from action values alone."""
+    if not task.choice.needs_table or task.choice.own_rule:
         raise AntsError(
-            f"`task.choice.rule` is {task.choice.rule!r}, which has no action values, so the "
-            "probabilities of actions are not known; record ants that are greedy or softmax."
+            f"`task.choice.rule` is {task.choice.rule!r}, so the probabilities of actions do not "
+            "follow from action values; record ants that are greedy or softmax."
         )
 
 

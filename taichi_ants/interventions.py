@@ -302,7 +302,8 @@ class TaskNumbers(Intervention, path="task"):
             of = rest.partition(".")[0]
             here = known
             if rest and group in _NAMED:
-                here = {f"{group}.{of}.{one.name}": one for one in declared(_NAMED[group].entry)}
+                kind = _NAMED[group].entry.entry_named(of)  # type: ignore[attr-defined]
+                here = {f"{group}.{of}.{one.name}": one for one in declared(kind)}
             if name not in here:
                 raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")
             values.append((name, here[name].checked(value)))

@@ -16,6 +16,7 @@ COMMANDS = {  # modules of this package with their help
     "bridge": "train colonies on a double bridge, where the shorter branch wins",
     "sweep": "run every combination of the settings in a file, and compare them",
     "render": "draw an episode, a colony, learning, or a policy",
+    "check-rule": "compare the rules of a file with the plain reference",
     "watch": "watch and change ants in a browser while they run",
 }
 
@@ -35,7 +36,7 @@ def run(
         from taichi_ants.studies.command_line import Parser
 
         Parser.program = program
-        import_module(f"{__name__}.{name}").main(arguments, **more)
+        import_module(f"{__name__}.{name.replace('-', '_')}").main(arguments, **more)
 
 
 def main() -> None:
@@ -47,7 +48,7 @@ def main() -> None:
         print("usage: taichi-ants COMMAND ...\n")
         print("Simulate ants on a hexagonal grid that lay trails and learn by reinforcement.\n")
         for command, summary in COMMANDS.items():
-            print(f"  {command:9} {summary}")
+            print(f"  {command:10} {summary}")
         print("\nRun `taichi-ants COMMAND --help` for the options of a command.")
     elif name == "--version":
         print(f"taichi-ants {taichi_ants.__version__}")

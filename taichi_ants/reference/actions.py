@@ -166,16 +166,16 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
         if slot in pushed:
             ant.cell, event = pushed[slot], Event.PUSHED
         elif intent.action < PICK_UP:
-            event = _move(world, intent, entered.get(slot))
+            event = _move(world, intent, entered.get(slot), tick)
         else:
-            event = _handle(world, intent, slot in winning, task)
+            event = _handle(world, intent, slot in winning, task, tick)
         paid = getattr(task.rewards, PAID[event])
         if world.foods and event in (Event.PICKED_UP, Event.DELIVERED):
             paid = getattr(world.foods[ant.kind], PAID[event])
         ant.event, ant.reward = event, paid
         for name, trail in world.fields.items():
             for cell in _marked(task.fields[name].laid, intent, start, had_food):
-                trail.deposit(cell, ant.carried)
+                trail.deposit(cell, ant.carried, ant, event, tick)
         ant.carried += 1
     world.ants = {intent.ant.cell: intent.ant for intent in intents}
 
@@ -204,17 +204,18 @@ def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell
     return [ant.cell] if ant.cell != start else []
 
 
-def _move(world: WorldState, intent: Intent, destination: Cell | None) -> Event:
+def _move(world: WorldState, intent: Intent, destination: Cell | None, tick: int) -> Event:
     ant = intent.ant
     if destination is None:
         return Event.BLOCKED
     ant.cell = destination
+    event = Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
     if ant.carries:
-        world.trail.deposit(destination, ant.carried)
-    return Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
+        world.trail.deposit(destination, ant.carried, ant, event, tick)
+    return event
 
 
-def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
+def _handle(world: WorldState, intent: Intent, wins: bool, task: Task, tick: int) -> Event:
     """Do a pick-up or a delivery if it is possible, and return the event."""
     ant = intent.ant
     if intent.gives:
@@ -227,9 +228,9 @@ def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
         world.loads[intent.target] -= 1
         if world.loads[intent.target] == 0:
             world.ground[intent.target] = EMPTY
-        world.trail.deposit(intent.target, 0)
-        world.trail.deposit(ant.cell, 0)
         ant.carries, ant.carried = True, 0
+        for cell in (intent.target, ant.cell):
+            world.trail.deposit(cell, 0, ant, Event.PICKED_UP, tick)
         ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.PICKED_UP
     return Event.FAILED

@@ -31,6 +31,7 @@ from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.observations import OBSERVATIONS, TURNS, codes_in_view, observe
+from taichi_ants.reference.own_rules import choose_by_rule, pay
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.sharing import SHARING, ByNest
 from taichi_ants.reference.world_state import WorldState
@@ -134,7 +135,9 @@ class ReferenceColony:
         """Reset everything that lasts for one episode."""
         self.world = WorldState(
             *(self.start_world, self.pheromone, self.fields),
-            *(self.task.outbound_cue, self.task.homing_cue, self._foods),
+            *(self.task.outbound_cue, self.task.homing_cue),
+            foods=self._foods,
+            rules=self.task.rules,
         )
         self.food_sources = FoodSources(self.start_world)
         self.stores = [0] * len(self.world.queens)
@@ -211,7 +214,7 @@ class ReferenceColony:
         traffic = self.task.traffic
         intents = []
         for ant in acting:
-            ant.action = self._draw_action(ant) if ant.chosen is None else ant.chosen
+            ant.action = self._draw_action(ant, tick) if ant.chosen is None else ant.chosen
             ant.chosen = None
             action = slipped(ant.action, self.task.noise.slip, ant.stream)
             intents.append(intend(self.world, ant, action, traffic))
@@ -221,7 +224,7 @@ class ReferenceColony:
             if picked is not None and self.world.ground[picked] == EMPTY:  # its last load
                 self.food_sources.taken(picked, tick)
         for trail in (self.world.trail, *self.world.fields.values()):
-            trail.tick()
+            trail.tick(tick)
         self._count(acting)
         self.record.carried += sum(
             was.carried
@@ -241,12 +244,26 @@ class ReferenceColony:
             self.food_sources.wander(self.world, self.queen_stream)
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
+        self._pay(before, acting, tick)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
         self._learn(before, acting, last or self.over)
         self.record.ticks += 1
 
-    def _draw_action(self, ant: Ant) -> int:
+    def _pay(self, before: Sequence[Ant], after: Sequence[Ant], tick: int) -> None:
+        """Replace the rewards of a tick by those of your own rule, if there is one."""
+        rule = self.task.own_reward
+        if rule is None:
+            return
+        for was, ant in zip(before, after, strict=True):
+            paid = pay(self.world, was, ant, rule, self.task, tick)
+            self.record.episode_return += paid - ant.reward
+            ant.reward = paid
+
+    def _draw_action(self, ant: Ant, tick: int) -> int:
         choice = self.task.choice
+        if choice.own_rule is not None:
+            values = self.minds.of(ant).rows[ant.state] if choice.needs_table else []
+            return choose_by_rule(self.world, ant, self.task, values, self.epsilon, tick)
         if choice.rule == "deneubourg":
             return choose_cell(self.world, ant, choice, self.task.traffic)
         values = self.minds.of(ant).rows[ant.state]
@@ -318,7 +335,7 @@ class ReferenceColony:
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
             # After a delivery that terminates, the ant chooses at the start of its next tick.
             if self.minds.draws_next_action and not terminated:
-                ant.chosen = self._draw_action(ant)
+                ant.chosen = self._draw_action(ant, self.record.ticks + 1)
             self.transitions.append(
                 Transition(
                     slot=ant.slot,

@@ -120,9 +120,10 @@ class Interventions:
         world = self.colony.world
         rocks = [cell for cell, held in world.ground.items() if held == OBSTACLE]
         bare = World(self._first.ranges, world.queen, obstacles=rocks)
-        world.trail = self._copy(world.trail, Trail(bare, world.pheromone))
+        rules = self.colony.task.rules
+        world.trail = self._copy(world.trail, Trail(bare, world.pheromone, rules=rules))
         for name, one in self.colony.fields.items():
-            world.fields[name] = self._copy(world.fields[name], Trail(bare, one))
+            world.fields[name] = self._copy(world.fields[name], Trail(bare, one, rules=rules))
 
     def _copy(self, old: Trail, new: Trail) -> Trail:
         """Return a new trail after setting it to the levels of an old one."""

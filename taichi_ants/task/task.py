@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.rules.registry import Parameters, Rule, own, words
 from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.choice import Choice, Noise
@@ -144,12 +147,21 @@ class Task(Settings, path="task"):
     foods: Annotated[
         Named[Food], Is("kinds of food, in the order of their numbers in worlds; colonies only")
     ] = field(default_factory=Named)
+    reward: Annotated[
+        str,
+        Is("rule of rewards: by_event (task.rewards), or the name of your rule; colonies only"),
+        Is(choices=partial(words, "reward")),
+    ] = "by_event"
+    rules: Annotated[Named[Parameters], Is("parameters of the rules that you wrote, by name")] = (
+        field(default_factory=Named)
+    )
 
     def __post_init__(self) -> None:
         self.check()
         self._check_choice()
         self._check_fields()
         self._check_foods()
+        self._check_rules()
 
     def _check_foods(self) -> None:
         if len(self.foods) > MAX_FOOD_KINDS:
@@ -168,6 +180,53 @@ class Task(Settings, path="task"):
             )
 
     @property
+    def own_reward(self) -> Rule | None:
+        """Your rule of rewards, if the task has one."""
+        return own("reward", self.reward)
+
+    @property
+    def own_rules(self) -> tuple[Rule, ...]:
+        """Your rules that the task uses, each once."""
+        pheromones = (self.pheromone, *self.fields.values())
+        of_fields = [rule for one in pheromones for rule in (one.own_deposit, one.own_evaporation)]
+        every = (self.choice.own_rule, self.own_reward, *of_fields)
+        return tuple(dict.fromkeys(rule for rule in every if rule is not None))
+
+    def _check_rules(self) -> None:
+        rules = {rule.name: rule for rule in self.own_rules}
+        for name in self.rules.keys() - rules.keys():
+            raise AntsError(
+                f"`task.rules` has parameters of {name!r}, a rule that the task does not use; "
+                "leave them out, or name the rule, for example in `task.choice.rule`."
+            )
+        used = {name: self.rules.get(name) or rule.settings() for name, rule in rules.items()}
+        object.__setattr__(self, "rules", Named(used))
+        for name, rule in rules.items():
+            for read in rule.fields:
+                if read not in (TRAIL, *self.fields):
+                    raise AntsError(
+                        f"the rule {name!r} reads the field {read!r}; add `task.fields.{read}`."
+                    )
+        if self.choice.own_rule and self.noise.misread and self.observation != "paper":
+            raise AntsError(
+                f"`task.noise.misread` is {self.noise.misread}; with your rule of choice "
+                f"{self.choice.rule!r}, it requires the observation 'paper'."
+            )
+
+    def _changed(self, changes: Mapping[str, Any]) -> Task:
+        # Rules that are no longer used lose their parameters.
+        if not self.rules and "rules" not in changes:
+            return super()._changed(changes)
+        bare = copy.copy(self)
+        object.__setattr__(bare, "rules", Named())
+        others = {name: value for name, value in changes.items() if name != "rules"}
+        task = super(Task, bare)._changed(others)
+        kept = {name: self.rules.get(name, usual) for name, usual in task.rules.items()}
+        return super(Task, replace(task, rules=Named(kept)))._changed(
+            {"rules": changes["rules"]} if "rules" in changes else {}
+        )
+
+    @property
     def has_loads(self) -> bool:
         """Whether a cell can have more than one load of food."""
         return any(food.loads > 1 for food in self.foods.values())
@@ -184,7 +243,7 @@ class Task(Settings, path="task"):
         return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
 
     def _check_choice(self) -> None:
-        if not self.choice.needs_table and self.observation != "paper":
+        if self.choice.rule == "deneubourg" and self.observation != "paper":
             raise AntsError(
                 f"`task.observation` is {self.observation!r}; it must be 'paper' if "
                 f"`task.choice.rule` is {self.choice.rule!r}, which chooses without states."

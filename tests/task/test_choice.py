@@ -222,7 +222,7 @@ REFUSED = [
     (lambda: EpisodeBounds(worlds.paper(), Task(noise=Noise(slip=0.1))), "a task without noise"),
     (
         lambda: record_colony(Colony(worlds.paper(), CELLS, None, sharing="frozen")),
-        "which has no action values",
+        "probabilities of actions do not follow",
     ),
 ]
 

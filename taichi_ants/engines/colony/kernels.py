@@ -8,18 +8,20 @@ variants do the same phases in the same order and give the same numbers. The ord
 """
 
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from itertools import chain, groupby
 from typing import Any, NamedTuple
 
 import taichi as ti
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import learning, life, steps, trail
+from taichi_ants.engines.colony import learning, life, own_inputs, steps, trail
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
+from taichi_ants.engines.colony.own_rules import own_rule
 from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import guarded, read_rates
+from taichi_ants.rules import Rule
 from taichi_ants.task import Traffic
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.observations import Observation
@@ -32,8 +34,8 @@ class Phase(NamedTuple):
     """A part of a tick that all ants, cells or worlds (`of`: ANTS, CELLS, WORLD) finish together.
 
     It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
-    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place) for CELLS, (c, v, w, tick) for
-    WORLD.
+    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, (c, v, w, tick)
+    for WORLD.
     """
 
     of: str
@@ -69,6 +71,11 @@ class Features(NamedTuple):
     choice: str = "greedy"
     slips: bool = False
     misreads: bool = False
+    rules: tuple[Rule, ...] = ()  # your own rules, in the order of their parameters
+    reward: str = "by_event"
+    deposits: tuple[str, ...] = ()  # the rules of each pheromone, if any is your own
+    evaporations: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()  # the names of all pheromones, if a rule of your own reads them
 
 
 class Variant:
@@ -94,6 +101,14 @@ class Variant:
         self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
+        own, none = partial(own_rule, features.rules), ("",) * len(features.dense)
+        self.own_choice = own_inputs.choice(own(features.choice))
+        self.own_reward = own_inputs.reward(own(features.reward))
+        self.has_own_choice = self.own_choice is not None
+        self.has_own_reward = self.own_reward is not None
+        self.own_deposits = tuple(map(own, features.deposits or none))
+        self.own_evaporations = tuple(map(own, features.evaporations or none))
+        self.field_numbers = {name: number for number, name in enumerate(features.fields)}
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
@@ -123,7 +138,8 @@ class Variant:
 
     def field(self, c: Any, number: int) -> trail.Pheromone:
         """Return the arrays and numbers of a pheromone; 0 is the trail."""
-        return trail.pheromone_of(c, number, *self.pheromones[number])
+        own = self.own_deposits[number], self.own_evaporations[number]
+        return trail.pheromone_of(c, number, *self.pheromones[number], *own)
 
     def dense_fields(self, c: Any) -> list[trail.Pheromone]:
         """Return the arrays and numbers of the dense pheromones."""
@@ -200,7 +216,7 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
         for place in range(w * c.size + first, w * c.size + last * running):
-            phase.do(c, v, place)
+            phase.do(c, v, place, tick)
     elif running == 1:
         phase.do(c, v, w, tick)
 

@@ -15,6 +15,7 @@ INTEGER_COLUMNS = (
     "want",  # the cell to enter or to take food from, else its own; later its previous cell
     "state",  # the state index, unless it is the percept (it is not if ants misread cells)
     "age",  # in ticks, if ants are born or die
+    "reward",  # of the last action, if rewards are by your own rule
 )
 BYTE_COLUMNS = (
     "heading",

@@ -9,7 +9,7 @@ would move it. Each chunk of ants has its own sums, without atomic operations.
 import taichi as ti
 
 from taichi_ants.engines.colony import steps
-from taichi_ants.engines.colony.layout import Stage, SumRow
+from taichi_ants.engines.colony.layout import Stage, SumRow, Tally
 from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
 from taichi_ants.task.constants import N_ACTIONS, ROW
@@ -64,10 +64,15 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     next_action = -1
     if steps.trait(c.stage, ant) != Stage.NEWBORN:
         c.wants[w * c.size + c.want[ant]] = 0
+        if ti.static(v.has_own_reward):
+            c.reward[ant] = v.own_reward(c, v, w, ant, percept, tick)
+            steps.tally(c, Tally.RETURNS, chunk, c.reward[ant])
         if ti.static(v.draws_next_action):
             if terminates(steps.trait(c.event, ant), c.delivery_terminates) == 0:
                 c.streams[ant] = advance(c.streams[ant])
-                next_action = steps.draw_action(c, v, w, ant, state, c.streams[ant])
+                next_action = steps.draw_action(
+                    c, v, w, ant, state, percept, tick + 1, c.streams[ant]
+                )
         if ti.static(v.alone):
             learn_alone(c, v, ant, state, next_action, tick)
         elif ti.static(v.together):

@@ -299,6 +299,8 @@ class ColonyState:
     @property
     def rewards(self) -> np.ndarray:
         """The reward of the last action of the ant in each slot, int32 (W, capacity)."""
+        if "reward" in self.arrays:
+            return self.arrays["reward"].reshape(self.events.shape).copy()
         rewards = self.task.rewards.by_event()[self.events]
         if self.task.foods:
             kinds = self.arrays["kind"].reshape(rewards.shape) if self.n_kinds > 1 else 0
@@ -443,6 +445,8 @@ class ColonyState:
         self.take_task(task)
         self.arrays["rewards"][:] = task.rewards.by_event()
         self.arrays["choice"][:] = task.choice.numbers()
+        for name, numbers in _rule_numbers(task).items():
+            self.arrays[name][:] = numbers
 
     def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
         """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
@@ -574,6 +578,8 @@ class ColonyState:
             unused.add("nest")
         if self.n_kinds == 1:
             unused.add("kind")
+        if self.task.reward == "by_event":
+            unused.add("reward")
         made = {
             **{name: array.copy() for name, array in self._at_start().items()},
             "trail": np.zeros(1 if dense else cells, np.int32),
@@ -678,6 +684,7 @@ class ColonyState:
             "rewards": self.task.rewards.by_event(),
             "choice": self.task.choice.numbers(),
             "food_numbers": _food_numbers(self.task),
+            **_rule_numbers(self.task),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
             # By n: the weight of the mean of n errors in an update; see `set_learning_rate`.
             "weights": np.zeros(2, np.float32),
@@ -815,6 +822,12 @@ def _food_numbers(task: Task) -> np.ndarray:
         grows = -1 if food.regrowth is None else food.regrowth
         numbers[:, k] = food.pick_up, food.deliver, food.loads, grows
     return numbers
+
+
+def _rule_numbers(task: Task) -> Arrays:
+    """Return the parameters of your own rules, float64 (parameters,); nothing without rules."""
+    numbers = [value for one in task.rules.values() for value in vars(one).values()]
+    return {"rule_numbers": np.array([*numbers, 0.0], np.float64)} if task.rules else {}
 
 
 def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:

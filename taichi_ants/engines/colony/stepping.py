@@ -13,6 +13,7 @@ import numpy as np
 from taichi_ants import runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
+from taichi_ants.task.field import TRAIL
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.kernels import Features
@@ -158,6 +159,23 @@ def features_of(state: ColonyState) -> Features:
         n_kinds=state.n_kinds,
         has_foods=bool(task.foods),
         has_loads=task.has_loads,
+        **_own_rules(state),
+    )
+
+
+def _own_rules(state: ColonyState) -> dict[str, Any]:
+    """Return the features of your own rules, empty if the task has none."""
+    task = state.task
+    return (
+        {}
+        if not task.rules
+        else {
+            "rules": task.own_rules,
+            "reward": task.reward,
+            "deposits": tuple(one.deposit for one in state.pheromones),
+            "evaporations": tuple(one.evaporation for one in state.pheromones),
+            "fields": (TRAIL, *state.fields),
+        }
     )
 
 

@@ -311,10 +311,12 @@ def owner_of(c: ti.template(), v: ti.template(), w, ant):
 
 
 @ti.func
-def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state):
+def draw_action(c: ti.template(), v: ti.template(), w, ant, state, percept, tick, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
     action, bits = 0, bits_of(random_state)
-    if ti.static(v.choice == "deneubourg"):
+    if ti.static(v.has_own_choice):
+        action = v.own_choice(c, v, w, ant, state, percept, tick, bits)
+    elif ti.static(v.choice == "deneubourg"):
         action = draw_cell(c, v, w, ant, state, bits)
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
@@ -327,32 +329,45 @@ def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state)
 
 
 @ti.func
+def cell_ahead(c: ti.template(), v: ti.template(), w, ant, state, percept, i: ti.template()):
+    """Return how an ant sees the cell left (0), forward (1) or right (2) of it, i32 each.
+
+    `state` is the paper's state as the ant sees it, `percept` the true one. A cell with an ant is
+    open if the traffic rules ever let an ant with this load enter it.
+
+    Returns:
+        Its code; 1 if the ant does not misread it; 1 if it is open; 1 if it is nearer to the queen.
+    """
+    heading, carries = trait(c.heading, ant), trait(c.carries, ant)
+    code = vision.code_in_view(state, i)
+    is_true = code == vision.code_in_view(percept, i)
+    opens = ti.cast(is_open(code), ti.i32)
+    nears = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(v.has_compass))
+    if ti.static(v.traffic.shared):
+        place = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
+        if is_true & holds_nestmate(c, v, ant, place):
+            nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+            opens = 1 if ti.static(v.traffic.follow) else carries
+            nears = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(v.has_compass))
+    return code, ti.cast(is_true, ti.i32), opens, nears
+
+
+@ti.func
 def draw_cell(c: ti.template(), v: ti.template(), w, ant, state, bits):
     """Return the ant's action by the rule "deneubourg", with 64 random bits.
 
     `state` is the paper's state as the ant sees it. A cell that it misreads looks as if it had no
-    trail, and is nearer to the queen if it looks S. A cell with an ant is open if the traffic rules
-    ever let an ant with this load enter it. With a field as homing cue, no cell is nearer.
+    trail, and is nearer to the queen if it looks S. With a field as homing cue, no cell is nearer.
     """
     percept, heading, carries = trait(c.percept, ant), trait(c.heading, ant), trait(c.carries, ant)
     here = w * c.size + c.cell[ant]
     tick = c.worlds[WorldRow.TICKS, w]
-    nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
     codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
     weights = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
     for i in ti.static((LEFT, FORWARD, RIGHT)):
-        place = here + step_towards(c.compass, heading, i)
-        code = vision.code_in_view(state, i)
-        is_true = code == vision.code_in_view(percept, i)
-        codes[i] = code
-        opens[i] = ti.cast(is_open(code), ti.i32)
-        nears[i] = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(v.has_compass))
-        if ti.static(v.traffic.shared):
-            if is_true & holds_nestmate(c, v, ant, place):
-                opens[i] = 1 if ti.static(v.traffic.follow) else carries
-                nears[i] = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(v.has_compass))
-        level = cue_level(c, v, carries, place, tick)
-        weights[i] = attraction(ti.select(is_true, level, 0), c.choice[1], c.choice[2])
+        codes[i], is_true, opens[i], nears[i] = cell_ahead(c, v, w, ant, state, percept, i)
+        level = cue_level(c, v, carries, here + step_towards(c.compass, heading, i), tick)
+        weights[i] = attraction(ti.select(is_true == 1, level, 0), c.choice[1], c.choice[2])
     return choose_cell(carries, codes, opens, nears, weights, bits)
 
 
@@ -382,7 +397,8 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         action = trait(c.next_action, ant)
     if action < 0:
         random_state = advance(random_state)
-        action = draw_action(c, v, w, ant, state_index_of(c, v, ant), random_state)
+        state = state_index_of(c, v, ant)
+        action = draw_action(c, v, w, ant, state, percept, tick, random_state)
     put(c.action, ant, action)
     if ti.static(v.slips):
         action, random_state = noise.slipped(action, random_state, c.slip_below)
@@ -488,7 +504,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if carries == 1:
         carried = c.carried[ant]
         if goes != cell:
-            deposit(trail, base + goes, tick, carried)
+            deposit(trail, base + goes, tick, carried, carries, event, percept)
         elif can_give(action, percept):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
@@ -502,14 +518,17 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         put(c.carries, ant, 1)
         c.carried[ant] = 1
         take_load(c, v, ant, base + wanted, tick)
-        deposit(trail, base + wanted, tick, 0)
-        deposit(trail, base + cell, tick, 0)
+        deposit(trail, base + wanted, tick, 0, carries, event, percept)
+        deposit(trail, base + cell, tick, 0, carries, event, percept)
         put(c.heading, ant, turn_round(heading))
     if ti.static(len(v.pheromones) > 1):
         age = ti.select(carries == had_food, age, 0)
         occasions = occasions_of(had_food, percept, action, event, goes != cell)
         for field in ti.static(v.further_fields(c)):
-            lay(field, occasions, base, cell, goes, wanted, tick, age)
+            lay(
+                *(field, occasions, base, cell, goes, wanted, tick, age),
+                *(carries, event, percept),
+            )
         if c.counts_without_food == 1:
             c.carried[ant] = age + 1
     ground = ANT_GROUND
@@ -520,7 +539,8 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     put(c.event, ant, event)
     tally(c, Tally.MOVES, chunk, ti.cast(moves, ti.i32))
     tally(c, Tally.BLOCKED, chunk, ti.cast(moves & (not enters), ti.i32))
-    tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
+    if ti.static(not v.has_own_reward):
+        tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
 
 
 @ti.func
@@ -541,7 +561,18 @@ def count_apart(c: ti.template(), v: ti.template(), ant, chunk):
 
 @ti.func
 def reward_of(c: ti.template(), v: ti.template(), ant):
-    """Return the reward of the last event of an ant, i32."""
+    """Return the reward of an ant for its last action, i32."""
+    reward = 0
+    if ti.static(v.has_own_reward):
+        reward = c.reward[ant]
+    else:
+        reward = event_reward(c, v, ant)
+    return reward
+
+
+@ti.func
+def event_reward(c: ti.template(), v: ti.template(), ant):
+    """Return the reward of the last event of an ant by the settings of rewards and foods, i32."""
     event = trait(c.event, ant)
     reward = c.rewards[event]
     if ti.static(v.has_foods):
