@@ -44,9 +44,9 @@ class RuleCheck(NamedTuple):
 def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
     """Return the result of a comparison of a rule in kernels with its twin.
 
-    First the results for drawn inputs are compared. If they are equal, small drawn colonies that
-    use the rule are compared with the reference tick by tick: cells, headings, loads, percepts,
-    actions, events, rewards, states, levels and action values must be equal in every bit.
+    First the results for drawn inputs are compared, then small drawn colonies that use the rule.
+    After each tick, cells, headings, loads, percepts, actions, events, rewards, states, levels and
+    action values must be equal in every bit.
 
     Args:
         name: The name of a registered rule.

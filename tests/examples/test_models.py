@@ -62,3 +62,14 @@ def test_ants_that_misread_cells(kernels: Path, tmp_path: Path) -> None:
     mean = {rate: sum(r["with trails"] for r in rows if r["misread"] == rate) for rate in (0, 0.4)}
     assert mean[0] > 4 * mean[0.4]
     assert (tmp_path / "misreading.png").stat().st_size > 10_000
+
+
+def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
+    done = run("models/no_entry", ["--seeds", 2, "--out", tmp_path], kernels, tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = files.read_csv(tmp_path / "no_entry.csv")
+    assert len(rows) == 2 * 2 * 30
+    last = [row["delivered"] for row in rows if row["tick"] == 3000]
+    assert min(last) > 0
+    assert len(set(last)) > 1
+    assert (tmp_path / "no_entry.png").stat().st_size > 10_000

@@ -572,7 +572,7 @@ def reward_of(c: ti.template(), v: ti.template(), ant):
 
 @ti.func
 def event_reward(c: ti.template(), v: ti.template(), ant):
-    """Return the reward of the last event of an ant by the settings of rewards and foods, i32."""
+    """Return the reward of the last event of an ant by the settings of the task, i32."""
     event = trait(c.event, ant)
     reward = c.rewards[event]
     if ti.static(v.has_foods):
