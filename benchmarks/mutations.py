@@ -43,10 +43,13 @@ MEASURES = "tests/measures"
 RESULTS_OF_RUNS = "tests/analysis/test_results.py"
 SWEEPS = "tests/commands/test_sweep_measures.py"
 CHOICE = "tests/task/test_choice.py"
+OWN_RULES = "tests/rules"
 NUMBERS = "tests/task/test_numbers.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
+    # Rules of users.
+    ("rules/language.py", '"modulo({}, {})"', '"ti.floor({} / {})"', OWN_RULES),
     # Rules.
     ("engines/colony/steps.py", "if c.counts_without_food == 1:", "if False:", COLONY),
     ("engines/colony/steps.py", "ti.select(carries == had_food, age, 0)", "age", COLONY),
