@@ -34,7 +34,7 @@ from taichi_ants.reference.observations import OBSERVATIONS, TURNS, codes_in_vie
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.sharing import SHARING, ByNest
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task import Task
+from taichi_ants.task import Food, Task
 from taichi_ants.task.constants import EMPTY, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
@@ -124,17 +124,21 @@ class ReferenceColony:
             tables = list(q_values)
         several = [SHARING[sharing](make, self.slots, table) for table in tables]
         self.minds = several[0] if nests == 1 else ByNest(several)
-        self._foods = list(task.foods.values())
         self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
         self.episode = -1
         self.records: list[EpisodeRecord] = []
         self._set_up()
 
+    @property
+    def foods(self) -> list[Food]:
+        """The kinds of food of the task; none for the usual food."""
+        return list(self.task.foods.values())
+
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
         self.world = WorldState(
             *(self.start_world, self.pheromone, self.fields),
-            *(self.task.outbound_cue, self.task.homing_cue, self._foods),
+            *(self.task.outbound_cue, self.task.homing_cue, self.foods),
         )
         self.food_sources = FoodSources(self.start_world)
         self.stores = [0] * len(self.world.queens)
@@ -235,7 +239,7 @@ class ReferenceColony:
                 self._births(nest)
         dying = self._deaths(acting)
         life = self.task.life
-        delays = [food.regrowth for food in self._foods] or [life.regrowth]
+        delays = [food.regrowth for food in self.foods] or [life.regrowth]
         self.record.regrown += self.food_sources.regrow(self.world, delays, tick)
         if life.wander is not None and (tick + 1) % life.wander == 0:
             self.food_sources.wander(self.world, self.queen_stream)

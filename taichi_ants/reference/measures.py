@@ -88,8 +88,9 @@ def carriers(colony: ReferenceColony) -> float:
 
 
 def mean_distance(colony: ReferenceColony) -> float:
-    """Return the mean distance of the ants to the queen."""
-    far = [distance(ant.cell, colony.world.queen) for ant in colony.ants.values()]
+    """Return the mean distance of the ants to the nearest queen."""
+    queens = colony.world.queens
+    far = [min(distance(ant.cell, one) for one in queens) for ant in colony.ants.values()]
     return sum(far) / len(far) if far else NONE
 
 

@@ -216,11 +216,11 @@ class ColonyPoint:
         checked_whole("rollouts", self.rollouts)
         object.__setattr__(self, "protocol", checked_protocol(self.protocol))
         check_one_of("during", self.during, DURING)
-        grid = (self.world[0] if isinstance(self.world, tuple) else self.world).grid
+        world = self.world[0] if isinstance(self.world, tuple) else self.world
         for event in self.protocol:
             event.times(self.ticks)
             for one in event.interventions:
-                one.check_in(grid, self.task)
+                one.check_in(world, self.task)
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
             raise AntsError(
                 "`after` has no shared table; it must be a point with sharing='shared' and at "

@@ -443,6 +443,7 @@ class ColonyState:
         self.take_task(task)
         self.arrays["rewards"][:] = task.rewards.by_event()
         self.arrays["choice"][:] = task.choice.numbers()
+        self.arrays["food_numbers"][:] = _food_numbers(task)
 
     def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
         """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
