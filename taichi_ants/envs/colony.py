@@ -34,6 +34,8 @@ class ColonyWorlds(Ants):
         events: The results of these actions, `Event` as int64; NONE if no ant acted.
     """
 
+    colonies = True
+
     def __init__(
         self,
         n_worlds: int,

@@ -73,12 +73,15 @@ class Ants(ABC):
         evaporates: Whether trails evaporate.
         max_steps: The step limit of an episode.
         shown: The format of observations.
+        colonies: Whether worlds can have several nests and kinds of food.
     """
+
+    colonies = False
 
     def __init__(
         self, n_worlds: int, task: Task, given: Arguments, render_modes: Sequence[str]
     ) -> None:
-        self.task, self.worlds = task, _worlds_of(given.world, n_worlds)
+        self.task, self.worlds = task, _worlds_of(given.world, n_worlds, self.colonies)
         self.evaporates = task.evaporation_in_training
         if given.evaporation is not None:
             self.evaporates = checked_flag("evaporation", given.evaporation)
@@ -139,7 +142,7 @@ class Ants(ABC):
         return {**vars(self), "_scene": None}  # `draw` creates it again
 
 
-def _worlds_of(world: Any, most: int) -> tuple[World, ...]:
+def _worlds_of(world: Any, most: int, colonies: bool) -> tuple[World, ...]:
     given = [world] if isinstance(world, (str, World)) else world
     if not isinstance(given, (list, tuple)) or not given:
         raise AntsError(
@@ -149,7 +152,8 @@ def _worlds_of(world: Any, most: int) -> tuple[World, ...]:
         raise AntsError(f"world lists {count(len(given), 'world')}; it must list at most {most}.")
     several = tuple(
         checks.checked_world(
-            one if not isinstance(one, str) else from_text(one) if "\n" in one else build(one)
+            one if not isinstance(one, str) else from_text(one) if "\n" in one else build(one),
+            several=colonies,
         )
         for one in given
     )
@@ -314,7 +318,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         seed: int | None = None,
         out: Rollout | None = None,
     ) -> Rollout:
-        """Take several steps in one call, with given actions or by a policy.
+        """Return the results of several steps, with given actions or by a policy.
 
         The results are equal to those of `step` with the same actions, in all autoreset modes, and
         you can mix both. In mode "Disabled", an environment whose episode has ended waits in the

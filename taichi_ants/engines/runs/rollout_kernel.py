@@ -26,8 +26,9 @@ from taichi_ants.task.rules.policy import choose
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
 WIDTH, LENGTH = 512, 64
-# The lowest bit of each part of a code, an i64; the state is in bits 0 to 31.
-_EVENT, _ACTION, _TERMINATED, _TRUNCATED = 32, 40, 48, 49
+# A code is an i64, with the state in bits 0 to 31. The lowest bits of its other parts:
+_RESULT = 32
+_EVENT, _ACTION, _TERMINATED, _TRUNCATED = _RESULT, _RESULT + 8, _RESULT + 16, _RESULT + 17
 
 
 @cache
@@ -66,7 +67,8 @@ def rollout_kernel(
         if ti.static(deposit == FADING):
             ant.carried = a.carried[i]
         percept, state = ti.cast(a.percepts[i], ti.i32), a.states[i]
-        steps, changed = a.steps[i], ti.cast(a.changed[i], ti.i32)
+        # Until an ant changes its world, it reads cells that all ants share.
+        steps, base = a.steps[i], ti.select(a.changed[i] == 1, own, origin)
         command, choices = ti.cast(a.commands[i], ti.i32), a.choices[i]
         for t in range(n_steps):
             action, event, terminated, truncated = 0, ti.cast(Event.NONE, ti.i32), 0, 0
@@ -80,12 +82,13 @@ def rollout_kernel(
                 executed = action
                 if ti.static(failures.slips):
                     executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
-                base = ti.select((changed == 1) | (executed == PICK_UP), own, origin)
-                ant = act(deposit, a, base, ant, percept, executed, steps * a.evaporates)
+                into = ti.select(executed == PICK_UP, own, base)
+                ant = act(deposit, a, into, ant, percept, executed, steps * a.evaporates)
                 event = ant.event
-                changed |= ti.cast(event == Event.PICKED_UP, ti.i32)
+                if event == Event.PICKED_UP:  # the store keeps this a branch, which is faster
+                    a.changed[i] = ti.cast(1, ti.u8)
+                    base = own
                 steps += 1
-                base = ti.select(changed == 1, own, origin)
                 percept, state, ant.random_state = observe(a, base, ant, steps * a.evaporates)
                 last = ti.cast(steps == a.max_steps, ti.i32)
                 terminated, truncated = step_end(
@@ -98,28 +101,23 @@ def rollout_kernel(
                         begins = 1
             seen = state
             if begins == 1:
-                if changed == 1:
+                if base == own:
                     restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
+                    a.changed[i] = ti.cast(0, ti.u8)
                 stream = ant.random_state
                 ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
                 ant.random_state = stream
-                steps, changed, command = 0, 0, Command.STEP
+                steps, base, command = 0, origin, Command.STEP
                 percept, state, ant.random_state = observe(a, origin, ant, 0)
                 seen = state
-            a.codes[place + t * WIDTH] = (
-                ti.cast(seen, ti.i64)
-                | (ti.cast(event, ti.i64) << _EVENT)
-                | (ti.cast(action, ti.i64) << _ACTION)
-                | (ti.cast(terminated, ti.i64) << _TERMINATED)
-                | (ti.cast(truncated, ti.i64) << _TRUNCATED)
-            )
+            result = event | action << 8 | terminated << 16 | truncated << 17
+            a.codes[place + t * WIDTH] = ti.cast(seen, ti.i64) | ti.cast(result, ti.i64) << _RESULT
         a.ant_cells[i], a.headings[i] = ant.cell, ti.cast(ant.heading, ti.u8)
         a.carries[i], a.random_states[i] = ti.cast(ant.carries, ti.u8), ant.random_state
         if ti.static(deposit == FADING):
             a.carried[i] = ant.carried
         a.percepts[i], a.states[i] = ti.cast(percept, ti.u8), state
-        a.steps[i], a.changed[i] = steps, ti.cast(changed, ti.u8)
-        a.commands[i] = ti.cast(command, ti.u8)
+        a.steps[i], a.commands[i] = steps, ti.cast(command, ti.u8)
         if ti.static(follows):
             a.choices[i] = choices
 
