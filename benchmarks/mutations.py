@@ -44,6 +44,7 @@ RESULTS_OF_RUNS = "tests/analysis/test_results.py"
 SWEEPS = "tests/commands/test_sweep_measures.py"
 CHOICE = "tests/task/test_choice.py"
 NUMBERS = "tests/task/test_numbers.py"
+ROLLOUT = "tests/envs/test_rollout.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
@@ -127,6 +128,11 @@ MUTATIONS = [
     # Engines.
     ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
     ("engines/runs/kernels.py", "clock += a.evaporates", "clock += 1", RUNS),
+    ("engines/runs/rollout_kernel.py", "steps == a.max_steps", "steps > a.max_steps", ROLLOUT),
+    ("engines/runs/rollout_kernel.py", "base = own", "base = origin", ROLLOUT),
+    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", ROLLOUT),
+    ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
+    ("envs/vector.py", "else rows.any(0)", "else rows[-1]", ROLLOUT),
     ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("engines/colony/life.py", "c.age[ant] >= c.lifespan", "c.age[ant] > c.lifespan", COLONY),
