@@ -26,6 +26,7 @@ RUNS = "tests/engines/runs/test_against_reference.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
 NESTS = "tests/engines/colony/test_nests.py"
+RASTER = "tests/rendering/test_raster.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -60,6 +61,10 @@ MUTATIONS = [
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
     ("engines/colony/steps.py", "homing.half", "v.half", COLONY),
+    ("task/task.py", "self.choice.carriers_follow or usual", "usual", CHOICE),
+    ("measures/tidy.py", "else parts", "else []", RESULTS_OF_RUNS),
+    ("rendering/rasteriser.py", "snapshot.ant_nests % len", "0 * snapshot.ant_nests % len", RASTER),
+    ("engines/colony/state.py", "np.where(carries, of_ants", "np.where(~carries, of_ants", NESTS),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),

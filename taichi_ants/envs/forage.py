@@ -125,8 +125,7 @@ class LoneAnts(Ants):
         from taichi_ants import rendering
 
         if self._scene is None:
-            strongest = self.task.pheromone.level
-            self._scene = rendering.Scene(now.grid, view=True, strongest=strongest)
+            self._scene = rendering.Scene(now.grid, view=True, task=self.task)
         return self._scene.draw(now, rendering.Status(facts, state, observation=sees))
 
 

@@ -6,7 +6,7 @@ import difflib
 import itertools
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,6 +34,7 @@ from taichi_ants.studies.runner import (
     Study,
 )
 from taichi_ants.task import Task
+from taichi_ants.task.field import TRAIL
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
@@ -83,7 +84,9 @@ def measure_of(kind: str, name: str) -> Measure:
         return known[name]
     registered = set(measures.names()) - {"occupancy"} if kind == "colony" else set()
     if not isinstance(name, str) or name.partition(".")[0] not in registered:
-        check_one_of("measures", name, (*known, *sorted(registered - known.keys())))
+        names = ", ".join([*known, *sorted(registered - known.keys())])
+        more = ", or the name of a measure of a plugin (--plugin FILE)" if registered else ""
+        raise AntsError(f"measures is {shown(name)}; it must be one of {names}{more}.")
     one = measures.get(name)
     words = one.summary or name.replace("_", " ")
     return Measure(f"{words} ({one.unit})" if one.unit else words)
@@ -255,6 +258,7 @@ def _sweep(file: Settings) -> Sweep:
     reading = _reading(kind, wanted, file.get("measure_every"))
     fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
     grids = [_grid(grid, fixed) for grid in _listed(file.get("vary", []))]
+    _check_entries(file, {name for rows in grids for row in rows for name in row})
     if not grids:
         raise AntsError("[vary] is missing; add it with lists of values of the settings that vary.")
     seeds = file.get("seeds", 10)
@@ -267,6 +271,11 @@ def _sweep(file: Settings) -> Sweep:
         least = measure.episodes
         if any(point.episodes < least for point in points):
             raise AntsError(f"{name} needs {least} episodes; use more or choose another measure.")
+        whole, _, part = name.partition(".")
+        for point in points if whole == "entropy" and part else ():
+            if part not in (pheromones := (TRAIL, *point.task.fields)):
+                allowed = ", ".join(f"{whole}.{one}" for one in pheromones)
+                raise AntsError(f"{name!r} is not a part of {whole}; choose one of {allowed}.")
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
@@ -361,6 +370,23 @@ def _grid(grid: Any, fixed: Settings) -> list[Settings]:
     return [dict(zip(values, row, strict=True)) for row in itertools.product(*values.values())]
 
 
+def _check_entries(file: Settings, varied: Iterable[str]) -> None:
+    """Raise AntsError if [vary] names a field or a kind of food for which the file has no table."""
+    for group in named_groups(Task):
+        one: Any = file
+        for key in group.path.split("."):
+            one = one.get(key, {}) if isinstance(one, dict) else {}
+        listed = list(one) if isinstance(one, dict) else []
+        for name in sorted(varied):
+            entry = name.removeprefix(f"{group.path}.").partition(".")[0]
+            if name.startswith(f"{group.path}.") and entry not in listed:
+                path, near = f"{group.path}.{entry}", difflib.get_close_matches(entry, listed, 3)
+                choose = f"choose {', '.join(near or listed)}, or " if listed else ""
+                raise AntsError(
+                    f"`{path}` is in [vary], but the file has no table [{path}]; {choose}add it."
+                )
+
+
 def _point(
     kind: str,
     settings: Settings,
@@ -391,6 +417,7 @@ def _point(
     rules = Task.from_dict(task)
     if kind == "colony" and "policy" in tree:
         tree["policy"] = FixedPolicy.named(tree["policy"], rules)
+    if kind == "colony" and ("policy" in tree or not rules.choice.needs_table):
         training = {**_WITHOUT_LEARNING, **training}
     for name in _OF_LEARNERS[:5]:  # the others have defaults
         if name not in training:

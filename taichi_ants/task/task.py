@@ -189,6 +189,18 @@ class Task(Settings, path="task"):
                 f"`task.observation` is {self.observation!r}; it must be 'paper' if "
                 f"`task.choice.rule` is {self.choice.rule!r}, which chooses without states."
             )
+        followed, pheromones = self.choice.carriers_follow, (TRAIL, *self.fields)
+        if followed is not None and followed not in pheromones:
+            raise AntsError(
+                f"`task.choice.carriers_follow` is {shown(followed)}; it must be one of "
+                f"{', '.join(pheromones)}, or the name of a field that you add to `task.fields`."
+            )
+        if followed is not None and self.homing_cue != COMPASS:
+            raise AntsError(
+                f"`task.choice.carriers_follow` is {shown(followed)}, but `task.homing_cue` is "
+                f"{shown(self.homing_cue)}, which ants with food follow already; leave one of them "
+                "out."
+            )
 
     def _check_fields(self) -> None:
         for name in (TRAIL, COMPASS):
@@ -254,6 +266,12 @@ class Task(Settings, path="task"):
         """Return the fields while ants learn or do not, with or without evaporation."""
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
         return {name: one if falls else one.lasting for name, one in self.fields.items()}
+
+    @property
+    def carriers_follow(self) -> str:
+        """The name of the pheromone whose levels ants with food see; see `Choice`."""
+        usual = self.outbound_cue if self.homing_cue == COMPASS else self.homing_cue
+        return self.choice.carriers_follow or usual
 
     def number_of(self, cue: str) -> int:
         """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""

@@ -121,7 +121,7 @@ class Recorder:
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
-            "strongest": int(task.pheromone.level),
+            "strongest": task.pheromone.darkest,
             "n_states": self._n_states,
             "names": self.names(),
             "view": list(task.sees.cells),

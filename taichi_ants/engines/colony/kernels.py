@@ -45,9 +45,9 @@ class Features(NamedTuple):
 
     With `own_tables` there is a table for each slot, not one for each world; for the others, see
     `ColonyState` and `Pheromone`. `dense` and `views` have an entry for each pheromone, the trail
-    first. The cues and `reads` are numbers of pheromones; -1 is the compass. A model does not pay
-    for features that it does not use: kernels without births, deaths or food that changes are
-    faster, and compile much faster.
+    first. The cues, `carriers_follow` and `reads` are numbers of pheromones; -1 is the compass. A
+    model does not pay for features that it does not use: kernels without births, deaths or food
+    that changes are faster, and compile much faster.
     """
 
     learner: Learner | None
@@ -58,6 +58,7 @@ class Features(NamedTuple):
     views: tuple[str, ...]
     outbound: int
     homing: int
+    carriers_follow: int
     reads: tuple[int, ...]  # of the observation
     traffic: Traffic
     ants_change: bool
@@ -81,7 +82,8 @@ class Variant:
         self.pheromones = tuple(zip(features.dense, features.views, strict=True))
         self.outbound, self.homing = features.outbound, features.homing
         self.has_compass = self.homing < 0
-        cues = {self.outbound} | ({self.homing} - {-1})
+        self.carriers_follow = features.carriers_follow
+        cues = {self.outbound, self.carriers_follow}
         self.half = features.views[self.outbound] == "half"
         self.homing_view = "" if self.has_compass else features.views[self.homing]
         self.reads = features.reads

@@ -337,6 +337,11 @@ class ColonyState:
         carries = self.carrying[world, living]
         carried = self.arrays["carried"].reshape(self.cells.shape)[world, living]
         fields = {name: self._levels(world, name) for name in (TRAIL, *self.fields)}
+        of_ants, of_cells = np.zeros(len(ant_cells), np.int32), np.zeros(self.grid.size, np.uint8)
+        if self.n_kinds > 1:
+            of_ants = self.arrays["kind"].reshape(self.cells.shape)[world, living].astype(np.int32)
+            of_cells = np.where(ground == FOOD, self.arrays["kind_of"][cells], np.uint8(0))
+        queens = self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)[world]
         return Snapshot(
             self.grid,
             ground,
@@ -348,6 +353,10 @@ class ColonyState:
             ant_numbers=self.numbers[world, living],
             ant_actions=self.actions[world, living].astype(np.int32),
             ant_events=self.events[world, living].astype(np.int32),
+            ant_nests=self.nests[world, living],
+            ant_foods=np.where(carries, of_ants, np.int32(-1)),
+            food_kinds=of_cells,
+            queens=queens.astype(np.int32),
             fields=fields,
             counts={name: int(array[world]) for name, array in self._counts().items()},
             world=self.worlds[world],

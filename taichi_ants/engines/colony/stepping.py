@@ -147,6 +147,7 @@ def features_of(state: ColonyState) -> Features:
         ),
         outbound=outbound,
         homing=homing,
+        carriers_follow=task.number_of(task.carriers_follow),
         reads=tuple(task.number_of(name) for name in task.sees.reads),
         traffic=task.traffic,
         ants_change=state.ants_change,

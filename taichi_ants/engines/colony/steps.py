@@ -166,11 +166,12 @@ def strongest_of(c: ti.template(), field: ti.template(), left, forward, right, t
 def cue_level(c: ti.template(), v: ti.template(), carries, place, tick):
     """Return the level of a cell in the pheromone that an ant with this load follows.
 
-    If ants have a compass, this is the outbound cue for all ants.
+    If ants have a compass, this is the outbound cue for all ants, or `Choice.carriers_follow`.
     """
     level = ti.cast(level_of(ti.static(v.field(c, v.outbound)), place, tick), v.level_type)
-    if ti.static(not v.has_compass):
-        homing = ti.cast(level_of(ti.static(v.field(c, v.homing)), place, tick), v.level_type)
+    if ti.static(v.carriers_follow != v.outbound):
+        followed = ti.static(v.field(c, v.carriers_follow))
+        homing = ti.cast(level_of(followed, place, tick), v.level_type)
         level = ti.select(carries == 1, homing, level)
     return level
 

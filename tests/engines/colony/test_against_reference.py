@@ -98,7 +98,15 @@ KERNELS = [
         SOFT | {"noise": "slip"},
     ),
     ("double_q", "independent", "paper", True, "blocking", "half", MISREADS),
-    ("q_learning", "frozen", "paper", True, "blocking", "half", BY_TRAIL),
+    (
+        "q_learning",
+        "frozen",
+        "paper",
+        True,
+        "blocking",
+        "half",
+        BY_TRAIL | with_fields("aB", "a"),
+    ),
     ("q_learning", "frozen", "paper", True, "following", "half", BY_TRAIL | MISREADS),
     (
         "q_learning",

@@ -15,6 +15,7 @@ from taichi_ants.interventions import AddAnts, Place, RemoveAnts
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.offline import record_colony
 from taichi_ants.protocol import At
+from taichi_ants.reference import ReferenceColony
 from taichi_ants.rendering import colony_snapshots, frames
 from taichi_ants.task import Food
 from taichi_ants.task.constants import FOOD
@@ -55,6 +56,31 @@ def drawn_nests(sharing: str = "frozen", most: int = 12):
         one = with_nests(one, seed, 2, 2, loads=True)
         if one.world.n_nests == 2:
             yield one
+
+
+def test_snapshots_have_nests_and_kinds():
+    """As the reference has them, by the numbers of ants and the cells of food and queens."""
+    rules = {"ants": 12, "sharing": "frozen", "q_values": trail_follower("paper")}
+    colony, seen = two_nests(seeds=[5]), set()
+    plain = ReferenceColony(WORLD, Task(foods=KINDS), TRAINING, 5, **rules)
+    colony.begin_episode()
+    plain.begin_episode()
+    for _ in range(40):
+        colony.tick()
+        plain.tick()
+        now, kinds = colony.snapshot(), np.zeros(colony.grid.size, np.uint8)
+        ants = {ant.number: ant for ant in plain.ants.values()}
+        of_ants = [ants[number] for number in now.ant_numbers.tolist()]
+        assert now.ant_nests.tolist() == [ant.nest for ant in of_ants]
+        carried = [ant.kind if ant.carries else -1 for ant in of_ants]
+        assert now.ant_foods.tolist() == carried
+        seen.update(zip(now.ant_nests.tolist(), carried, strict=True))
+        for cell, kind in plain.world.kinds.items():
+            if plain.world.ground[cell] == FOOD:
+                kinds[colony.grid.index(cell)] = kind
+        assert (now.food_kinds == kinds).all()
+    assert now.queens.tolist() == [int(colony.grid.index(cell)) for cell in plain.world.queens]
+    assert {(0, -1), (0, 0), (1, -1), (1, 0), (1, 1)} <= seen
 
 
 def loads_of(colony: Colony, world: int) -> np.ndarray:
