@@ -211,7 +211,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
         _discard_output()
         text = str(error) or "the command needs more memory than is available"
         notice(f"error: {text.rstrip('.')}.")
-        status = EXIT_BAD_INPUT
+        status = getattr(error, "exit_status", EXIT_BAD_INPUT)
     sys.exit(status)
 
 
