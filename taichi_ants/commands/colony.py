@@ -114,6 +114,7 @@ def _add_study(parser: command_line.Parser) -> None:
     parser.open_settings, parser.own_settings = ("training",), PLANNED
     command_line.add_settings(parser, _learning(0.3))
     command_line.add_common(parser)
+    command_line.add_machines(parser)
     command_line.add_results(parser, "colony")
 
 
@@ -183,6 +184,7 @@ def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingCon
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show its results if it is finished."""
     from taichi_ants.studies.colony_study import plan, study_of, write_results
+    from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
@@ -192,9 +194,8 @@ def study(settings: argparse.Namespace) -> None:
     asked = study_of(conditions, seeds)
 
     def work(blocks: Path, ready: Path) -> Results:
-        with command_line.progress_bar("study") as progress:
-            where = {"threads": settings.threads, "arch": settings.arch}
-            outcomes = asked.run(blocks, progress, **where)
+        with command_line.progress_bar("study") as progress, chosen(settings) as how:
+            outcomes = asked.run(blocks, progress, **how)
         return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
 
     words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}

@@ -22,6 +22,7 @@ from taichi_ants.studies.command_line import (
     WORLDS,
     Parser,
     add_common,
+    add_machines,
     add_results,
     add_settings,
     given_settings,
@@ -71,6 +72,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--planning-steps", **several, default=(3, 5), help=planning)
     add("--world", default="paper", metavar="WORLD", help=WORLDS)
     add_common(parser)
+    add_machines(parser)
     quick = f"use at most {QUICK_SEEDS} seeds and draw no animations"
     add("--quick", action="store_true", help=quick)
     add_results(parser, "compare")

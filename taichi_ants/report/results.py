@@ -40,7 +40,8 @@ from taichi_ants.report.comparison import (
 from taichi_ants.report.page import made_facts, setting_facts
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.studies.command_line import given_settings, load_plugin, progress_bar
-from taichi_ants.studies.runner import RunPoint, Study
+from taichi_ants.studies.executors import Work, chosen
+from taichi_ants.studies.runner import VALUE, RunPoint, Study
 from taichi_ants.studies.worker_process import WorkerProcess
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import record_colony
@@ -69,7 +70,8 @@ def do_comparison(
     worker.begin(rehearse, first, settings.plugin, where, settings.quick)
     discounts = tuple(dict.fromkeys(settings.discounts))
     exact = worker.begin(bounds.bound_rows, world, task, discounts, steps)
-    arrays = measured(study, blocks, where)
+    with chosen(settings) as how:
+        arrays = measured(study, blocks, where, **how)
     comparison, tables = with_curves(study, blocks, comparison_of(settings, study, arrays))
     arrays |= {_CURVE + name: curve for name, curve in comparison.curves.items()}
     archives.write(ready / RUNS, arrays)
@@ -109,20 +111,25 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
 
 
 def measured(
-    study: Study[RunPoint], folder: Path, where: Mapping[str, Any]
+    study: Study[RunPoint], folder: Path, where: Mapping[str, Any], **how: Any
 ) -> dict[str, np.ndarray]:
-    """Return measures of the runs and behaviours of the final policies: arrays (points, seeds)."""
+    """Return measures of the runs and behaviours of the final policies: arrays (points, seeds).
 
-    def reduce(points: Sequence[RunPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
-        followed = what_policies_do(points[0], seeds, outcome["q_values"])
-        return {**measures_of_runs(outcome), **followed}
-
+    `how` has further arguments of `Study.in_blocks`.
+    """
     with progress_bar("training") as progress:
         # Compile all kernels first; this needs one thread, and the worker process uses another.
         for point in {point.training.learner: point for point in study.points}.values():
             short = replace(point, episodes=1, max_steps=1, rollouts=1)
-            reduce((short,), (0,), short.do((short,), (0,), None, lambda share: None, where))
-        return study.reduced(folder, reduce, progress, **where)
+            Work((short,), (0,), None, with_measures, where).do()
+        return study.reduced(folder, with_measures, progress, **{**where, **how})
+
+
+def with_measures(points: Sequence[RunPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
+    """Return an outcome with the measures of its runs, and with what their policies do."""
+    followed = what_policies_do(points[0], seeds, outcome["q_values"])
+    values = {**measures_of_runs(outcome), **followed}
+    return {**outcome, **{f"{VALUE}{name}": array for name, array in values.items()}}
 
 
 def what_policies_do(point: RunPoint, seeds: Sequence[int], q_values: np.ndarray) -> Outcome:

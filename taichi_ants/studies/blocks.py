@@ -19,11 +19,12 @@ _ABOUT = "about"
 
 
 class _Held(NamedTuple):
-    """The rows of a file for a point: its place among the points, and those of the seeds."""
+    """What a file has of a point: its row, the columns of seeds, and the names of arrays."""
 
     path: Path
     row: int
     seeds: dict[str, int]
+    arrays: tuple[str, ...]
 
 
 class Blocks:
@@ -34,8 +35,10 @@ class Blocks:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._folder = folder
+        self.folder = folder
         self._held: dict[str, list[_Held]] = {}
+        self._columns: dict[tuple[str, ...], dict[str, int]] = {}
+        self._arrays: dict[tuple[str, ...], tuple[str, ...]] = {}
         self._last: tuple[Path | None, Outcome] = None, {}
         for path in sorted(folder.glob("block-*.npz")):
             header = _header(path)
@@ -66,31 +69,37 @@ class Blocks:
 
     def add(self, points: Sequence[str], seeds: Sequence[str], outcome: Outcome) -> None:
         """Write a block, arrays (points, seeds, ...); AntsError if it cannot be written."""
-        header = files.to_json({"points": list(points), "seeds": list(seeds)})
+        what = {"points": list(points), "seeds": list(seeds), "arrays": sorted(outcome)}
+        header = files.to_json(what)
         path = self._path(header)
         archives.write(path, {**outcome, _ABOUT: np.array(header)}, compress=False)
-        self._note(path, list(points), list(seeds))
+        self._note(path, **what)
 
-    def has(self, point: str, seed: str) -> bool:
-        """Return whether a block has the outcome of a point and a seed."""
-        return any(seed in one.seeds for one in self._held.get(point, ()))
+    def has(self, point: str, seed: str, array: str | None = None) -> bool:
+        """Return whether a block has the outcome of a point and a seed, or one of its arrays."""
+        return any(seed in one.seeds for one in self._of(point, array))
 
-    def read(self, point: str, seeds: Sequence[str]) -> Outcome:
-        """Return the arrays (seeds, ...) of a point; AntsError if a block cannot be read.
+    def read(self, point: str, seeds: Sequence[str], array: str | None = None) -> Outcome:
+        """Return the arrays (seeds, ...) of a point from blocks with `array`, or from any.
 
-        Raises KeyError if no block has the outcome of a seed.
+        Raises:
+            AntsError: A block cannot be read.
+            KeyError: No block has the outcome of a seed.
         """
         parts: list[Outcome] = []
         where: dict[str, int] = {}
-        for path, row, held in self._held.get(point, ()):
+        for path, row, held, _ in self._of(point, array):
             new = [seed for seed in seeds if seed in held and seed not in where]
             if new:
                 columns = [held[seed] for seed in new]
                 parts.append({n: array[row, columns] for n, array in self._read(path).items()})
                 where |= {seed: len(where) + n for n, seed in enumerate(new)}
         order = [where[seed] for seed in seeds]
-        joined = {n: np.concatenate([one[n] for one in parts]) for n in parts[0]}
-        return {name: array[order] for name, array in joined.items()}
+        names = [name for name in parts[0] if all(name in one for one in parts)]
+        return {name: np.concatenate([one[name] for one in parts])[order] for name in names}
+
+    def _of(self, point: str, array: str | None) -> Iterator[_Held]:
+        return (one for one in self._held.get(point, ()) if array is None or array in one.arrays)
 
     def _read(self, path: Path) -> Outcome:
         if self._last[0] != path:
@@ -99,12 +108,15 @@ class Blocks:
         return self._last[1]
 
     def _path(self, header: str) -> Path:
-        return self._folder / f"block-{hashlib.sha256(header.encode()).hexdigest()[:32]}.npz"
+        return self.folder / f"block-{hashlib.sha256(header.encode()).hexdigest()[:32]}.npz"
 
-    def _note(self, path: Path, points: Sequence[str], seeds: Sequence[str]) -> None:
-        columns = {seed: n for n, seed in enumerate(seeds)}
+    def _note(self, path: Path, points: list[str], seeds: list[str], arrays: list[str]) -> None:
+        # Blocks share what they have in common, to save memory.
+        columns = self._columns.setdefault(tuple(seeds), {})
+        columns.update((seed, n) for n, seed in enumerate(seeds))
+        names = self._arrays.setdefault(tuple(arrays), tuple(arrays))
         for row, point in enumerate(points):
-            self._held.setdefault(point, []).append(_Held(path, row, columns))
+            self._held.setdefault(point, []).append(_Held(path, row, columns, names))
 
     def _drop(self, path: Path) -> None:
         notice(f"{str(path)!r} is damaged or has other settings, so it is computed again.")

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from taichi_ants import World
 
 EXIT_BAD_INPUT = 2
+MOST_SHARDS = 100_000
 # Help for options that several commands have.
 PLUGIN = "Python file that registers learners, observations or worlds"
 THREADS = "number of CPU threads (default: all)"
@@ -122,6 +123,30 @@ def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) 
     add("--out", type=Path, metavar="FOLDER", help=f"write the results here (default: {default})")
     add("--force", action="store_true", help="replace finished results in FOLDER")
     add("--no-figures", action="store_true", help="skip figures and animations")
+
+
+def add_machines(parser: argparse.ArgumentParser) -> None:
+    """Add the options of commands that can spread their work, see `executors.chosen`."""
+    add = parser.add_argument
+    workers = "number of worker processes on this machine (default: all work in this process)"
+    add("--workers", type=whole_number(1, 1024), metavar="N", help=workers)
+    shard = (
+        "compute only the I-th of N equal parts, for example of a job array; "
+        "`taichi-ants merge` joins the parts"
+    )
+    add("--shard", type=_shard, metavar="I/N", help=shard)
+
+
+def _shard(text: str) -> tuple[int, int]:
+    """Return the numbers of a shard such as 2/3."""
+    number, slash, shards = text.partition("/")
+    if not (slash and number.isdecimal() and shards.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a shard; write I/N, for example 2/3")
+    if not 1 <= int(number) <= int(shards) <= MOST_SHARDS:
+        raise argparse.ArgumentTypeError(
+            f"there is no shard {text}; write I/N with I from 1 to N, and N at most {MOST_SHARDS}"
+        )
+    return int(number), int(shards)
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:

@@ -17,10 +17,11 @@ import signal
 import sys
 import tempfile
 import threading
+from argparse import Namespace
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from multiprocessing.connection import Connection
@@ -208,6 +209,24 @@ def _error_of(future: Future[Any]) -> Exception | None:
     if error is None or isinstance(error, Exception):
         return error
     return RuntimeError(f"{type(error).__name__}: {error}")  # a SystemExit, for example
+
+
+@contextmanager
+def chosen(settings: Namespace) -> Iterator[dict[str, Any]]:
+    """Yield the arguments of `Study.in_blocks` that the options of a command determine.
+
+    Worker processes end with the `with` block. Each has the threads of `--threads`, by default
+    those of this machine divided by the number of workers.
+    """
+    how: dict[str, Any] = {"threads": settings.threads, "arch": settings.arch}
+    how["shard"] = settings.shard or (1, 1)
+    if not settings.workers:
+        yield how
+        return
+    how["threads"] = settings.threads or max(1, available_threads() // settings.workers)
+    how["plugins"] = [read_plugin(settings.plugin)] if settings.plugin else []
+    with LocalWorkers(settings.workers) as workers:
+        yield {**how, "executor": workers}
 
 
 class LocalWorkers:

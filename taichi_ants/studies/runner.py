@@ -7,6 +7,7 @@ outcome of a run depends only on its point and seed, so the order of blocks does
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -48,6 +49,7 @@ _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 
 DURING = ("evaluation", "training", "both")
 SERIES = "series_"  # begins the names of the series of measures in outcomes
+VALUE = "value_"  # begins the names of numbers of runs in outcomes, which functions `Reduce` make
 # Settings that only the points that use them name, so that the blocks of others stay valid.
 _LATER = ("policy", "measures", "measure_every")
 
@@ -429,6 +431,28 @@ class Study(Generic[PointKind]):
             known[point] = known[worlds]
         return tuple(known[point] for point in self.in_order)
 
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """The approximate work of each run, float64 (points of `in_order`, seeds)."""
+        several = np.array([[float(one.weight)] for one in self.in_order])
+        return np.broadcast_to(several, (len(several), len(self.seeds)))
+
+    def share(self, number: int, shards: int) -> np.ndarray:
+        """Return the runs of one of several shards with equal work, bool as `weights`.
+
+        `number` is from 1 to `shards`. Points that start from the table of another one are in the
+        same shard as that one.
+        """
+        if shards == 1:
+            return np.ones(self.weights.shape, bool)
+        roots = [_chain(one)[0] for one in self.in_order]
+        families = {root: n for n, root in enumerate(dict.fromkeys(roots))}
+        of_point = np.array([families[root] for root in roots])
+        weights = np.zeros((len(families), len(self.seeds)))
+        np.add.at(weights, of_point, self.weights)
+        middle = weights.cumsum().reshape(weights.shape) - weights / 2
+        return (np.floor(middle / weights.sum() * shards) == number - 1)[of_point]
+
     def run(
         self, folder: Path, progress: Progress = lambda share: None, **how: Any
     ) -> dict[PointKind, Outcome]:
@@ -439,21 +463,25 @@ class Study(Generic[PointKind]):
         return {order[place]: outcome for place, outcome in self.read(folder, range(len(order)))}
 
     def reduced(
-        self, folder: Path, reduce: Reduce, progress: Progress = lambda share: None, **how: Any
+        self,
+        folder: Path,
+        reduce: Reduce,
+        progress: Progress = lambda share: None,
+        each: Callable[[Block], None] = lambda block: None,
+        **how: Any,
     ) -> dict[str, np.ndarray]:
-        """Return numbers of each run, arrays (points, seeds) by name, without keeping outcomes.
+        """Return the `VALUE` arrays of all runs (points, seeds), by their names without `VALUE`.
 
-        `reduce` gets points, seeds and outcome of a block and returns these arrays for the block;
-        the other arguments and errors are those of `in_blocks`.
+        `each` is called with each block; the other arguments and errors are those of `in_blocks`.
         """
         order = self.in_order
         found: dict[str, np.ndarray] = {}
-        for some, at, outcome in self.in_blocks(folder, progress, **how):
-            points, seeds = [order[p] for p in some], [self.seeds[s] for s in at]
-            for name, array in reduce(points, seeds, outcome).items():
+        for block in self.in_blocks(folder, progress, reduce=reduce, **how):
+            for name, array in values_in(block.outcome).items():
                 shape = len(order), len(self.seeds)
                 of_all = found.setdefault(name, np.empty(shape, array.dtype))
-                of_all[np.ix_(some, at)] = array
+                of_all[np.ix_(block.points, block.seeds)] = array
+            each(block)
         if order == self.points:
             return found
         place = {point: number for number, point in enumerate(order)}  # points may repeat
@@ -463,17 +491,72 @@ class Study(Generic[PointKind]):
         self,
         folder: Path,
         progress: Progress = lambda share: None,
-        *,
-        executor: Executor | None = None,
-        in_flight: int | None = None,
-        plugins: Sequence[Plugin] = (),
-        **where: Any,
+        shard: tuple[int, int] = (1, 1),
+        **how: Any,
     ) -> Iterator[Block]:
         """Yield all blocks in any order; compute and save those that the folder lacks.
 
         Args:
             folder: The folder of finished blocks of this study.
             progress: A function that is called with the finished share of the work.
+            shard: The arguments of `share`; only this part of the study is computed.
+            how: See `_computed`, whose errors are raised.
+        """
+        saved, wanted = Blocks(folder), self.share(*shard)
+        missing, total = wanted.copy(), self.weights[wanted].sum()
+        progress(0.0)
+        for block in self._saved(saved):
+            at = np.ix_(block.points, block.seeds)
+            if missing[at].any():
+                missing[at] = False
+                progress(1.0 - self.weights[missing].sum() / total)
+                yield block
+        yield from self._computed(saved, missing, total, progress, **how)
+
+    def complete(
+        self,
+        folder: Path,
+        runs: np.ndarray,
+        array: str,
+        progress: Progress = lambda share: None,
+        **how: Any,
+    ) -> None:
+        """Compute and save the runs, bool as `weights`, for which the folder lacks an array.
+
+        The other arguments are those of `in_blocks`.
+        """
+        saved = Blocks(folder)
+        missing = runs & ~self._has(saved, array)
+        total = max(self.weights[missing].sum(), 1.0)
+        for _ in self._computed(saved, missing, total, progress, **how):
+            pass
+
+    def _has(self, saved: Blocks, array: str) -> np.ndarray:
+        """Return whether there is a block with an array for each run, bool as `weights`."""
+        rows = zip(self.keys, self.names, strict=True)
+        return np.array([[saved.has(key, name, array) for name in names] for key, names in rows])
+
+    def _computed(
+        self,
+        saved: Blocks,
+        missing: np.ndarray,
+        total: float,
+        progress: Progress,
+        *,
+        reduce: Reduce | None = None,
+        executor: Executor | None = None,
+        in_flight: int | None = None,
+        plugins: Sequence[Plugin] = (),
+        **where: Any,
+    ) -> Iterator[Block]:
+        """Yield blocks of the missing runs, after they were computed and saved.
+
+        Args:
+            saved: The finished blocks.
+            missing: The runs to compute, bool as `weights`.
+            total: The work from which `progress` counts.
+            progress: See `in_blocks`.
+            reduce: What is saved of an outcome, see `Work`; None means all of it.
             executor: The executor that computes blocks, see `studies.executors`; None computes them
                 in this process.
             in_flight: The number of blocks that the executor has at the same time; None means
@@ -485,60 +568,53 @@ class Study(Generic[PointKind]):
             AntsError: The disk is too small for all blocks, or an argument is not allowed.
             FailedBlocksError: Some blocks cannot be computed; the others are finished.
         """
-        order, saved = self.in_order, Blocks(folder)
-        missing = np.ones((len(order), len(self.seeds)), bool)
-        weights = np.array([[one.weight] for one in order]) * missing
-
-        def show(share_of_more: float = 0.0) -> None:
-            progress(1.0 - (weights[missing].sum() - share_of_more) / weights.sum())
-
-        progress(0.0)
-        for block in self._saved(saved):
-            if missing[np.ix_(block.points, block.seeds)].any():
-                missing[np.ix_(block.points, block.seeds)] = False
-                show()
-                yield block
-        needed = (
-            one.bytes_of_a_run * runs for one, runs in zip(order, missing.sum(axis=1), strict=True)
-        )
-        files.check_room(folder, sum(needed))
+        order, weights = self.in_order, self.weights
+        place_of: dict[Any, int] = {point: place for place, point in enumerate(order)}
+        after = [place_of.get(point.after, -1) for point in order]
+        for place in reversed(range(len(order))):  # those that need the tables of another point
+            if (a := after[place]) >= 0 and missing[place].any():
+                lacks = [not saved.has(self.keys[a], n, "q_values") for n in self.names[a]]
+                missing[a] |= missing[place] & lacks
+        needed = zip((one.bytes_of_a_run for one in order), missing.sum(axis=1), strict=True)
+        files.check_room(saved.folder, sum(size * int(runs) for size, runs in needed))
         failed: dict[Piece, Exception] = {}
+        succeeded = not missing.all()
+
+        def show(more: float = 0.0) -> None:
+            progress(1.0 - (weights[missing].sum() - more) / total)
 
         def here(pieces: Iterable[Piece]) -> Iterator[tuple[Piece, Outcome | Exception]]:
             for piece in pieces:
-                weight = weights[np.ix_(*piece)].sum()
-                work = self._work(piece, saved, where)
+                work = self._work(piece, saved, reduce, where)
                 try:
-                    yield piece, work.do(_part(show, 0.0, weight))
+                    yield piece, work.do(_part(show, 0.0, weights[np.ix_(*piece)].sum()))
                 except Exception as error:
                     stop_if_noted()
                     yield piece, error
 
-        # Points that start from the tables of others come after them.
         depths = np.array([[len(_chain(one))] for one in order])
         for depth in range(1, depths.max() + 1):
             ready = missing & (depths == depth)
-            for place, one in enumerate(order):
-                if one.after is not None:
-                    ready[place] &= ~missing[order.index(one.after)]
+            for place, a in enumerate(after):
+                ready[place] &= (a < 0) | ~missing[a]
             if executor is None:
                 found = here(self.blocks(ready))
             else:
-                work_of = partial(self._work, saved=saved, where=where)
+                work_of = partial(self._work, saved=saved, reduce=reduce, where=where)
                 found = completed(self.blocks(ready), work_of, executor, in_flight, plugins)
             for piece, outcome in found:
                 if isinstance(outcome, Exception):
                     failed[piece] = outcome
-                    if missing.all() and len(failed) == _HOPELESS:
+                    if not succeeded and len(failed) == _HOPELESS:
                         break
                     continue
                 keys = [self.keys[place] for place in piece.points]
                 names = self.names[piece.points[0]]
                 saved.add(keys, [names[s] for s in piece.seeds], outcome)
-                missing[np.ix_(*piece)] = False
+                missing[np.ix_(*piece)], succeeded = False, True
                 show()
                 yield Block(*piece, outcome)
-            if failed and missing.all():
+            if failed and not succeeded:
                 raise next(iter(failed.values()))
         if failed:
             raise self._failure(failed)
@@ -559,7 +635,9 @@ class Study(Generic[PointKind]):
             if at:
                 yield Block(places, at, outcome)
 
-    def _work(self, piece: Piece, saved: Blocks, where: Mapping[str, Any]) -> Work:
+    def _work(
+        self, piece: Piece, saved: Blocks, reduce: Reduce | None, where: Mapping[str, Any]
+    ) -> Work:
         """Return the work of a block; AntsError if the tables of `after` cannot be read."""
         points: list[Any] = [self.in_order[place] for place in piece.points]
         seeds, learned = tuple(self.seeds[s] for s in piece.seeds), None
@@ -569,18 +647,24 @@ class Study(Generic[PointKind]):
         if points[0].after is not None:
             place = self.in_order.index(points[0].after)
             names = [self.names[place][s] for s in piece.seeds]
-            learned = saved.read(self.keys[place], names)["q_values"]
-        return Work(tuple(points), seeds, learned, None, where)
+            learned = saved.read(self.keys[place], names, "q_values")["q_values"]
+            points = [copy.copy(points[0])]
+            object.__setattr__(points[0], "after", None)  # workers get its tables instead
+        return Work(tuple(points), seeds, learned, reduce, where)
 
-    def read(self, folder: Path, points: Iterable[int]) -> Iterator[tuple[int, Outcome]]:
+    def read(
+        self, folder: Path, points: Iterable[int], array: str | None = None
+    ) -> Iterator[tuple[int, Outcome]]:
         """Yield outcomes of points from finished blocks, by indices into `in_order`.
+
+        With `array`, the blocks are those that have this array.
 
         Raises:
             AntsError: A block cannot be read.
         """
         saved = Blocks(folder)
         for place in sorted(set(points)):
-            yield place, saved.read(self.keys[place], self.names[place])
+            yield place, saved.read(self.keys[place], self.names[place], array)
 
     def _failure(self, failed: Mapping[Piece, Exception]) -> FailedBlocksError:
         several = [f"{self.named(piece)} ({_said(error)})" for piece, error in failed.items()]
@@ -606,6 +690,11 @@ class Study(Generic[PointKind]):
         seeds = [self.seeds[s] for s in piece.seeds]
         of_seeds = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
         return ", ".join([*parts, of_seeds])
+
+
+def values_in(outcome: Outcome) -> Outcome:
+    """Return the `VALUE` arrays of an outcome by their names without `VALUE`."""
+    return {n.removeprefix(VALUE): array for n, array in outcome.items() if n.startswith(VALUE)}
 
 
 class FailedBlocksError(AntsError):

@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,6 +26,7 @@ from taichi_ants.measures.series import stops
 from taichi_ants.settings import all_of, declared, flat, named_groups, nested
 from taichi_ants.studies.runner import (
     SERIES,
+    VALUE,
     ColonyPoint,
     FixedPolicy,
     Outcome,
@@ -118,24 +120,13 @@ class Sweep:
         own |= {"measure_every": self.measure_every} if self.measure_every else {}
         return {**self.study.settings(), **own, "vary": self.settings}
 
-    def measured(self, blocks: Path, progress: Progress, **where: Any) -> dict[str, np.ndarray]:
+    def measured(self, blocks: Path, progress: Progress, **how: Any) -> dict[str, np.ndarray]:
         """Return each measure, float64 (points, seeds); arguments as of `Study.in_blocks`.
 
         The value of a registered measure is its mean over rollouts, at the last tick of each.
         """
-
-        def reduce(points: Sequence[Any], seeds: Sequence[int], outcome: Outcome) -> Outcome:
-            if self.kind == "runs":
-                return of_runs.measures_of_runs(outcome, self.measures)
-            (point,) = points
-            arrays = {key: array[0] for key, array in outcome.items()}
-            found = of_colonies.measures_of(arrays, point.ants, point.ticks)
-            columns: Outcome = {}
-            for name in self.measures:
-                columns |= {name: found[name]} if name in found else _ends(arrays, name)
-            return {name: array[None] for name, array in columns.items()}
-
-        return self.study.reduced(blocks, reduce, progress, **where)
+        reduce = partial(_measured, self.kind, self.measures, self.measure_every is not None)
+        return self.study.reduced(blocks, reduce, progress, **how)
 
     def write_series(self, blocks: Path, folder: Path) -> None:
         """Write the series of the registered measures, a row for each value; read finished blocks.
@@ -305,6 +296,29 @@ def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
             f"{', '.join(measures.names())} to measures."
         )
     return {"measures": registered, "measure_every": checked_whole("measure_every", every)}
+
+
+def _measured(
+    kind: str,
+    wanted: Sequence[str],
+    has_series: bool,
+    points: Sequence[Any],
+    seeds: Sequence[int],
+    outcome: Outcome,
+) -> Outcome:
+    """Return the measures of a block as `VALUE` arrays, and the series if they are asked for."""
+    if kind == "runs":
+        columns = of_runs.measures_of_runs(outcome, wanted)
+        return {f"{VALUE}{name}": array for name, array in columns.items()}
+    (point,) = points
+    arrays = {key: array[0] for key, array in outcome.items()}
+    found = of_colonies.measures_of(arrays, point.ants, point.ticks)
+    columns = {}
+    for name in wanted:
+        columns |= {name: found[name]} if name in found else _ends(arrays, name)
+    kept = {f"{VALUE}{name}": array[None] for name, array in columns.items()}
+    series = {name: array for name, array in outcome.items() if name.startswith(SERIES)}
+    return {**kept, **series} if has_series else kept
 
 
 def _ends(outcome: Outcome, name: str) -> Outcome:
