@@ -60,6 +60,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
             setattr(settings, name, QUICK[name])
         settings.world_kinds = tuple(one for one in WORLD_KINDS if one in settings.world_kinds)
         settings.sizes = tuple(sorted({1, *settings.sizes}))
+        settings.command = "colony"
         command_line.with_folder(settings, "colony")
     else:
         _check_live(settings, given, parser.error)
@@ -193,14 +194,16 @@ def study(settings: argparse.Namespace) -> None:
     conditions = plan(settings.world_kinds, settings.sizes, seeds, training, *lengths)
     asked = study_of(conditions, seeds)
 
-    def work(blocks: Path, ready: Path) -> Results:
+    def work(blocks: Path, ready: Path) -> Results | None:
         with command_line.progress_bar("study") as progress, chosen(settings) as how:
             outcomes = asked.run(blocks, progress, **how)
+        if settings.shard:
+            return None
         return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
 
     words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}
     page = partial(make_page, settings, conditions, asked)
-    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page)
+    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page, asked)
 
 
 def make_page(

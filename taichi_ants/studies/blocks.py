@@ -31,10 +31,11 @@ class Blocks:
     """The finished blocks in a folder.
 
     Points have keys and seeds have names, which are texts; equal texts mean equal outcomes. Two
-    processes may write to the same folder.
+    processes may write to the same folder. If not `drops`, damaged files are ignored instead of
+    removed.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, drops: bool = True) -> None:
         self.folder = folder
         self._held: dict[str, list[_Held]] = {}
         self._columns: dict[tuple[str, ...], dict[str, int]] = {}
@@ -44,7 +45,7 @@ class Blocks:
             header = _header(path)
             if path == self._path(header):
                 self._note(path, **json.loads(header))
-            else:
+            elif drops:
                 self._drop(path)
 
     def __iter__(self) -> Iterator[tuple[list[str], list[str], Outcome]]:
@@ -78,6 +79,10 @@ class Blocks:
     def has(self, point: str, seed: str, array: str | None = None) -> bool:
         """Return whether a block has the outcome of a point and a seed, or one of its arrays."""
         return any(seed in one.seeds for one in self._of(point, array))
+
+    def path_of(self, point: str, seed: str) -> Path | None:
+        """Return the file with the outcome of a point and a seed; None without any."""
+        return next((one.path for one in self._of(point, None) if seed in one.seeds), None)
 
     def read(self, point: str, seeds: Sequence[str], array: str | None = None) -> Outcome:
         """Return the arrays (seeds, ...) of a point from blocks with `array`, or from any.

@@ -150,8 +150,11 @@ def _shard(text: str) -> tuple[int, int]:
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """Return the settings with a folder for the results, which --quick changes."""
-    settings.out = settings.out or Path("results", f"{name}-quick" if settings.quick else name)
+    """Return the settings with a folder for the results, which --quick and --shard change."""
+    name = f"{name}-quick" if getattr(settings, "quick", False) else name
+    if shard := getattr(settings, "shard", None):
+        name = f"{name}-shard-{shard[0]}-of-{shard[1]}"
+    settings.out = settings.out or Path("results", name)
     return settings
 
 

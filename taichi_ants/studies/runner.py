@@ -415,7 +415,7 @@ class Study(Generic[PointKind]):
 
         for point in self.in_order:
             facts = {"version": __version__, **_facts_of(point, number_of)}
-            known[point] = hashlib.sha256(files.to_json(facts).encode()).hexdigest()
+            known[point] = hashlib.sha256(files.to_json(facts).encode()).hexdigest()[:32]
         return tuple(known[point] for point in self.in_order)
 
     @cached_property
@@ -430,6 +430,26 @@ class Study(Generic[PointKind]):
                 known[worlds] = tuple("@".join(one) for one in parts)
             known[point] = known[worlds]
         return tuple(known[point] for point in self.in_order)
+
+    def runs(self, shard: tuple[int, int] = (1, 1)) -> dict[str, Any]:
+        """Return what identifies the runs of a shard, for manifests.
+
+        Returns:
+            `points`: the `keys`. `seeds`: lists of names of seeds. `seeds_of`: for each point, the
+            index of its list. `weights`: for each point, the work of a seed. `rows`: for each of
+            `Study.points`, its index. `shard`: for each point, the range of its seeds.
+        """
+        place = {point: n for n, point in enumerate(self.in_order)}
+        lists = {names: n for n, names in enumerate(dict.fromkeys(self.names))}
+        share = [np.flatnonzero(row) for row in self.share(*shard)]
+        return {
+            "points": self.keys,
+            "seeds": list(lists),
+            "seeds_of": [lists[names] for names in self.names],
+            "weights": self.weights[:, 0],
+            "rows": [place[point] for point in self.points],
+            "shard": [[int(at[0]), int(at[-1]) + 1] if len(at) else [0, 0] for at in share],
+        }
 
     @cached_property
     def weights(self) -> np.ndarray:
@@ -456,11 +476,12 @@ class Study(Generic[PointKind]):
     def run(
         self, folder: Path, progress: Progress = lambda share: None, **how: Any
     ) -> dict[PointKind, Outcome]:
-        """Return all outcomes; arguments and errors are those of `in_blocks`."""
+        """Return all outcomes, or none of a shard; arguments and errors as of `in_blocks`."""
         for _ in self.in_blocks(folder, progress, **how):
             pass
-        order = self.in_order
-        return {order[place]: outcome for place, outcome in self.read(folder, range(len(order)))}
+        order, is_whole = self.in_order, how.get("shard", (1, 1))[1] == 1
+        places = range(len(order)) if is_whole else ()
+        return {order[place]: outcome for place, outcome in self.read(folder, places)}
 
     def reduced(
         self,
@@ -519,6 +540,7 @@ class Study(Generic[PointKind]):
         runs: np.ndarray,
         array: str,
         progress: Progress = lambda share: None,
+        shard: tuple[int, int] = (1, 1),
         **how: Any,
     ) -> None:
         """Compute and save the runs, bool as `weights`, for which the folder lacks an array.
@@ -526,7 +548,7 @@ class Study(Generic[PointKind]):
         The other arguments are those of `in_blocks`.
         """
         saved = Blocks(folder)
-        missing = runs & ~self._has(saved, array)
+        missing = runs & self.share(*shard) & ~self._has(saved, array)
         total = max(self.weights[missing].sum(), 1.0)
         for _ in self._computed(saved, missing, total, progress, **how):
             pass
@@ -667,11 +689,8 @@ class Study(Generic[PointKind]):
             yield place, saved.read(self.keys[place], self.names[place], array)
 
     def _failure(self, failed: Mapping[Piece, Exception]) -> FailedBlocksError:
-        several = [f"{self.named(piece)} ({_said(error)})" for piece, error in failed.items()]
-        more = f" and {len(several) - _NAMED} more" if len(several) > _NAMED else ""
         return FailedBlocksError(
-            f"{count(len(failed), 'block')} failed: {'; '.join(several[:_NAMED])}{more}; all "
-            "others are saved, so correct the cause and run the same command again."
+            [f"{self.named(piece)} ({_said(error)})" for piece, error in failed.items()]
         )
 
     def named(self, piece: Piece) -> str:
@@ -698,9 +717,17 @@ def values_in(outcome: Outcome) -> Outcome:
 
 
 class FailedBlocksError(AntsError):
-    """Blocks that cannot be computed, while others are finished."""
+    """Blocks that cannot be computed, while others are finished; `several` names them all."""
 
     exit_status = 1
+
+    def __init__(self, several: Sequence[str]) -> None:
+        more = f" and {len(several) - _NAMED} more" if len(several) > _NAMED else ""
+        super().__init__(
+            f"{count(len(several), 'block')} failed: {'; '.join(several[:_NAMED])}{more}; all "
+            "others are saved, so correct the cause and run the same command again."
+        )
+        self.several = list(several)
 
 
 class Piece(NamedTuple):

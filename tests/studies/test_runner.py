@@ -130,6 +130,33 @@ def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
     assert "q_values" not in outcomes[own]  # a table for each ant is not kept
 
 
+@pytest.mark.parametrize("shards", [1, 2, 3, 7, 30])
+def test_shards_have_equal_work_and_keep_points_with_their_tables(shards):
+    seeds = (3, 5, 8, 1, 0)
+    one = replace(ALONE, world=WORLDS[0])
+    large = replace(one, ants=9)
+    study = Study((large, replace(one, ants=4, episodes=0, after=one)), seeds)
+    shares = [study.share(number, shards) for number in range(1, shards + 1)]
+    assert (sum(share.astype(int) for share in shares) == 1).all()
+    place, after = (study.in_order.index(study.points[1]), study.in_order.index(one))
+    for share in shares:
+        assert (share[place] == share[after]).all()
+    works = [study.weights[share].sum() for share in shares]
+    heaviest = study.weights[study.in_order.index(large), 0]
+    assert max(works) - min(works) <= 2 * heaviest
+
+
+def test_shards_fill_one_folder(tmp_path):
+    study = Study((replace(ALONE, ants=4, episodes=0, after=ALONE), ALONE), (3, 5))
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    for number in (2, 1):
+        assert study.run(tmp_path / "a", shard=(number, 2)) == {}
+    blocks = set((tmp_path / "a").iterdir())
+    assert same(study.run(tmp_path / "a"), study.run(tmp_path / "b"))
+    assert set((tmp_path / "a").iterdir()) == blocks
+
+
 def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
     """With worlds of their own, with one for all, from a pool, and going on from others."""
     seeds = (3, 5, 8, 1, 0)
