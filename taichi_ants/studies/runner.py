@@ -41,6 +41,8 @@ EVALUATION_SEEDS = 1 << 32
 _STEPS_OF_A_BLOCK = 250_000_000  # at most, if every episode of every run uses all its steps
 _RUNS_OF_A_BLOCK = 5000  # at most; each needs about 20 KB during training
 _NUMBERS_OF_A_BLOCK = 1 << 26  # of four bytes, for colonies, at most, unless one needs more
+_WORK_OF_A_BLOCK = 1e8  # ticks of ants, about ten seconds on one thread
+_WORK_OF_A_CELL, _WORK_OF_DIFFUSION = 0.02, 0.08  # of a dense field in a tick
 _NUMBERS_OF_AN_ANT, _NUMBERS_OF_A_CELL = 13, 4  # upper bounds
 _HOPELESS = 3  # blocks that fail, and none that succeeds: a study stops
 _NAMED = 3  # failed blocks, at most, in a message
@@ -245,12 +247,19 @@ class ColonyPoint:
         table = (1 + memory.tables) * states * ROW + memory.floats + memory.integers
         owners = slots if self.sharing == "independent" else 1
         ants, cells = slots * _NUMBERS_OF_AN_ANT, world.grid.size * _NUMBERS_OF_A_CELL
-        return max(1, _NUMBERS_OF_A_BLOCK // (ants + cells + owners * table))
+        fits = _NUMBERS_OF_A_BLOCK // (ants + cells + owners * table)
+        return max(1, min(fits, int(_WORK_OF_A_BLOCK / self.weight)))
 
     @property
     def weight(self) -> float:
-        """The approximate work of a seed, for progress."""
-        return self.ants * self.ticks * (self.episodes + self.rollouts)
+        """The approximate work of a seed: that of a tick of an ant is 1."""
+        world = self.world[0] if isinstance(self.world, tuple) else self.world
+        cells = sum(
+            world.grid.size * (_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL)
+            for one in (self.task.pheromone, *self.task.fields.values())
+            if one.dense
+        )
+        return (self.ants + cells) * self.ticks * (self.episodes + self.rollouts)
 
     @property
     def bytes_of_a_run(self) -> int:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
+import signal
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import assert_one_sentence, call, contents
+from command_lines import assert_one_sentence, call, contents, promptly, start
 
 from taichi_ants.files import archives
 from taichi_ants.studies import runner
+from taichi_ants.studies.state import state
 
 RUNS = """
 kind = "runs"
@@ -249,6 +253,45 @@ def test_status_and_rows_of_work_in_progress(sweep, capsys, monkeypatch):
     _, out, _ = call("status", ["a"], capsys)
     assert "finished: results with 24 runs, since" in out
     assert call("status", ["nothing"], capsys)[0] == 2
+
+
+def workers_of(pid):
+    """The processes that are children of a process, or of its children."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = path.read_text().rpartition(")")[2].split()
+            if int(fields[1]) == pid:
+                found += [int(path.parent.name), *workers_of(int(path.parent.name))]
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_worker_processes_end_with_the_command_and_work_resumes(number, sweep, tmp_path):
+    long = RUNS.replace("episodes = 6", "episodes = 6000").replace("= 60", "= 600")
+    long = long.replace("[7, 2, 5, 1]", "400")
+    Path("long.toml").write_text(long)
+    arguments = ["long.toml", "--out", "a", "--no-figures", "--workers", 2]
+    process = start("sweep", arguments, tmp_path / "kernels", tmp_path)
+    until = time.monotonic() + 120
+    while not list(Path("a").rglob("block-*.npz")) and time.monotonic() < until:
+        time.sleep(0.05)
+    workers = workers_of(process.pid)
+    assert len(workers) >= 2
+    began = time.monotonic()
+    process.send_signal(number)
+    _, err = process.communicate(timeout=60)
+    assert time.monotonic() - began < promptly()
+    while any(Path(f"/proc/{one}").exists() for one in workers):
+        assert time.monotonic() - began < promptly()
+        time.sleep(0.05)
+    if number == signal.SIGINT:
+        assert process.returncode == 130
+        assert err == "Stopped; finished parts are saved. Run the same command again to resume.\n"
+    done = set(Path("a").rglob("block-*.npz"))
+    assert done
+    assert "of 2400 runs done" in "".join(state(Path("a")))
 
 
 COMPARE = [

@@ -178,11 +178,24 @@ def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
 
 def test_a_block_of_colonies_is_limited_in_memory(monkeypatch):
     """To a quarter of a gigabyte, but it has one seed at least."""
+    monkeypatch.setattr(runner, "_WORK_OF_A_BLOCK", 1e12)
     many = replace(ALONE, world=WORLDS[0], ants=10_000, start="spread")
     assert 100 < many.runs_of_a_block < 1000
     tables = replace(many, sharing="independent")
     assert 1 <= tables.runs_of_a_block < many.runs_of_a_block / 10
     assert replace(many, ants=16_000_000, capacity=16_000_000).runs_of_a_block == 1
+
+
+@pytest.mark.parametrize("ants", [1, 16, 500, 10**6])
+def test_a_block_of_colonies_is_limited_in_work(ants):
+    """To that of 10^8 ticks of an ant, or to one seed."""
+    diffuses = replace(LIVELY, pheromone=Pheromone("exponential", half_life=9, diffusion=0.1))
+    for task in (LIVELY, diffuses):
+        point = replace(ALONE, world=WORLDS[0], task=task, start="spread", episodes=50, ticks=1000)
+        point = replace(point, ants=ants, capacity=10**6 + 1)
+        assert point.weight >= ants * 52_000
+        assert point.runs_of_a_block * point.weight <= 1e8 or point.runs_of_a_block == 1
+    assert point.weight > 52_000 * (ants + 0.07 * WORLDS[0].grid.size)
 
 
 def test_copies_follow_what_another_point_has_learned_and_train_nothing(tmp_path):
