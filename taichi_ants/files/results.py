@@ -63,20 +63,21 @@ class ResultFolder:
         for place, what in ((self._unfinished, "unfinished work"), (self.path, "results")):
             if not (place / MANIFEST).exists():
                 continue
-            if place == self._unfinished and self._is_part(read_manifest(place)):
-                continue
+            manifest = read_manifest(place)
+            other = manifest["settings"]
+            if other == self._settings:
+                return place == self.path
             if place == self.path and self.part():
                 return False
-            other = read_manifest(place)["settings"]
+            if place == self._unfinished and self._is_part(manifest):
+                continue
             keys = dict.fromkeys([*self._settings, *other])
             different = [key for key in keys if self._settings.get(key) != other.get(key)]
             different = [key for key in different if key in self._leading] or different
-            if different:
-                raise AntsError(
-                    f"{str(self.path)!r} contains {what} of other settings ({', '.join(different)} "
-                    "differ); choose another --out, or give --force to replace them."
-                )
-            return place == self.path
+            raise AntsError(
+                f"{str(self.path)!r} contains {what} of other settings ({', '.join(different)} "
+                "differ); choose another --out, or give --force to replace them."
+            )
         if self.path.is_dir() and any(item != self._unfinished for item in self.path.iterdir()):
             raise AntsError(
                 f"{str(self.path)!r} contains files, but no finished results; "

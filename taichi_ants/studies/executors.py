@@ -47,10 +47,10 @@ Reduce = Callable[[Sequence[Any], Sequence[int], Outcome], Outcome]
 
 
 class Executor(Protocol):
-    """What studies need of an executor."""
+    """An executor, as far as studies need one."""
 
     def submit(self, call: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
-        """Run a call, somewhere and at some time."""
+        """Return the future of a call, which runs elsewhere or later."""
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,7 @@ class LocalWorkers:
             self._pool.shutdown(wait=False, cancel_futures=True)
 
     def submit(self, call: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
-        """Run a call in a worker process, which is started if necessary."""
+        """Return the future of a call in a worker process, which is started if necessary."""
         # Workers inherit the mask of signals: only this process gets Ctrl-C.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
         try:

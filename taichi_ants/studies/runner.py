@@ -575,6 +575,7 @@ class Study(Generic[PointKind]):
         progress: Progress,
         *,
         reduce: Reduce | None = None,
+        bytes_of_a_run: Callable[[Any], int] = lambda point: point.bytes_of_a_run,
         executor: Executor | None = None,
         in_flight: int | None = None,
         plugins: Sequence[Plugin] = (),
@@ -588,6 +589,7 @@ class Study(Generic[PointKind]):
             total: The work from which `progress` counts.
             progress: See `in_blocks`.
             reduce: What is saved of an outcome, see `Work`; None means all of it.
+            bytes_of_a_run: The upper bound on the bytes of a run of a point on disk.
             executor: The executor that computes blocks, see `studies.executors`; None computes them
                 in this process.
             in_flight: The number of blocks that the executor has at the same time; None means
@@ -606,8 +608,8 @@ class Study(Generic[PointKind]):
             if (a := after[place]) >= 0 and missing[place].any():
                 lacks = [not saved.has(self.keys[a], n, "q_values") for n in self.names[a]]
                 missing[a] |= missing[place] & lacks
-        needed = zip((one.bytes_of_a_run for one in order), missing.sum(axis=1), strict=True)
-        files.check_room(saved.folder, sum(size * int(runs) for size, runs in needed))
+        needed = zip(map(bytes_of_a_run, order), missing.sum(axis=1).tolist(), strict=True)
+        files.check_room(saved.folder, sum(size * runs for size, runs in needed))
         failed: dict[Piece, Exception] = {}
         succeeded = not missing.all()
 

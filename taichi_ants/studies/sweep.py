@@ -45,6 +45,7 @@ KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
 SERIES_FILE = "series.csv"
 _OF_SERIES = ("seed", "episode", "tick", "measure", "value")  # columns of SERIES_FILE
+_BYTES_OF_A_NUMBER = 20  # in a table
 _OF_FILE = ("kind", "seeds", "measures", "measure_every", "margin", "against", "vary")
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
@@ -131,8 +132,17 @@ class Sweep:
         The value of a registered measure is its mean over rollouts, at the last tick of each.
         """
         reduce = partial(_measured, self.kind, self.measures, self.measure_every is not None)
+        how = {"bytes_of_a_run": self._bytes_of_a_run, **how}
         with self._rows_as_they_come(blocks.parent / ROWS) as each:
             return self.study.reduced(blocks, reduce, progress, each, **how)
+
+    def _bytes_of_a_run(self, point: Any) -> int:
+        """Return the approximate bytes of a run on disk: in a block, and in two tables."""
+        values = len(self.measures)
+        if self.measure_every is not None:
+            several = len(list(stops(point.ticks, self.measure_every)))
+            values += len(point.measures) * several * point.rollouts
+        return values * (8 + 2 * _BYTES_OF_A_NUMBER)
 
     @contextmanager
     def _rows_as_they_come(self, folder: Path) -> Iterator[Callable[[Block], None]]:

@@ -157,6 +157,26 @@ def test_shards_fill_one_folder(tmp_path):
     assert set((tmp_path / "a").iterdir()) == blocks
 
 
+def only_deliveries(points, seeds, outcome):
+    return {"value_deliveries": outcome["deliveries"].sum(axis=2)}
+
+
+def test_tables_that_were_not_saved_are_learned_again_for_the_points_that_need_them(tmp_path):
+    copies = replace(ALONE, ants=4, episodes=0, after=ALONE)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    few = Study((ALONE,), (3, 5)).reduced(tmp_path / "a", only_deliveries)
+    grown = Study((copies, ALONE), (3, 5))
+    ((_, saved),) = Study((ALONE,), (3, 5)).read(tmp_path / "a", (0,))
+    assert saved.keys() == {"value_deliveries"}
+    grown.complete(tmp_path / "a", grown.share(1, 1), "deliveries")
+    plain = grown.run(tmp_path / "b")
+    ((_, found),) = grown.read(tmp_path / "a", [1], "deliveries")
+    for name, array in plain[copies].items():
+        assert np.array_equal(found[name], array)
+    assert np.array_equal(few["deliveries"][0], plain[ALONE]["deliveries"].sum(axis=1))
+
+
 def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
     """With worlds of their own, with one for all, from a pool, and going on from others."""
     seeds = (3, 5, 8, 1, 0)
