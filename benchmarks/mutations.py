@@ -34,6 +34,9 @@ FINDINGS = "tests/analysis/test_findings.py"
 ARCHIVES = "tests/files/test_archives.py"
 FILES = "tests/files/test_files.py"
 RESULTS = "tests/files/test_results.py"
+STUDIES = "tests/studies/test_runner.py"
+EXECUTORS = "tests/studies/test_executors.py"
+GROWING = "tests/commands/test_growing.py"
 RECORDING = "tests/viewer/test_recording.py"
 SERVER = "tests/live/test_server.py"
 SESSION = "tests/live/test_session.py"
@@ -221,6 +224,16 @@ MUTATIONS = [
     ("files/results.py", "if replace or not (", "if replace and not (", RESULTS),
     ("files/results.py", "max([started, *times]) - started", "0", RESULTS),
     ("studies/blocks.py", "== digest", '!= ""', "tests/studies/test_blocks.py"),
+    ("studies/blocks.py", "if path == self._path(header):", "if header:", STUDIES),
+    ("studies/runner.py", "missing[a] |= missing[place] & lacks", "pass", STUDIES),
+    ("studies/runner.py", "families[root] for root in roots", "0 for root in roots", STUDIES),
+    ("studies/runner.py", "(a < 0) | ~missing[a]", "True", STUDIES),
+    ("studies/executors.py", "if failures[piece] == TRIES:", "if True:", EXECUTORS),
+    ("studies/executors.py", "if versions != _versions():", "if False:", EXECUTORS),
+    ("studies/executors.py", "while len(coming) < most:", "while True:", EXECUTORS),
+    ("studies/shards.py", "if name != _OF_TIME", "if False", GROWING),
+    ("studies/sweep.py", "values[number, :, n]", "values[0, :, n]", GROWING),
+    ("files/results.py", "seeds <= wanted.get(point, nothing)", "True", GROWING),
     # Recorder and viewer.
     ("viewer/recorder.py", "actions + 16 *", "actions + 8 *", RECORDING),
     ("viewer/recorder.py", "headings + 8 * carrying", "headings + 8 * ~carrying", RECORDING),

@@ -60,6 +60,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
             setattr(settings, name, QUICK[name])
         settings.world_kinds = tuple(one for one in WORLD_KINDS if one in settings.world_kinds)
         settings.sizes = tuple(sorted({1, *settings.sizes}))
+        settings.command = "colony"
         command_line.with_folder(settings, "colony")
     else:
         _check_live(settings, given, parser.error)
@@ -114,6 +115,7 @@ def _add_study(parser: command_line.Parser) -> None:
     parser.open_settings, parser.own_settings = ("training",), PLANNED
     command_line.add_settings(parser, _learning(0.3))
     command_line.add_common(parser)
+    command_line.add_machines(parser)
     command_line.add_results(parser, "colony")
 
 
@@ -183,6 +185,7 @@ def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingCon
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show its results if it is finished."""
     from taichi_ants.studies.colony_study import plan, study_of, write_results
+    from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
@@ -191,15 +194,16 @@ def study(settings: argparse.Namespace) -> None:
     conditions = plan(settings.world_kinds, settings.sizes, seeds, training, *lengths)
     asked = study_of(conditions, seeds)
 
-    def work(blocks: Path, ready: Path) -> Results:
-        with command_line.progress_bar("study") as progress:
-            where = {"threads": settings.threads, "arch": settings.arch}
-            outcomes = asked.run(blocks, progress, **where)
+    def work(blocks: Path, ready: Path) -> Results | None:
+        with command_line.progress_bar("study") as progress, chosen(settings) as how:
+            outcomes = asked.run(blocks, progress, **how)
+        if settings.shard:
+            return None
         return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
 
     words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}
     page = partial(make_page, settings, conditions, asked)
-    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page)
+    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page, asked)
 
 
 def make_page(

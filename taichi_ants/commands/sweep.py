@@ -22,29 +22,34 @@ def parse_arguments(
         parser.add_argument("file", type=Path, metavar="FILE", help="sweep to run (.toml)")
     parser.set_defaults(**({"file": file} if file else {}))
     command_line.add_common(parser)
+    command_line.add_machines(parser)
     name = f"sweep-{file.stem}" if file else "sweep-NAME for the file NAME.toml"
     command_line.add_results(parser, name, quick=False)
     settings = parser.parse_args(arguments)
-    settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
-    return settings
+    settings.command, settings.text = "sweep", None
+    return command_line.with_folder(settings, f"sweep-{settings.file.stem}")
 
 
 def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
+    from taichi_ants.files import read_text
+    from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.sweep import read_sweep
 
     command_line.load_plugin(settings.plugin)
-    asked = read_sweep(settings.file)
+    settings.text = settings.text or read_text(settings.file)
+    asked = read_sweep(settings.file, settings.text)
 
     def work(blocks: Path, ready: Path) -> None:
-        with command_line.progress_bar("sweep") as progress:
-            where = {"threads": settings.threads, "arch": settings.arch}
-            values = asked.measured(blocks, progress, **where)
+        with command_line.progress_bar("sweep") as progress, chosen(settings) as how:
+            values = asked.measured(blocks, progress, **how)
+        if settings.shard:
+            return
         asked.write(values, ready, draws=not settings.no_figures)
         asked.write_series(blocks, ready)
 
-    work_or_show(settings, asked.facts(), work)
+    work_or_show(settings, asked.facts(), work, study=asked.study, take=asked.take)
 
 
 def main(

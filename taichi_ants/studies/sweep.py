@@ -6,8 +6,10 @@ import difflib
 import itertools
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, fields
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,12 +21,15 @@ from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
-from taichi_ants.files.results import REPORT
+from taichi_ants.files.results import REPORT, ROWS
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import stops
 from taichi_ants.settings import all_of, declared, flat, named_groups, nested
+from taichi_ants.studies.blocks import Blocks
 from taichi_ants.studies.runner import (
     SERIES,
+    VALUE,
+    Block,
     ColonyPoint,
     FixedPolicy,
     Outcome,
@@ -32,6 +37,7 @@ from taichi_ants.studies.runner import (
     Progress,
     RunPoint,
     Study,
+    values_in,
 )
 from taichi_ants.task import Task
 from taichi_ants.task.field import TRAIL
@@ -39,6 +45,8 @@ from taichi_ants.task.field import TRAIL
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
 SERIES_FILE = "series.csv"
+_OF_SERIES = ("seed", "episode", "tick", "measure", "value")  # columns of SERIES_FILE
+_BYTES_OF_A_NUMBER = 20  # in a table
 _OF_FILE = ("kind", "seeds", "measures", "measure_every", "margin", "against", "vary")
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
@@ -121,24 +129,87 @@ class Sweep:
         own |= {"measure_every": self.measure_every} if self.measure_every else {}
         return {**self.study.settings(), **own, "vary": self.settings}
 
-    def measured(self, blocks: Path, progress: Progress, **where: Any) -> dict[str, np.ndarray]:
+    def measured(self, blocks: Path, progress: Progress, **how: Any) -> dict[str, np.ndarray]:
         """Return each measure, float64 (points, seeds); arguments as of `Study.in_blocks`.
 
         The value of a registered measure is its mean over rollouts, at the last tick of each.
         """
+        reduce = partial(_measured, self.kind, self.measures, self.measure_every is not None)
+        how = {"bytes_of_a_run": self._bytes_of_a_run, **how}
+        with self._rows_as_they_come(blocks.parent / ROWS) as each:
+            return self.study.reduced(blocks, reduce, progress, each, **how)
 
-        def reduce(points: Sequence[Any], seeds: Sequence[int], outcome: Outcome) -> Outcome:
-            if self.kind == "runs":
-                return of_runs.measures_of_runs(outcome, self.measures)
-            (point,) = points
-            arrays = {key: array[0] for key, array in outcome.items()}
-            found = of_colonies.measures_of(arrays, point.ants, point.ticks)
-            columns: Outcome = {}
-            for name in self.measures:
-                columns |= {name: found[name]} if name in found else _ends(arrays, name)
-            return {name: array[None] for name, array in columns.items()}
+    def _bytes_of_a_run(self, point: Any) -> int:
+        """Return the approximate bytes of a run on disk: in a block, and in two tables."""
+        values = len(self.measures)
+        if self.measure_every is not None:
+            several = len(list(stops(point.ticks, self.measure_every)))
+            values += len(point.measures) * several * point.rollouts
+        return values * (8 + 2 * _BYTES_OF_A_NUMBER)
 
-        return self.study.reduced(blocks, reduce, progress, **where)
+    @contextmanager
+    def _rows_as_they_come(self, folder: Path) -> Iterator[Callable[[Block], None]]:
+        """Yield a function that appends the rows of a block to tables in a folder.
+
+        The tables have the columns of `RUNS` and `SERIES_FILE`, and rows in the order of blocks.
+        """
+        tables: dict[str, files.GrowingTable] = {}
+        settings, order = self._settings_of_points, self.study.in_order
+        columns, seeds = sweeps.columns_of(self.settings), self.study.seeds
+
+        def append(name: str, rows: Iterable[dict[str, Any]], more: Iterable[str]) -> None:
+            if name not in tables:
+                path = files.check_writable_folder(folder) / name
+                tables[name] = stack.enter_context(files.GrowingTable(path, [*columns, *more]))
+            tables[name].append(rows)
+
+        def each(block: Block) -> None:
+            values, of_seeds = values_in(block.outcome), [seeds[s] for s in block.seeds]
+            own = [(one, row) for row, p in enumerate(block.points) for one in settings[order[p]]]
+            several = {name: array[[row for _, row in own]] for name, array in values.items()}
+            rows = sweeps.seed_rows([one for one, _ in own], of_seeds, several)
+            append(RUNS, rows, ["seed", *values])
+            for row, p in enumerate(block.points) if self.measure_every else ():
+                of_point = {name: array[row] for name, array in block.outcome.items()}
+                append(SERIES_FILE, self._rows_of_series(order[p], of_seeds, of_point), _OF_SERIES)
+
+        with ExitStack() as stack:
+            yield each
+
+    @cached_property
+    def _settings_of_points(self) -> dict[Any, list[Settings]]:
+        """Return the settings of each point, several if it repeats."""
+        settings: dict[Any, list[Settings]] = {}
+        for point, one in zip(self.study.points, self.settings, strict=True):
+            settings.setdefault(point, []).append(one)
+        return settings
+
+    def take(self, folder: Path, runs: Mapping[str, Any], blocks: Blocks) -> None:
+        """Add finished results, whose `Study.runs` were `runs`, to the blocks.
+
+        Raises:
+            AntsError: A table cannot be read.
+        """
+        rows = files.read_csv(folder / RUNS)
+        names = list(rows[0])
+        own, wanted = names[: names.index("seed")], names[names.index("seed") + 1 :]
+        size = len(rows) // len(runs["rows"])  # seeds
+        values = np.array([[row[name] for name in wanted] for row in rows], float)
+        values = values.reshape(-1, size, len(wanted))
+        point_of = dict(zip(self.study.keys, self.study.in_order, strict=True))
+        series: dict[tuple, dict[str, list[Any]]] = {}
+        if self.measure_every is not None:
+            for row in files.read_csv(folder / SERIES_FILE):
+                of_point = series.setdefault(tuple(row.get(name) for name in own), {})
+                of_point.setdefault(row["measure"], []).append(row["value"])
+        for number, place in enumerate(runs["rows"]):
+            key, seeds = runs["points"][place], runs["seeds"][runs["seeds_of"][place]]
+            arrays = {f"{VALUE}{name}": values[number, :, n] for n, name in enumerate(wanted)}
+            of_point = series.get(tuple(rows[number * size][name] for name in own), {})
+            for name, several in of_point.items():
+                shape = size, point_of[key].rollouts, -1
+                arrays[f"{SERIES}{name}"] = np.array(several, float).reshape(shape)
+            blocks.add([key], seeds, {name: array[None] for name, array in arrays.items()})
 
     def write_series(self, blocks: Path, folder: Path) -> None:
         """Write the series of the registered measures, a row for each value; read finished blocks.
@@ -147,28 +218,25 @@ class Sweep:
         """
         if self.measure_every is None:
             return
-        columns = [*sweeps.columns_of(self.settings), "seed", "episode", "tick", "measure", "value"]
-        files.write_csv(folder / SERIES_FILE, self._series_rows(blocks), columns)
+        order, seeds = self.study.in_order, self.study.seeds
+        rows = (
+            row
+            for place, outcome in self.study.read(blocks, range(len(order)))
+            for row in self._rows_of_series(order[place], seeds, outcome)
+        )
+        columns = [*sweeps.columns_of(self.settings), *_OF_SERIES]
+        files.write_csv(folder / SERIES_FILE, rows, columns)
 
-    def _series_rows(self, blocks: Path) -> Iterator[dict[str, Any]]:
-        order = self.study.in_order
-        settings: dict[Any, list[Settings]] = {}  # points may repeat
-        for point, one in zip(self.study.points, self.settings, strict=True):
-            settings.setdefault(point, []).append(one)
-        for place, outcome in self.study.read(blocks, range(len(order))):
-            point = order[place]
-            ticks = list(stops(point.ticks, self.measure_every))
-            for name, array in outcome.items():
-                for one in settings[point] if name.startswith(SERIES) else ():
-                    for (s, episode, row), value in np.ndenumerate(array):
-                        yield {
-                            **one,
-                            "seed": self.study.seeds[s],
-                            "episode": episode,
-                            "tick": ticks[row],
-                            "measure": name.removeprefix(SERIES),
-                            "value": value,
-                        }
+    def _rows_of_series(
+        self, point: Any, seeds: Sequence[int], outcome: Outcome
+    ) -> Iterator[dict[str, Any]]:
+        """Yield the rows of a point, whose outcome has arrays (seeds, ...)."""
+        settings, ticks = self._settings_of_points, list(stops(point.ticks, self.measure_every))
+        for name, array in outcome.items():
+            for one in settings[point] if name.startswith(SERIES) else ():
+                for (s, episode, row), value in np.ndenumerate(array):
+                    found = seeds[s], episode, ticks[row], name.removeprefix(SERIES), value
+                    yield {**one, **dict(zip(_OF_SERIES, found, strict=True))}
 
     def findings(self, values: np.ndarray) -> dict[int, dict[str, Any]]:
         """Return by point the finding on its difference from the point with the value `against`.
@@ -217,13 +285,13 @@ class Sweep:
                 sweeps.draw(path, self.settings[some], values[first][some], words)
 
 
-def read_sweep(path: Path) -> Sweep:
-    """Return the sweep of a file.
+def read_sweep(path: Path, text: str | None = None) -> Sweep:
+    """Return the sweep of a file, or of its text.
 
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
-    text = files.read_text(path)
+    text = files.read_text(path) if text is None else text
     try:
         file = files.tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -314,6 +382,29 @@ def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
             f"{', '.join(measures.names())} to measures."
         )
     return {"measures": registered, "measure_every": checked_whole("measure_every", every)}
+
+
+def _measured(
+    kind: str,
+    wanted: Sequence[str],
+    has_series: bool,
+    points: Sequence[Any],
+    seeds: Sequence[int],
+    outcome: Outcome,
+) -> Outcome:
+    """Return the measures of a block as `VALUE` arrays, and the series if they are asked for."""
+    if kind == "runs":
+        columns = of_runs.measures_of_runs(outcome, wanted)
+        return {f"{VALUE}{name}": array for name, array in columns.items()}
+    (point,) = points
+    arrays = {key: array[0] for key, array in outcome.items()}
+    found = of_colonies.measures_of(arrays, point.ants, point.ticks)
+    columns = {}
+    for name in wanted:
+        columns |= {name: found[name]} if name in found else _ends(arrays, name)
+    kept = {f"{VALUE}{name}": array[None] for name, array in columns.items()}
+    series = {name: array for name, array in outcome.items() if name.startswith(SERIES)}
+    return {**kept, **series} if has_series else kept
 
 
 def _ends(outcome: Outcome, name: str) -> Outcome:
