@@ -36,6 +36,8 @@ def sweep(settings: argparse.Namespace) -> None:
 
     command_line.load_plugin(settings.plugin)
     asked = read_sweep(settings.file)
+    if not settings.force:
+        asked.design.check_folder(settings.out)
 
     def work(blocks: Path, ready: Path) -> None:
         with command_line.progress_bar("sweep") as progress:

@@ -21,6 +21,7 @@ from taichi_ants.errors import AntsError
 MANIFEST = "manifest.json"
 REPORT = "report.txt"  # the text that commands print
 PAGE = "report.html"  # the whole result as a page
+UNFINISHED = "unfinished"  # the subfolder of work in progress
 
 
 class ResultFolder:
@@ -39,7 +40,7 @@ class ResultFolder:
         self.seconds_before = 0.0
         self._leading = leading
         self._settings = json.loads(files.to_json(settings))
-        self._unfinished = self.path / "unfinished"
+        self._unfinished = self.path / UNFINISHED
         self._blocks, self._ready = self._unfinished / "blocks", self._unfinished / "ready"
 
     def is_finished(self) -> bool:
