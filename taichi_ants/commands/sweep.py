@@ -1,16 +1,21 @@
 """Sweep any settings of the world, the task, the learner or the colony, from a TOML file.
 
-FILE lists fixed settings, the values of settings to vary, seeds, and measures. The command runs
-every combination of values with every seed, and writes tables and a figure to a folder. See
-docs/sweeps.md.
+FILE lists fixed settings, the values or ranges of settings to vary, seeds, and measures. The
+command runs every combination of values, or the points of a design, with every seed, and writes
+tables and figures to a folder. With [search], it looks for the best settings. See docs/sweeps.md
+and docs/designs.md.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from taichi_ants.studies import command_line
+
+if TYPE_CHECKING:
+    from taichi_ants.studies.search import Search
 
 
 def parse_arguments(
@@ -32,19 +37,33 @@ def parse_arguments(
 def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
     from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.sweep import read_sweep
+    from taichi_ants.studies.search import Search, read
 
     command_line.load_plugin(settings.plugin)
-    asked = read_sweep(settings.file)
+    asked = read(settings.file)
+    where = {"threads": settings.threads, "arch": settings.arch}
+    if isinstance(asked, Search):
+        return _search(settings, asked, where)
     if not settings.force:
         asked.design.check_folder(settings.out)
 
     def work(blocks: Path, ready: Path) -> None:
         with command_line.progress_bar("sweep") as progress:
-            where = {"threads": settings.threads, "arch": settings.arch}
             values = asked.measured(blocks, progress, **where)
         asked.write(values, ready, draws=not settings.no_figures)
         asked.write_series(blocks, ready)
+
+    work_or_show(settings, asked.facts(), work)
+
+
+def _search(settings: argparse.Namespace, asked: Search, where: dict[str, Any]) -> None:
+    """Run a search, or show its results if it is finished."""
+    from taichi_ants.studies.result_folder import work_or_show
+
+    def work(blocks: Path, ready: Path) -> None:
+        with command_line.progress_bar("search") as progress:
+            found = asked.measured(blocks, progress, **where)
+        asked.write(found, ready, draws=not settings.no_figures)
 
     work_or_show(settings, asked.facts(), work)
 

@@ -41,7 +41,17 @@ from taichi_ants.task import Task
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
 SERIES_FILE, SENSITIVITY = "series.csv", "sensitivity.csv"
-_OF_FILE = ("kind", "seeds", "measures", "measure_every", "margin", "against", "vary", *design.KEYS)
+_OF_FILE = (
+    "kind",
+    "seeds",
+    "measures",
+    "measure_every",
+    "margin",
+    "against",
+    "vary",
+    "search",
+    *design.KEYS,
+)
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
