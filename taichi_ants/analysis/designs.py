@@ -72,22 +72,28 @@ def panel(axes: Axes, places: Sequence[Any], means: np.ndarray, logarithmic: boo
     """Draw means, float64 (P,), against the values of a setting: numbers, or choices by name."""
     if are_numbers(places):
         x = np.array(places, float)
-        axes.scatter(x, means, s=6, color=style.SKY, alpha=0.6, linewidths=0)
+        dots(axes, x, means)
         parts = np.array_split(np.argsort(x, kind="stable"), min(_PARTS, len(x)))
         middles = [np.exp(np.log(x[one]).mean()) if logarithmic else x[one].mean() for one in parts]
         axes.plot(middles, [means[one].mean() for one in parts], color=style.INK, linewidth=1.2)
         if logarithmic:
-            axes.set_xscale("log")
+            style.logarithmic(axes.xaxis, (1,))
         return
     labels = [str(place) for place in places]
     kinds = list(dict.fromkeys(labels))
     x = np.array([kinds.index(label) for label in labels], float)
     aside = (np.arange(len(x)) * 0.618) % 1 - 0.5  # spreads the dots evenly, without chance
-    axes.scatter(x + 0.5 * aside, means, s=6, color=style.SKY, alpha=0.6, linewidths=0)
+    dots(axes, x + 0.5 * aside, means)
     for place in range(len(kinds)):
         mean = means[x == place].mean()
         axes.hlines(mean, place - 0.3, place + 0.3, color=style.INK, linewidth=1.2)
-    axes.set_xticks(range(len(kinds)), kinds)
+    names = [kind.replace("_", "\n") for kind in kinds]
+    axes.set_xticks(range(len(kinds)), names, fontsize=8)
+
+
+def dots(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
+    """Draw dots at (x, y), both float64 (P,); many of them are small."""
+    axes.scatter(x, y, s=6 if len(x) > 200 else 14, color=style.SKY, alpha=0.6, linewidths=0)
 
 
 def are_numbers(places: Sequence[Any]) -> bool:

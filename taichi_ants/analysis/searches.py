@@ -98,16 +98,17 @@ def draw(
         for number, name in enumerate(names):
             axes = figure.add_subplot(grid[1 + number // _COLUMNS, number % _COLUMNS])
             places = [row[name] for row in done]
-            designs.panel(axes, places, means, name in logarithmic)
             if designs.are_numbers(places):
+                designs.dots(axes, np.array(places, float), means)
                 axes.axvline(chosen[name], color=style.ORANGE, linestyle="--", label="Best setting")
+                if name in logarithmic:
+                    style.logarithmic(axes.xaxis, (1,))
+            else:
+                designs.panel(axes, places, means, False)
             axes.set_xlabel(short(name, names))
             if number % _COLUMNS == 0:
                 axes.set_ylabel(words)
-        caption = (
-            "Below: complete trials against each setting. Lines: means over an eighth of "
-            "the trials, or over those with the same choice."
-        )
+        caption = "Below: complete trials against each setting. A pruned trial has fewer seeds."
         title = f"{sentence(words)} of each trial, {'higher' if maximises else 'lower'} is better"
         style.frame(figure, title, caption, style.legend_entries(figure.axes))
     style.save(figure, path)
