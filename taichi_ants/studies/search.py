@@ -115,10 +115,9 @@ class Search:
                 raise AntsError(f"{name}.steps is {axis.steps}, but is for grids; leave it out.")
         if not design.varying(axes):
             raise AntsError("no setting in [search.vary] varies; give it a range.")
-        base.point({}, {})
         design.check_installed("optuna", "search", "[search]")
         design.check_installed("tomli_w", "search", "[search]")
-        return cls(
+        asked = cls(
             base,
             axes,
             measure,
@@ -129,6 +128,9 @@ class Search:
             _held_out(own.get("held_out", 20), base.seeds),
             file,
         )
+        for row in ({}, asked._asked(asked._study(), 0)[1]):  # the default and the first trial
+            base.point(row, {})
+        return asked
 
     def facts(self) -> dict[str, Any]:
         """Return everything that determines the results."""
@@ -209,9 +211,7 @@ class Search:
         """Return a trial that has run, until it was pruned."""
         try:
             point = self.base.point(row, {})
-        except AntsError as error:
-            if trial.number == 0:
-                raise AntsError(f"the first trial, {shown(row, 300)}, failed: {error}") from error
+        except AntsError:  # the rules do not allow these settings together
             return Trial(row, FAILED, {})
         seeds = self.base.seeds
         found: dict[str, list[np.ndarray]] = {name: [] for name in self.base.measures}
