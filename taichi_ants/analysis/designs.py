@@ -56,8 +56,7 @@ def draw(
         for axes, name in zip(panels.flat, names, strict=False):
             panel(axes, [one[name] for one in settings], means, name in logarithmic)
             axes.set_xlabel(short(name, names))
-        for row in panels:
-            row[0].set_ylabel(words)
+        figure.supylabel(words)
         seeds = values.shape[1]
         over = f"the mean over {seeds} seeds" if seeds > 1 else "one seed"
         caption = (
@@ -80,7 +79,7 @@ def panel(axes: Axes, places: Sequence[Any], means: np.ndarray, logarithmic: boo
             style.logarithmic(axes.xaxis, (1,))
         return
     labels = [str(place) for place in places]
-    kinds = list(dict.fromkeys(labels))
+    kinds = sorted(set(labels))
     x = np.array([kinds.index(label) for label in labels], float)
     aside = (np.arange(len(x)) * 0.618) % 1 - 0.5  # spreads the dots evenly, without chance
     dots(axes, x + 0.5 * aside, means)

@@ -91,15 +91,19 @@ def draw(
             *_places(pruned, column), marker="x", s=14, color=style.GREY, label="Pruned trial"
         )
         history.scatter(*_places(done, column), s=14, color=style.BLUE, label="Complete trial")
-        numbers = [row["trial"] for row in done]
-        history.step(numbers, best, where="post", color=style.ORANGE, label="Best so far")
+        numbers = [*(row["trial"] for row in done), rows[-1]["trial"]]
+        history.step(
+            numbers, [*best, best[-1]], where="post", color=style.ORANGE, label="Best so far"
+        )
         history.set(xlabel="trial", ylabel=words)
         chosen = done[int(np.argmax(means) if maximises else np.argmin(means))]
         for number, name in enumerate(names):
             axes = figure.add_subplot(grid[1 + number // _COLUMNS, number % _COLUMNS])
             places = [row[name] for row in done]
             if designs.are_numbers(places):
-                designs.dots(axes, np.array(places, float), means)
+                left_out = [row[name] for row in pruned], [row[column] for row in pruned]
+                axes.scatter(*left_out, marker="x", s=14, color=style.GREY, linewidths=0.8)
+                axes.scatter(places, means, s=14, color=style.BLUE)
                 axes.axvline(chosen[name], color=style.ORANGE, linestyle="--", label="Best setting")
                 if name in logarithmic:
                     style.logarithmic(axes.xaxis, (1,))
@@ -108,7 +112,9 @@ def draw(
             axes.set_xlabel(short(name, names))
             if number % _COLUMNS == 0:
                 axes.set_ylabel(words)
-        caption = "Below: complete trials against each setting. A pruned trial has fewer seeds."
+        caption = (
+            "Below: the same trials against each setting. A pruned trial has run with fewer seeds."
+        )
         title = f"{sentence(words)} of each trial, {'higher' if maximises else 'lower'} is better"
         style.frame(figure, title, caption, style.legend_entries(figure.axes))
     style.save(figure, path)

@@ -125,6 +125,8 @@ def test_the_points_of_a_file_are_built_from_drawn_values(tmp_path):
         assert point.task.pheromone.half_life == row["task.pheromone.half_life"]
         assert point.task.noise.slip == row["task.noise.slip"]
     assert sweep.facts()["design"] == {"design": "sobol", "design_seed": 0}
+    path.write_text(COLONY.replace('"sobol"', '"latin_hypercube"'), "utf-8")
+    assert read_sweep(path).facts()["design"]["samples"] == 8
 
 
 def test_declared_whole_numbers_need_no_key():
