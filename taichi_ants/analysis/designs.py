@@ -38,7 +38,7 @@ def draw(
     values: np.ndarray,
     words: str,
 ) -> None:
-    """Draw a measure against each setting that varies, in a panel of its own, a dot per point.
+    """Draw a measure against each setting that varies, a panel per setting and a dot per point.
 
     `settings` are those of P points, `names` the settings to show, `logarithmic` those with such an
     axis, `values` the measure, float64 (P, S), of S seeds, and `words` its name.

@@ -233,6 +233,11 @@ def varying(axes: Mapping[str, Axis]) -> dict[str, Axis]:
     return {n: one for n, one in axes.items() if isinstance(one, Range) or len(one.several) > 1}
 
 
+def logarithmic(axes: Mapping[str, Axis]) -> set[str]:
+    """Return the names of the axes that have a logarithmic scale."""
+    return {name for name, one in axes.items() if isinstance(one, Range) and one.log}
+
+
 def check_installed(module: str, extra: str, what: str) -> None:
     """Raise AntsError if the module that `what` requires is not installed."""
     if find_spec(module) is None:

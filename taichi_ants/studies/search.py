@@ -189,8 +189,8 @@ class Search:
     def _asked(self, study: optuna.Study, number: int) -> tuple[optuna.Trial, Settings]:
         """Return the next trial, and its settings.
 
-        Each trial has a sampler with a seed of its own, so that it does not depend on numbers that
-        an earlier process has drawn.
+        Each trial has a new sampler with another seed, so that it does not depend on random numbers
+        that an earlier process has drawn.
         """
         import optuna
 
@@ -280,9 +280,9 @@ class Search:
         self._store(found.study, folder / STORAGE)
         files.write_text(folder / REPORT, self._report(found, rows))
         if draws:
-            logs = {n for n, one in self.axes.items() if isinstance(one, Range) and one.log}
             words = sweep.measure_of(self.base.kind, self.measure).words
-            names, path = list(design.varying(self.axes)), folder / sweep.FIGURES / "search.png"
+            names, logs = list(design.varying(self.axes)), design.logarithmic(self.axes)
+            path = folder / sweep.FIGURES / "search.png"
             files.check_writable_folder(path.parent)
             searches.draw(path, rows, names, logs, (self.measure, words), self.maximises)
 

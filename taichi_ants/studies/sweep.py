@@ -221,40 +221,44 @@ class Sweep:
             more = ("finding", "difference", "low", "high")
             files.write_csv(folder / FINDINGS, found.values(), [*columns, *more])
         notes = [found.get(p, {}).get("finding", "") for p in range(len(self.settings))]
-        report = sweeps.report(self.settings, values, self.against, notes)
-        if self.design.kind != GRID:
-            report = self.write_design(values, folder, draws)
+        if self.design.kind == GRID:
+            report = sweeps.report(self.settings, values, self.against, notes)
+        else:
+            report = designs.first_rows(self.settings, values, f"the design {self.design.kind!r}")
+        indices = self.indices(values)
+        if indices:
+            report = f"{report}\n{sensitivity.report(indices, len(self.study.seeds))}"
+            of_all = [one._asdict() for several in indices.values() for one in several]
+            files.write_csv(folder / SENSITIVITY, of_all, sensitivity.Index._fields)
         files.write_text(folder / REPORT, report)
         if draws:
-            files.check_writable_folder(folder / FIGURES)
-            words = measure_of(self.kind, first).words
-            for number, (some, axes) in enumerate(zip(self.grids, self.axes, strict=True), start=1):
-                path = folder / FIGURES / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
-                if self.design.kind == GRID:
-                    sweeps.draw(path, self.settings[some], values[first][some], words)
-                else:
-                    names = list(design.varying(axes))
-                    logs = {n for n, one in axes.items() if isinstance(one, Range) and one.log}
-                    designs.draw(path, self.settings[some], names, logs, values[first][some], words)
+            self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
 
-    def write_design(self, values: dict[str, np.ndarray], folder: Path, draws: bool) -> str:
-        """Write the sensitivity indices, if the file wants them; return the report of a design."""
-        words = f"the design {self.design.kind!r}"
-        report = designs.first_rows(self.settings, values, words)
-        if not self.design.sensitivity:
-            return report
-        seeds, names = len(self.study.seeds), list(design.varying(self.axes[0]))
-        found = {
-            measure: sensitivity.indices(measure, names, array) for measure, array in values.items()
-        }
-        rows = [one._asdict() for several in found.values() for one in several]
-        files.write_csv(folder / SENSITIVITY, rows, sensitivity.Index._fields)
-        first = next(iter(values))
-        if draws and found[first]:
-            files.check_writable_folder(folder / FIGURES)
-            path = folder / FIGURES / f"sensitivity_{first}.png"
-            sensitivity.draw(path, found[first], measure_of(self.kind, first).words, seeds)
-        return f"{report}\n{sensitivity.report(found, seeds)}"
+    def indices(self, values: dict[str, np.ndarray]) -> dict[str, list[sensitivity.Index]]:
+        """Return the sensitivity indices by measure, from values that `measured` returned.
+
+        Empty if the file does not want them.
+        """
+        names = list(design.varying(self.axes[0])) if self.design.sensitivity else []
+        measured = values.items() if names else ()
+        return {name: sensitivity.indices(name, names, array) for name, array in measured}
+
+    def _draw(
+        self, values: np.ndarray, indices: Sequence[sensitivity.Index], first: str, folder: Path
+    ) -> None:
+        """Draw the first measure, float64 (points, seeds), in a figure for each [vary] table."""
+        files.check_writable_folder(folder)
+        words = measure_of(self.kind, first).words
+        for number, (some, axes) in enumerate(zip(self.grids, self.axes, strict=True), start=1):
+            path = folder / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
+            if self.design.kind == GRID:
+                sweeps.draw(path, self.settings[some], values[some], words)
+            else:
+                names, logs = list(design.varying(axes)), design.logarithmic(axes)
+                designs.draw(path, self.settings[some], names, logs, values[some], words)
+        if indices:
+            path = folder / f"sensitivity_{first}.png"
+            sensitivity.draw(path, indices, words, values.shape[1])
 
 
 def read_sweep(path: Path) -> Sweep:

@@ -163,6 +163,19 @@ def test_results_of_a_search(plain, tmp_path):
     assert (tmp_path / "figures" / "search.png").stat().st_size > 10_000
 
 
+def test_less_of_what_is_minimised_is_better(plain, tmp_path):
+    asked = read(TEXT.replace("maximise", "minimise"))
+    found = asked.measured(tmp_path, lambda share: None)
+    asked.write(found, tmp_path, draws=False)
+    report = " ".join((tmp_path / "report.txt").read_text("utf-8").split())
+    mean, low, high = map(
+        float, re.search(r"paired by seed: (\S+) \[(\S+), (\S+)\]", report).groups()
+    )
+    assert low <= mean <= high < 0
+    assert "has the lowest deliveries" in report
+    assert "Finding: better." in report
+
+
 def test_the_storage_is_one_that_optuna_reads(plain, tmp_path):
     asked = read(TEXT.replace("trials = 40", "trials = 9"))
     found = asked.measured(tmp_path, lambda share: None)
@@ -172,6 +185,9 @@ def test_the_storage_is_one_that_optuna_reads(plain, tmp_path):
     loaded = optuna.load_study(study_name="search", storage=storage)
     assert loaded.best_trial.number == found.best
     assert [one.params for one in loaded.trials] == [one.settings for one in found.trials]
+    states = [one.state.name.lower() for one in loaded.trials]
+    assert states == [one.state for one in found.trials]
+    assert "pruned" in states
     values = loaded.best_trial.user_attrs["values"]["deliveries"]
     assert values == found.trials[found.best].values["deliveries"].tolist()
 
