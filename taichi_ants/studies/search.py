@@ -85,49 +85,28 @@ class Search:
     @classmethod
     def of(cls, file: Settings) -> Search:
         """Return the search of the contents of a file; AntsError if a setting is not allowed."""
-        own = file["search"]
-        if not isinstance(own, dict):
-            raise AntsError(f"search is {shown(own)}; it must be a table, [search].")
-        for key in own:
-            if key not in _KEYS:
-                raise AntsError(f"`search.{key}` {not_a_setting(key, _KEYS)}")
-        for key in _OF_SWEEPS:
-            if key in file:
-                more = "; move its settings to [search.vary]" if key == "vary" else ""
-                raise AntsError(f"{key} and [search] are in the same file; remove one{more}.")
-        ways = [one for one in _KEYS[:2] if one in own]
-        if len(ways) != 1:
-            raise AntsError(
-                f"[search] has {' and '.join(ways) or 'no aim'}; write maximise or minimise with "
-                "the name of a measure."
-            )
-        measure = own[ways[0]]
+        own = _table(file)
+        (way,) = {*_KEYS[:2]} & own.keys()
+        measure = own[way]
         base = Base.of({"measures": [measure], **file})
         if measure not in base.measures:
             raise AntsError(
-                f"{ways[0]} is {shown(measure)}, but measures are {', '.join(base.measures)}; add "
-                "it to measures."
+                f"{way} is {shown(measure)}, but measures are {', '.join(base.measures)}; add it "
+                "to measures."
             )
-        fixed = {name: value for name, value in base.fixed.items() if name not in own_names(own)}
-        axes = sweep.axes_of(base.kind, own.get("vary", {}), fixed)
-        for name, axis in axes.items():
-            if isinstance(axis, Range) and axis.steps:
-                raise AntsError(f"{name}.steps is {axis.steps}, but is for grids; leave it out.")
-        if not design.varying(axes):
-            raise AntsError("no setting in [search.vary] varies; give it a range.")
-        design.check_installed("optuna", "search", "[search]")
-        design.check_installed("tomli_w", "search", "[search]")
         asked = cls(
             base,
-            axes,
+            _axes(own, base),
             measure,
-            ways[0] == "maximise",
+            way == "maximise",
             checked_whole("search.trials", own.get("trials", 50), 1, 100_000),
             checked_whole("search.seed", own.get("seed", 0), 0, 2**63 - 1),
             _group(own),
             _held_out(own.get("held_out", 20), base.seeds),
             file,
         )
+        for module in ("optuna", "tomli_w"):
+            design.check_installed(module, "search", "[search]")
         for row in ({}, asked._asked(asked._study(), 0)[1]):  # the default and the first trial
             base.point(row, {})
         return asked
@@ -321,20 +300,49 @@ class Search:
         return searches.report(head, choices, found.held_out, self.measure, numbers, words)
 
 
-def read(path: Path) -> Sweep | Search:
-    """Return the sweep or the search of a file.
+def read(path: Path, text: str | None = None) -> Sweep | Search:
+    """Return the sweep or the search of a file, or of its text.
 
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
-    with sweep.contents(path) as file:
+    with sweep.contents(path, text) as file:
         return Search.of(file) if "search" in file else sweep.sweep_of(file)
 
 
-def own_names(own: Settings) -> set[str]:
-    """Return the full names in the table `vary` of [search]."""
-    vary = own.get("vary")
-    return {name for name, _ in design.axes_of(vary)} if isinstance(vary, dict) else set()
+def _table(file: Settings) -> Settings:
+    """Return the table [search] of a file, which has one aim."""
+    own = file["search"]
+    if not isinstance(own, dict):
+        raise AntsError(f"search is {shown(own)}; it must be a table, [search].")
+    for key in own:
+        if key not in _KEYS:
+            raise AntsError(f"`search.{key}` {not_a_setting(key, _KEYS)}")
+    for key in _OF_SWEEPS:
+        if key in file:
+            more = "; move its settings to [search.vary]" if key == "vary" else ""
+            raise AntsError(f"{key} and [search] are in the same file; remove one{more}.")
+    ways = [one for one in _KEYS[:2] if one in own]
+    if len(ways) != 1:
+        raise AntsError(
+            f"[search] has {' and '.join(ways) or 'no aim'}; write maximise or minimise with the "
+            "name of a measure."
+        )
+    return own
+
+
+def _axes(own: Settings, base: Base) -> dict[str, Axis]:
+    """Return the ranges and choices of a table [search]; fixed values of these are the default."""
+    table = own.get("vary", {})
+    names = {name for name, _ in design.axes_of(table)} if isinstance(table, dict) else set()
+    fixed = {name: value for name, value in base.fixed.items() if name not in names}
+    axes = sweep.axes_of(base.kind, table, fixed)
+    for name, axis in axes.items():
+        if isinstance(axis, Range) and axis.steps:
+            raise AntsError(f"{name}.steps is {axis.steps}, but is for grids; leave it out.")
+    if not design.varying(axes):
+        raise AntsError("no setting in [search.vary] varies; give it a range.")
+    return axes
 
 
 def _group(own: Settings) -> int | None:

@@ -261,24 +261,24 @@ class Sweep:
             sensitivity.draw(path, indices, words, values.shape[1])
 
 
-def read_sweep(path: Path) -> Sweep:
-    """Return the sweep of a file.
+def read_sweep(path: Path, text: str | None = None) -> Sweep:
+    """Return the sweep of a file, or of its text.
 
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
-    with contents(path) as file:
+    with contents(path, text) as file:
         return sweep_of(file)
 
 
 @contextmanager
-def contents(path: Path) -> Iterator[Settings]:
-    """Yield the contents of a file (.toml); errors inside of the context name the file.
+def contents(path: Path, text: str | None = None) -> Iterator[Settings]:
+    """Yield the contents of a file (.toml), or of its text; errors in the context name the file.
 
     Raises:
         AntsError: The file cannot be read.
     """
-    text = files.read_text(path)
+    text = files.read_text(path) if text is None else text
     try:
         file = files.tomllib.loads(text)
     except (ValueError, RecursionError) as error:

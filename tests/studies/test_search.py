@@ -290,6 +290,11 @@ def test_mistakes_are_named(name):
         assert word in str(error.value)
 
 
+def test_a_search_is_a_table():
+    with pytest.raises(AntsError, match=r"search is 3; it must be a table, \[search\]"):
+        Search.of({"search": 3})
+
+
 @pytest.mark.parametrize("missing", ["optuna", "tomli_w"])
 def test_a_missing_extra_is_named_with_the_command(missing, monkeypatch):
     monkeypatch.setattr(design, "find_spec", lambda name: None if name == missing else name)
