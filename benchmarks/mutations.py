@@ -49,6 +49,9 @@ SWEEPS = "tests/commands/test_sweep_measures.py"
 CHOICE = "tests/task/test_choice.py"
 NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
+DESIGN = "tests/studies/test_design.py"
+SENSITIVITY = "tests/analysis/test_sensitivity.py"
+SEARCH = "tests/studies/test_search.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
@@ -299,6 +302,24 @@ MUTATIONS = [
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "made[one.name] = one.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
+    # Designs and searches.
+    ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
+    ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
+    ("studies/design.py", "random_base2(whole)[: self.samples]", "random_base2(whole)", DESIGN),
+    ("studies/design.py", "if self.kind == LATIN_HYPERCUBE else {}", "if False else {}", DESIGN),
+    ("analysis/sensitivity.py", "- drawn.mean(axis=0)", "", SENSITIVITY),
+    ("analysis/sensitivity.py", "(seeds - 1)) / seeds", "(seeds - 1))", SENSITIVITY),
+    ("analysis/sensitivity.py", '"seed": RANDOM_SEED', '"seed": 0', SENSITIVITY),
+    ("studies/search.py", "SeedSequence((self.seed, number))", "SeedSequence(self.seed)", SEARCH),
+    (
+        "studies/search.py",
+        "world=point.world[at]",
+        "world=point.world[: at.stop - at.start]",
+        SEARCH,
+    ),
+    ("studies/search.py", "max(seeds) + 1, max(seeds) + 1 + n", "n", SEARCH),
+    ("studies/search.py", "sign * (best - default)", "best - default", SEARCH),
+    ("studies/search.py", "PRUNED if done.state == PRUNED", "PRUNED if False", SEARCH),
 ]
 
 
