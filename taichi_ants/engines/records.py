@@ -57,6 +57,9 @@ class Snapshot(Record):
         ant_numbers: int32 (n,), the numbers of the ants.
         ant_actions: int32 (n,), the last action of each ant; -1 before its first one.
         ant_events: int32 (n,), the result of the last action, an `Event`.
+        ant_castes: int32 (n,), the castes of the ants; 0 without castes.
+        ant_idle: bool (n,), whether each ant is idle, see `Labour`.
+        ant_thresholds: float32 (n,), the response thresholds of the ants; 0 without one.
         fields: The levels of each pheromone by name, (grid.size,); "trail" is `trail`.
         counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers.
         world: The world at the start of the episode; None if unknown.
@@ -72,6 +75,9 @@ class Snapshot(Record):
     ant_numbers: np.ndarray = field(default_factory=_none)
     ant_actions: np.ndarray = field(default_factory=_none)
     ant_events: np.ndarray = field(default_factory=_none)
+    ant_castes: np.ndarray = field(default_factory=_none)
+    ant_idle: np.ndarray = field(default_factory=_none)
+    ant_thresholds: np.ndarray = field(default_factory=_none)
     fields: Mapping[str, np.ndarray] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
     world: World | None = None

@@ -94,11 +94,7 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
             weights[side] = power(choice.k + level, choice.exponent)
     if not any(weights):
         return (LEFT, RIGHT)[pick(low, 2)]
-    if (
-        ant.carries
-        and world.homing == "compass"
-        and any(weights[side] and nearer[side] for side in range(3))
-    ):
+    if world.has_compass(ant) and any(weights[side] and nearer[side] for side in range(3)):
         weights = [weights[side] if nearer[side] else 0.0 for side in range(3)]
     return weighted(weights, low)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
 from taichi_ants.reference.ants import start_order
+from taichi_ants.reference.castes import draw_caste
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, normal_form
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
@@ -142,15 +143,14 @@ class Interventions:
     def add_ants(self, cells: Sequence[Cell], heading: int | None = None) -> None:
         """Put ants on those of the cells that are empty; draw each heading if none is given."""
         colony = self.colony
-        for cell in cells:
-            if colony.world.content(cell) != EMPTY:
-                continue
-            towards = heading
-            if towards is None:
-                high, _ = self._stream.draw()
-                towards = pick(high, N_HEADINGS)
+        free = [cell for cell in cells if colony.world.content(cell) == EMPTY]
+        headings = [heading or 0 for _ in free]
+        if heading is None:
+            headings = [pick(self._stream.draw()[0], N_HEADINGS) for _ in free]
+        castes = [draw_caste(colony.castes, 0, colony.n_ants, self._stream) for _ in free]
+        for cell, towards, caste in zip(free, headings, castes, strict=True):
             slot = next(slot for slot in range(colony.slots) if slot not in colony.ants)
-            colony.new_ant(cell, towards, slot)
+            colony.new_ant(cell, towards, slot, caste=caste)
         self._observe()
 
     def add_some(self, n: int, heading: int | None = None) -> None:
@@ -170,6 +170,7 @@ class Interventions:
     def set_task(self, task: Task) -> None:
         """Change numbers of the task."""
         self.colony.task, self._pheromone = task, task.pheromone
+        self.colony.take_castes()
         learns = self.colony.sharing != "frozen"
         self._falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self.set_pheromone()

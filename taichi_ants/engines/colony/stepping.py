@@ -133,7 +133,8 @@ def features_of(state: ColonyState) -> Features:
     from taichi_ants.engines.colony import kernels
 
     task, pheromones = state.task, state.pheromones
-    outbound, homing = task.number_of(task.outbound_cue), task.number_of(task.homing_cue)
+    cues = task.all_cues
+    outbound, homing = cues[0]
     return kernels.Features(
         learner=state.learner,
         own_tables=state.one_a_slot,
@@ -142,7 +143,7 @@ def features_of(state: ColonyState) -> Features:
         dense=tuple(one.dense for one in pheromones),
         # Only the views of cues are compiled.
         views=tuple(
-            one.view if number in (outbound, homing) else "half"
+            one.view if any(number in pair for pair in cues) else "half"
             for number, one in enumerate(pheromones)
         ),
         outbound=outbound,
@@ -158,6 +159,9 @@ def features_of(state: ColonyState) -> Features:
         n_kinds=state.n_kinds,
         has_foods=bool(task.foods),
         has_loads=task.has_loads,
+        n_castes=len(task.castes),
+        cues=cues if len(cues) > 1 else (),
+        has_labour=task.labour.divides,
     )
 
 
