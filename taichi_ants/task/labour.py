@@ -56,5 +56,5 @@ class Labour(Settings, path="task.labour"):
 
     @property
     def numbers(self) -> tuple[float, float, float]:
-        """`demand`, `relief` and `exponent` as kernels read them."""
+        """The numbers `demand`, `relief` and `exponent`, as kernels read them."""
         return self.demand or 0.0, self.relief or 0.0, self.exponent or 0.0

@@ -2,18 +2,19 @@
 
 The stimulus of a nest, f64, is 0 at the start of an episode. After the actions of a tick it becomes
 max(0, stimulus - relief * deliveries) + demand. Ants respond to the stimulus at the start of a
-tick. With the ratio r = threshold / stimulus, in f64, an idle ant starts foraging if the high word
-of its draw is below floor(2^32 / (1 + r^exponent)), by `numbers.power`; r^exponent is 0 if r is 0,
-and no ant starts at a stimulus of 0.
+tick. At a stimulus of 0, no idle ant starts foraging. Otherwise r = threshold / stimulus, and an
+idle ant starts if the high word of its draw is below floor(2^32 / (1 + r^exponent)). All numbers
+are f64, and r^exponent is `numbers.power`, or 0 if r is 0. A forager stops if the high word of its
+draw is below floor(2^32 * quit).
 
 The threshold of an ant is f32. It comes from the ant's own stream of (seed, STREAM_TRAIT, number),
-whose draws have the words `high` and `low`, with all else in f64:
+whose draws have the words `high` and `low`. Everything is computed in f64 and rounded at the end:
 
 - "fixed": value, without a draw.
 - "uniform": value + spread * (2 * u - 1), with u = (high + 0.5) / 2^32.
 - "normal" and "lognormal": a = (high + 0.5) / 2^31 - 1, b = (low + 0.5) / 2^31 - 1 and q = a * a +
   b * b. If q >= 1, the draw is repeated. z = a * power(-2 * logarithm(q) / q, 0.5). The threshold
-  is value + spread * z, and all is repeated if that is below 0; or value * exponential(spread * z).
+  is value + spread * z, and everything is repeated if that is below 0; or value * exponential(spread * z).
 """
 
 import taichi as ti
