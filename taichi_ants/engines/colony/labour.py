@@ -14,7 +14,8 @@ whose draws have the words `high` and `low`. Everything is computed in f64 and r
 - "uniform": value + spread * (2 * u - 1), with u = (high + 0.5) / 2^32.
 - "normal" and "lognormal": a = (high + 0.5) / 2^31 - 1, b = (low + 0.5) / 2^31 - 1 and q = a * a +
   b * b. If q >= 1, the draw is repeated. z = a * power(-2 * logarithm(q) / q, 0.5). The threshold
-  is value + spread * z, and everything is repeated if that is below 0; or value * exponential(spread * z).
+  is value + spread * z, and everything is repeated if that is below 0; or, if "lognormal", value *
+  exponential(spread * z).
 """
 
 import taichi as ti

@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from random_castes import drawn_castes
 from random_choices import NO_NOISE, NOISE
 from random_colonies import random_colony
 from random_protocols import random_protocol
@@ -29,7 +30,10 @@ KERNELS = [
     ("double_q", "independent", "ants_seen", True, "blocking", "half", "aB", ("a", "B")),
     ("q_learning", "frozen", "paper", True, "following", "strongest_under_carriers"),
 ]
-MARKED = [*KERNELS[:2], *(pytest.param(one, marks=pytest.mark.slow) for one in KERNELS[2:])]
+WITH_CASTES = ("sarsa", "shared", "paper", False, "right_of_way", "half", "a", ("trail", "a"))
+KERNELS.append(WITH_CASTES)
+QUICK = (*KERNELS[:2], WITH_CASTES)
+MARKED = [one if one in QUICK else pytest.param(one, marks=pytest.mark.slow) for one in KERNELS]
 TICKS = 14
 FOLLOWS = TrainingConfig("q_learning", 1.0, 1.0, 0.05, 1.0)
 
@@ -52,6 +56,13 @@ def drawn_cases(kernel, seed, n_worlds):
         noise=NOISE if learner == "q_learning" else NO_NOISE,
         **dict(zip(("fields", "cues"), fields, strict=False)),
     )
+    if kernel is WITH_CASTES:
+        cues = [("trail", "a"), ("a", "compass")]
+        drawn = (
+            drawn_castes(drawn, seed, 2, True, cues)
+            or drawn_castes(drawn, 0, 2, True, cues)
+            or drawn
+        )
     rng = np.random.default_rng([seed, 7])
     population = {**drawn.population, "ends_at_delivery": False}
     population["capacity"] = capacity = population["ants"] + int(rng.integers(2, 9))
@@ -65,7 +76,7 @@ def drawn_cases(kernel, seed, n_worlds):
 @pytest.mark.parametrize("kernel", MARKED, ids=lambda kernel: "-".join(map(str, kernel[:4])))
 def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
     done, refused = Counter(), 0
-    for seed in range(14 if kernel in KERNELS[:2] else 30):
+    for seed in range(14 if kernel in QUICK else 30):
         n_worlds = 1 + 2 * (seed % 3 > 0)
         places, task, training, first, rules, protocol = drawn_cases(kernel, seed, n_worlds)
         seeds = [first + w for w in range(n_worlds)]
