@@ -26,6 +26,7 @@ RUNS = "tests/engines/runs/test_against_reference.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
 NESTS = "tests/engines/colony/test_nests.py"
+CASTES = "tests/engines/colony/test_castes.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -48,6 +49,19 @@ NUMBERS = "tests/task/test_numbers.py"
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
     # Rules.
+    ("engines/colony/labour.py", "chance = 1.0 / (1.0 + raised)", "chance = 1.0 - raised", CASTES),
+    ("engines/colony/labour.py", "waits = drawn < 0.0", "waits = False", CASTES),
+    ("engines/colony/labour.py", "and trait(c.carries, ant) == 0:", "and True:", CASTES),
+    ("engines/colony/labour.py", "lowered > 0.0, lowered", "True, lowered", COLONY),
+    (
+        "engines/colony/learning.py",
+        "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
+        "does = True",
+        CASTES,
+    ),
+    ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
+    ("engines/colony/life.py", "ti.cast(bound <= word, ti.i32)", "0", COLONY),
+    ("task/caste.py", "int(quotas[i]) - quotas[i])", "quotas[i])", CASTES),
     ("engines/colony/steps.py", "if c.counts_without_food == 1:", "if False:", COLONY),
     ("engines/colony/steps.py", "ti.select(carries == had_food, age, 0)", "age", COLONY),
     (
@@ -58,7 +72,7 @@ MUTATIONS = [
     ),
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
-    ("engines/colony/steps.py", "homing.half", "v.half", COLONY),
+    ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),
@@ -129,7 +143,7 @@ MUTATIONS = [
     ("engines/runs/kernels.py", "clock += a.evaporates", "clock += 1", RUNS),
     ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
-    ("engines/colony/life.py", "c.age[ant] >= c.lifespan", "c.age[ant] > c.lifespan", COLONY),
+    ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
     ("engines/colony/life.py", "tick >= taken + c.regrowth", "tick > taken + c.regrowth", COLONY),
     ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
     ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),
