@@ -27,6 +27,7 @@ COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
 NESTS = "tests/engines/colony/test_nests.py"
 RASTER = "tests/rendering/test_raster.py"
+CASTES = "tests/engines/colony/test_castes.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -56,6 +57,19 @@ SEARCH = "tests/studies/test_search.py"
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
     # Rules.
+    ("engines/colony/labour.py", "chance = 1.0 / (1.0 + raised)", "chance = 1.0 - raised", CASTES),
+    ("engines/colony/labour.py", "waits = drawn < 0.0", "waits = False", CASTES),
+    ("engines/colony/labour.py", "and trait(c.carries, ant) == 0:", "and True:", CASTES),
+    ("engines/colony/labour.py", "lowered > 0.0, lowered", "True, lowered", COLONY),
+    (
+        "engines/colony/learning.py",
+        "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
+        "does = True",
+        CASTES,
+    ),
+    ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
+    ("engines/colony/life.py", "ti.cast(bound <= word, ti.i32)", "0", COLONY),
+    ("task/caste.py", "int(quotas[i]) - quotas[i])", "quotas[i])", CASTES),
     ("engines/colony/steps.py", "if c.counts_without_food == 1:", "if False:", COLONY),
     ("engines/colony/steps.py", "ti.select(carries == had_food, age, 0)", "age", COLONY),
     (
@@ -66,8 +80,8 @@ MUTATIONS = [
     ),
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
-    ("engines/colony/steps.py", "homing.half", "v.half", COLONY),
-    ("task/task.py", "self.choice.carriers_follow or usual", "usual", CHOICE),
+    ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
+    ("engines/colony/kernels.py", "features.carriers_follow if", "outbound if", CHOICE),
     ("measures/tidy.py", "else parts", "else []", RESULTS_OF_RUNS),
     ("rendering/rasteriser.py", "snapshot.ant_nests % len", "0 * snapshot.ant_nests % len", RASTER),
     ("engines/colony/state.py", "np.where(carries, of_ants", "np.where(~carries, of_ants", NESTS),
@@ -146,7 +160,7 @@ MUTATIONS = [
     ("envs/vector.py", "else rows.any(0)", "else rows[-1]", ROLLOUT),
     ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
-    ("engines/colony/life.py", "c.age[ant] >= c.lifespan", "c.age[ant] > c.lifespan", COLONY),
+    ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
     ("engines/colony/life.py", "tick >= taken + c.regrowth", "tick > taken + c.regrowth", COLONY),
     ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
     ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),

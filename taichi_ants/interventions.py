@@ -332,7 +332,11 @@ class TaskNumbers(Intervention, path="task"):
             of = rest.partition(".")[0]
             here = known
             if rest and group in _NAMED:
-                here = {f"{group}.{of}.{one.name}": one for one in declared(_NAMED[group].entry)}
+                entry = _NAMED[group].entry
+                before = f"{entry.path}."  # type: ignore[attr-defined]
+                here = {
+                    f"{group}.{of}.{one.path.removeprefix(before)}": one for one in all_of(entry)
+                }
             if name not in here:
                 raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")
             values.append((name, here[name].checked(value)))

@@ -61,6 +61,9 @@ class Snapshot(Record):
         ant_foods: int32 (n,), the kind of the food that each ant carries; -1 without food.
         food_kinds: uint8 (grid.size,), the kind of the food in each cell; 0 without food.
         queens: int32 (nests,), the flat cell index of the queen of each nest.
+        ant_castes: int32 (n,), the castes of the ants; 0 without castes.
+        ant_idle: bool (n,), whether each ant is idle, see `Labour`.
+        ant_thresholds: float32 (n,), the response thresholds of the ants; 0 without one.
         fields: The levels of each pheromone by name, (grid.size,); "trail" is `trail`.
         counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers.
         world: The world at the start of the episode; None if unknown.
@@ -80,6 +83,9 @@ class Snapshot(Record):
     ant_foods: np.ndarray = field(default_factory=_none)
     food_kinds: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint8))
     queens: np.ndarray = field(default_factory=_none)
+    ant_castes: np.ndarray = field(default_factory=_none)
+    ant_idle: np.ndarray = field(default_factory=_none)
+    ant_thresholds: np.ndarray = field(default_factory=_none)
     fields: Mapping[str, np.ndarray] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
     world: World | None = None

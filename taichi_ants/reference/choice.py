@@ -82,7 +82,7 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
         return GIVE if ant.carries else PICK_UP
     weights, nearer = [0.0, 0.0, 0.0], [False, False, False]
     cue = world.cue(ant)
-    if ant.carries and choice.carriers_follow is not None:
+    if world.has_compass(ant) and choice.carriers_follow is not None:
         cue = world.pheromone_named(choice.carriers_follow)
     for side in (LEFT, FORWARD, RIGHT):
         cell = neighbour(ant.cell, (ant.heading + side - 1) % N_HEADINGS)
@@ -97,11 +97,7 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
             weights[side] = power(choice.k + level, choice.exponent)
     if not any(weights):
         return (LEFT, RIGHT)[pick(low, 2)]
-    if (
-        ant.carries
-        and world.homing == "compass"
-        and any(weights[side] and nearer[side] for side in range(3))
-    ):
+    if world.has_compass(ant) and any(weights[side] and nearer[side] for side in range(3)):
         weights = [weights[side] if nearer[side] else 0.0 for side in range(3)]
     return weighted(weights, low)
 

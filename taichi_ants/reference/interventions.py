@@ -10,6 +10,7 @@ import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
 from taichi_ants.reference.ants import start_order
+from taichi_ants.reference.castes import draw_caste
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.reference.geometry import (
     Cell,
@@ -166,15 +167,17 @@ class Interventions:
 
     def _add(self, cells: Sequence[Cell], nests: Sequence[int], heading: int | None) -> None:
         colony = self.colony
-        for cell, nest in zip(cells, nests, strict=True):
-            if colony.world.content(cell) != EMPTY:
-                continue
-            towards = heading
-            if towards is None:
-                high, _ = self._stream.draw()
-                towards = pick(high, N_HEADINGS)
+        pairs = zip(cells, nests, strict=True)
+        free = [(cell, nest) for cell, nest in pairs if colony.world.content(cell) == EMPTY]
+        headings = [heading or 0 for _ in free]
+        if heading is None:
+            headings = [pick(self._stream.draw()[0], N_HEADINGS) for _ in free]
+        castes = [
+            draw_caste(colony.castes, nest, colony.starting[nest], self._stream) for _, nest in free
+        ]
+        for (cell, nest), towards, caste in zip(free, headings, castes, strict=True):
             slot = next(slot for slot in range(colony.slots) if slot not in colony.ants)
-            colony.new_ant(cell, towards, slot, nest)
+            colony.new_ant(cell, towards, slot, nest, caste)
         self._observe()
 
     def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
@@ -205,6 +208,7 @@ class Interventions:
         """Change numbers of the task."""
         self.colony.task, self._pheromone = task, task.pheromone
         self.colony.world.foods = self.colony.foods
+        self.colony.take_castes()
         learns = self.colony.sharing != "frozen"
         self._falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self.set_pheromone()

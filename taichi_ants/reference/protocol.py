@@ -53,6 +53,7 @@ class Protocol:
         colony = self._colony
         colony.task, colony.epsilon, learning_rate, tables = self._before
         colony.pheromone, colony.fields = self._pheromones
+        colony.take_castes()
         colony.minds.pace(learning_rate)
         colony.learning_rate = learning_rate
         if colony.sharing == "frozen":

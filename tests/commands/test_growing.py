@@ -58,11 +58,14 @@ epsilon_decay = 0.9
 [vary]
 task.rewards.shaping = [1, 0]
 """
-DRAWN = RUNS.split("[vary]")[0].replace("kind =", 'design = "sobol"\nsamples = 8\nkind =') + """
+DRAWN = (
+    RUNS.split("[vary]")[0].replace("kind =", 'design = "sobol"\nsamples = 8\nkind =')
+    + """
 [vary]
 training.learning_rate = {from = 0.01, to = 0.2, scale = "log"}
 task.rewards.shaping = [1, 0]
 """
+)
 SWEEPS = {"runs": RUNS, "colony": COLONY, "drawn": DRAWN}
 FEWER = {
     "runs": RUNS.replace("[7, 2, 5, 1]", "[5, 7]").replace("[0.01, 0.1, 0.2]", "[0.2, 0.01]"),

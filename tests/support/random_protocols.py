@@ -130,6 +130,13 @@ def _change(rng: np.random.Generator, task: Task) -> dict[str, Any]:
             able.append((f"fields.{name}.half_life", float(rng.uniform(0.5, 20))))
     for name in task.foods:
         able.append((f"foods.{name}.deliver", int(rng.integers(-2, 30))))
+    for name, caste in task.castes.items():
+        able.append((f"castes.{name}.epsilon", float(rng.random())))
+        able.append((f"castes.{name}.lays", str(rng.choice(["all", "none", "trail"]))))
+        if caste.threshold.value is not None:
+            able.append((f"castes.{name}.threshold.value", float(rng.uniform(3, 9))))
+    if task.labour.divides:
+        able.append(("labour.demand", float(rng.uniform(0, 4))))
     if life.wander:
         able += [("life.wander", int(rng.integers(1, 9))), ("life.regrowth", 2)]
     return dict([able[int(rng.integers(len(able)))]])

@@ -11,7 +11,8 @@ are tried by distance, then by cube coordinates. If none is empty, the ant and i
 change.
 
 Random numbers come from the stream of (seed, STREAM_INTERVENTION, episode) of each world, in the
-order of the changes. Adding n ants draws n headings. Removing n of m living ants draws m words of
+order of the changes. Adding n ants draws n headings and, with several castes, n castes, by the
+probabilities for newborn ants. Removing n of m living ants draws m words of
 64 bits, one for each ant in the order of numbers, and removes the ants with the n smallest words.
 With a nest given, m counts the ants of that nest.
 """
@@ -544,6 +545,11 @@ class _World:
         numbers = rows[WorldRow.NEXT_NUMBER] + np.arange(n)
         words = self.all.stream(self.w).bits(n) if heading is None else np.zeros(0, np.uint64)
         headings = choose(words >> np.uint64(32), N_HEADINGS) if heading is None else heading
+        castes: Any = 0
+        if len(colony.task.castes) > 1:
+            drawn = (self.all.stream(self.w).bits(n) >> np.uint64(32)) / 2.0**32
+            bounds = self.view("caste_chances").reshape(colony.n_nests, -1)[nests, :-1]
+            castes = np.count_nonzero(bounds <= drawn[:, None], axis=1)
         episode = int(colony.arrays["episodes"][self.w])
         born = (episode << 32) + numbers.astype(np.int64)
         newborn = {
@@ -554,6 +560,7 @@ class _World:
             "action": -1,
             "executed": -1,
             "next_action": -1,
+            "caste": castes,
             "stage": Stage.NEWBORN,
             "streams": stream_state(colony.seeds[self.w], STREAM_BORN, born),
         }

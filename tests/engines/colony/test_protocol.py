@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_castes import drawn_castes
 from random_choices import NO_NOISE, NOISE
 from random_colonies import random_colony, with_nests
 from random_protocols import random_protocol
@@ -34,7 +35,9 @@ KERNELS = [
     ("q_learning", "frozen", "queues", True, "right_of_way", "half", "", ("trail", "compass"),
      (2, 2, False)),
 ]  # fmt: skip
-QUICK = (KERNELS[0], KERNELS[4])
+WITH_CASTES = ("sarsa", "shared", "paper", False, "right_of_way", "half", "a", ("trail", "a"))
+KERNELS.append(WITH_CASTES)
+QUICK = (KERNELS[0], KERNELS[4], WITH_CASTES)
 MARKED = [one if one in QUICK else pytest.param(one, marks=pytest.mark.slow) for one in KERNELS]
 TICKS = 14
 FOLLOWS = TrainingConfig("q_learning", 1.0, 1.0, 0.05, 1.0)
@@ -59,6 +62,13 @@ def drawn_cases(kernel, seed, n_worlds):
     )
     if len(more) > 2:
         drawn = with_nests(drawn, seed, *more[2])
+    if kernel is WITH_CASTES:
+        cues = [("trail", "a"), ("a", "compass")]
+        drawn = (
+            drawn_castes(drawn, seed, 2, True, cues)
+            or drawn_castes(drawn, 0, 2, True, cues)
+            or drawn
+        )
     rng = np.random.default_rng([seed, 7])
     population = {**drawn.population, "ends_at_delivery": False}
     population["capacity"] = capacity = population["ants"] + int(rng.integers(2, 9))
