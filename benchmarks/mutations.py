@@ -26,6 +26,8 @@ RUNS = "tests/engines/runs/test_against_reference.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
 NESTS = "tests/engines/colony/test_nests.py"
+RASTER = "tests/rendering/test_raster.py"
+CASTES = "tests/engines/colony/test_castes.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -33,6 +35,9 @@ FINDINGS = "tests/analysis/test_findings.py"
 ARCHIVES = "tests/files/test_archives.py"
 FILES = "tests/files/test_files.py"
 RESULTS = "tests/files/test_results.py"
+STUDIES = "tests/studies/test_runner.py"
+EXECUTORS = "tests/studies/test_executors.py"
+GROWING = "tests/commands/test_growing.py"
 RECORDING = "tests/viewer/test_recording.py"
 SERVER = "tests/live/test_server.py"
 SESSION = "tests/live/test_session.py"
@@ -45,12 +50,29 @@ SWEEPS = "tests/commands/test_sweep_measures.py"
 CHOICE = "tests/task/test_choice.py"
 OWN_RULES = "tests/rules"
 NUMBERS = "tests/task/test_numbers.py"
+ROLLOUT = "tests/envs/test_rollout.py"
+DESIGN = "tests/studies/test_design.py"
+SENSITIVITY = "tests/analysis/test_sensitivity.py"
+SEARCH = "tests/studies/test_search.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
     # Rules of users.
     ("rules/language.py", '"modulo({}, {})"', '"ti.floor({} / {})"', OWN_RULES),
     # Rules.
+    ("engines/colony/labour.py", "chance = 1.0 / (1.0 + raised)", "chance = 1.0 - raised", CASTES),
+    ("engines/colony/labour.py", "waits = drawn < 0.0", "waits = False", CASTES),
+    ("engines/colony/labour.py", "and trait(c.carries, ant) == 0:", "and True:", CASTES),
+    ("engines/colony/labour.py", "lowered > 0.0, lowered", "True, lowered", COLONY),
+    (
+        "engines/colony/learning.py",
+        "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
+        "does = True",
+        CASTES,
+    ),
+    ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
+    ("engines/colony/life.py", "ti.cast(bound <= word, ti.i32)", "0", COLONY),
+    ("task/caste.py", "int(quotas[i]) - quotas[i])", "quotas[i])", CASTES),
     ("engines/colony/steps.py", "if c.counts_without_food == 1:", "if False:", COLONY),
     ("engines/colony/steps.py", "ti.select(carries == had_food, age, 0)", "age", COLONY),
     (
@@ -61,7 +83,11 @@ MUTATIONS = [
     ),
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
-    ("engines/colony/steps.py", "homing.half", "v.half", COLONY),
+    ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
+    ("engines/colony/kernels.py", "features.carriers_follow if", "outbound if", CHOICE),
+    ("measures/tidy.py", "else parts", "else []", RESULTS_OF_RUNS),
+    ("rendering/rasteriser.py", "snapshot.ant_nests % len", "0 * snapshot.ant_nests % len", RASTER),
+    ("engines/colony/state.py", "np.where(carries, of_ants", "np.where(~carries, of_ants", NESTS),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),
@@ -130,9 +156,14 @@ MUTATIONS = [
     # Engines.
     ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
     ("engines/runs/kernels.py", "clock += a.evaporates", "clock += 1", RUNS),
+    ("engines/runs/rollout_kernel.py", "steps == a.max_steps", "steps > a.max_steps", ROLLOUT),
+    ("engines/runs/rollout_kernel.py", "base = own", "base = origin", ROLLOUT),
+    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", ROLLOUT),
+    ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
+    ("envs/vector.py", "else rows.any(0)", "else rows[-1]", ROLLOUT),
     ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
-    ("engines/colony/life.py", "c.age[ant] >= c.lifespan", "c.age[ant] > c.lifespan", COLONY),
+    ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
     ("engines/colony/life.py", "tick >= taken + c.regrowth", "tick > taken + c.regrowth", COLONY),
     ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
     ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),
@@ -213,6 +244,16 @@ MUTATIONS = [
     ("files/results.py", "if replace or not (", "if replace and not (", RESULTS),
     ("files/results.py", "max([started, *times]) - started", "0", RESULTS),
     ("studies/blocks.py", "== digest", '!= ""', "tests/studies/test_blocks.py"),
+    ("studies/blocks.py", "if path == self._path(header):", "if header:", STUDIES),
+    ("studies/runner.py", "missing[a] |= missing[place] & lacks", "pass", STUDIES),
+    ("studies/runner.py", "families[root] for root in roots", "0 for root in roots", STUDIES),
+    ("studies/runner.py", "(a < 0) | ~missing[a]", "True", EXECUTORS),
+    ("studies/executors.py", "if failures[piece] == TRIES:", "if True:", EXECUTORS),
+    ("studies/executors.py", "if versions != _versions():", "if False:", EXECUTORS),
+    ("studies/executors.py", "while len(coming) < most:", "while True:", EXECUTORS),
+    ("studies/shards.py", "if name != _OF_TIME", "if False", GROWING),
+    ("studies/sweep.py", "values[number, :, n]", "values[0, :, n]", GROWING),
+    ("files/results.py", "seeds <= wanted.get(point, nothing)", "True", GROWING),
     # Recorder and viewer.
     ("viewer/recorder.py", "actions + 16 *", "actions + 8 *", RECORDING),
     ("viewer/recorder.py", "headings + 8 * carrying", "headings + 8 * ~carrying", RECORDING),
@@ -278,6 +319,24 @@ MUTATIONS = [
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "made[one.name] = one.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
+    # Designs and searches.
+    ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
+    ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
+    ("studies/design.py", "random_base2(whole)[: self.samples]", "random_base2(whole)", DESIGN),
+    ("studies/design.py", "if self.kind == LATIN_HYPERCUBE else {}", "if False else {}", DESIGN),
+    ("analysis/sensitivity.py", "- drawn.mean(axis=0)", "", SENSITIVITY),
+    ("analysis/sensitivity.py", "(seeds - 1)) / seeds", "(seeds - 1))", SENSITIVITY),
+    ("analysis/sensitivity.py", '"seed": RANDOM_SEED', '"seed": 0', SENSITIVITY),
+    ("studies/search.py", "SeedSequence((self.seed, number))", "SeedSequence(self.seed)", SEARCH),
+    (
+        "studies/search.py",
+        "world=point.world[at]",
+        "world=point.world[: at.stop - at.start]",
+        SEARCH,
+    ),
+    ("studies/search.py", "max(seeds) + 1, max(seeds) + 1 + n", "n", SEARCH),
+    ("studies/search.py", "sign * (best - default)", "best - default", SEARCH),
+    ("studies/search.py", "PRUNED if done.state == PRUNED", "PRUNED if False", SEARCH),
 ]
 
 

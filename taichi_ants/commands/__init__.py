@@ -15,6 +15,8 @@ COMMANDS = {  # modules of this package with their help
     "colony": "study how colonies scale, or run one colony of any size",
     "bridge": "train colonies on a double bridge, where the shorter branch wins",
     "sweep": "run every combination of the settings in a file, and compare them",
+    "merge": "join the shards of a sweep, a comparison or a colony study",
+    "status": "show what is done in a folder of results, and how long is left",
     "render": "draw an episode, a colony, learning, or a policy",
     "check-rule": "compare the rules of a file with the plain reference",
     "watch": "watch and change ants in a browser while they run",

@@ -60,6 +60,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
             setattr(settings, name, QUICK[name])
         settings.world_kinds = tuple(one for one in WORLD_KINDS if one in settings.world_kinds)
         settings.sizes = tuple(sorted({1, *settings.sizes}))
+        settings.command = "colony"
         command_line.with_folder(settings, "colony")
     else:
         _check_live(settings, given, parser.error)
@@ -114,6 +115,7 @@ def _add_study(parser: command_line.Parser) -> None:
     parser.open_settings, parser.own_settings = ("training",), PLANNED
     command_line.add_settings(parser, _learning(0.3))
     command_line.add_common(parser)
+    command_line.add_machines(parser)
     command_line.add_results(parser, "colony")
 
 
@@ -183,6 +185,7 @@ def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingCon
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show its results if it is finished."""
     from taichi_ants.studies.colony_study import plan, study_of, write_results
+    from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
@@ -191,15 +194,16 @@ def study(settings: argparse.Namespace) -> None:
     conditions = plan(settings.world_kinds, settings.sizes, seeds, training, *lengths)
     asked = study_of(conditions, seeds)
 
-    def work(blocks: Path, ready: Path) -> Results:
-        with command_line.progress_bar("study") as progress:
-            where = {"threads": settings.threads, "arch": settings.arch}
-            outcomes = asked.run(blocks, progress, **where)
+    def work(blocks: Path, ready: Path) -> Results | None:
+        with command_line.progress_bar("study") as progress, chosen(settings) as how:
+            outcomes = asked.run(blocks, progress, **how)
+        if settings.shard:
+            return None
         return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
 
     words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}
     page = partial(make_page, settings, conditions, asked)
-    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page)
+    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page, asked)
 
 
 def make_page(
@@ -259,10 +263,17 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     """Return a new colony from the settings, at the start of its episode."""
     from taichi_ants import AntsError, Colony, load_policy, worlds
 
-    of_world = {"seed": settings.seed, **command_line.given_settings(settings).get("world", {})}
-    world = worlds.build(settings.world, **of_world)
+    given = command_line.given_settings(settings)
+    world = worlds.build(settings.world, **{"seed": settings.seed, **given.get("world", {})})
     policy = load_policy(settings.policy) if settings.policy else None
-    if settings.sharing == "frozen" and policy is None:
+    task = rules(settings, policy)
+    learns_nothing = not task.choice.needs_table
+    if learns_nothing and (policy or given.get("training")):
+        raise AntsError(
+            f"--task.choice.rule is {task.choice.rule}, by which ants choose without learning; "
+            "leave out --policy and the options of --training."
+        )
+    if settings.sharing == "frozen" and policy is None and not learns_nothing:
         raise AntsError(
             "--sharing frozen requires a policy; add --policy FILE, or choose another --sharing."
         )
@@ -270,8 +281,10 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     options: dict[str, Any] = {name: getattr(settings, name) for name in names}
     seeds = range(settings.seed, settings.seed + settings.colonies)
     options["q_values"] = policy.q_values if policy else None
-    training = training_config(settings, 0.1)
-    colony = Colony(world, rules(settings, policy), training, seeds, **options)
+    training = None if learns_nothing else training_config(settings, 0.1)
+    if learns_nothing and settings.sharing == "shared":  # the default
+        options["sharing"] = "frozen"
+    colony = Colony(world, task, training, seeds, **options)
     colony.begin_episode()
     return colony
 

@@ -22,6 +22,7 @@ from taichi_ants.studies.command_line import (
     WORLDS,
     Parser,
     add_common,
+    add_machines,
     add_results,
     add_settings,
     given_settings,
@@ -71,12 +72,14 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--planning-steps", **several, default=(3, 5), help=planning)
     add("--world", default="paper", metavar="WORLD", help=WORLDS)
     add_common(parser)
+    add_machines(parser)
     quick = f"use at most {QUICK_SEEDS} seeds and draw no animations"
     add("--quick", action="store_true", help=quick)
     add_results(parser, "compare")
     parser.open_settings, parser.own_settings = ("world", "training"), _FIXED
     add_settings(parser, Task())
     settings = parser.parse_args(arguments)
+    settings.command = "compare"
     if settings.quick:
         settings.seeds = min(settings.seeds, QUICK_SEEDS)
     return with_folder(settings, "compare")
@@ -146,6 +149,11 @@ def compare(settings: argparse.Namespace) -> None:
 
         return do_comparison(settings, study, worker, *folders)
 
+    def take(*given: Any) -> None:
+        from taichi_ants.report.results import take_results
+
+        take_results(*given)
+
     def page(*found: Any) -> str:
         from taichi_ants.report.results import make_page
 
@@ -156,7 +164,7 @@ def compare(settings: argparse.Namespace) -> None:
         if not (settings.out / MANIFEST).exists():
             worker.begin(import_module, "taichi_ants.report.results")  # slow, so start early
         study = build_study(settings)
-        work_or_show(settings, study.settings(), work, page=page)
+        work_or_show(settings, study.settings(), work, page=page, study=study, take=take)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -1,16 +1,22 @@
 """Sweep any settings of the world, the task, the learner or the colony, from a TOML file.
 
-FILE lists fixed settings, the values of settings to vary, seeds, and measures. The command runs
-every combination of values with every seed, and writes tables and a figure to a folder. See
-docs/sweeps.md.
+FILE lists fixed settings, the values or ranges of settings to vary, seeds, and measures. The
+command runs every combination of values, or the points of a design, with every seed, and writes
+tables and figures to a folder. With [search], it looks for the best settings. See docs/sweeps.md
+and docs/designs.md.
 """
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
+
+if TYPE_CHECKING:
+    from taichi_ants.studies.search import Search
 
 
 def parse_arguments(
@@ -22,27 +28,55 @@ def parse_arguments(
         parser.add_argument("file", type=Path, metavar="FILE", help="sweep to run (.toml)")
     parser.set_defaults(**({"file": file} if file else {}))
     command_line.add_common(parser)
+    command_line.add_machines(parser)
     name = f"sweep-{file.stem}" if file else "sweep-NAME for the file NAME.toml"
     command_line.add_results(parser, name, quick=False)
     settings = parser.parse_args(arguments)
-    settings.out = settings.out or Path("results", f"sweep-{settings.file.stem}")
-    return settings
+    settings.command, settings.text = "sweep", None
+    return command_line.with_folder(settings, f"sweep-{settings.file.stem}")
 
 
 def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
+    from taichi_ants.files import read_text
+    from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.sweep import read_sweep
+    from taichi_ants.studies.search import Search, read
 
     command_line.load_plugin(settings.plugin)
-    asked = read_sweep(settings.file)
+    settings.text = settings.text or read_text(settings.file)
+    asked = read(settings.file, settings.text)
+    if isinstance(asked, Search):
+        return _search(settings, asked)
+    if not settings.force:
+        asked.design.check_folder(settings.out)
 
     def work(blocks: Path, ready: Path) -> None:
-        with command_line.progress_bar("sweep") as progress:
-            where = {"threads": settings.threads, "arch": settings.arch}
-            values = asked.measured(blocks, progress, **where)
+        with command_line.progress_bar("sweep") as progress, chosen(settings) as how:
+            values = asked.measured(blocks, progress, **how)
+        if settings.shard:
+            return
         asked.write(values, ready, draws=not settings.no_figures)
         asked.write_series(blocks, ready)
+
+    work_or_show(settings, asked.facts(), work, study=asked.study, take=asked.take)
+
+
+def _search(settings: argparse.Namespace, asked: Search) -> None:
+    """Run a search, or show its results if it is finished."""
+    from taichi_ants.studies.executors import chosen
+    from taichi_ants.studies.result_folder import work_or_show
+
+    if settings.shard:
+        raise AntsError(
+            "a search cannot be split into shards, because each trial depends on those before it; "
+            "leave out --shard."
+        )
+
+    def work(blocks: Path, ready: Path) -> None:
+        with command_line.progress_bar("search") as progress, chosen(settings) as how:
+            found = asked.measured(blocks, progress, **how)
+        asked.write(found, ready, draws=not settings.no_figures)
 
     work_or_show(settings, asked.facts(), work)
 

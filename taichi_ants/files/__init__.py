@@ -119,15 +119,45 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     Raises ValueError if a row has a key that is not a column.
     """
 
-    def write(file: BinaryIO) -> None:
-        text = codecs.getwriter("utf-8")(file)
-        table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
-        table.writeheader()
-        for row in rows:
-            values = {n: v.item() if isinstance(v, np.generic) else v for n, v in row.items()}
-            table.writerow({n: None if v != v else v for n, v in values.items()})
+    write_atomically(path, lambda file: _write_rows(file, rows, columns, header=True))
 
-    write_atomically(path, write)
+
+class GrowingTable:
+    """A file as `write_csv` writes it, to which rows are appended while others read it.
+
+    The file contains whole rows after each `append`. Raises AntsError if it cannot be written.
+    """
+
+    def __init__(self, path: PathLike, columns: Sequence[str]) -> None:
+        self._path, self._columns = path, columns
+        with writing(path):
+            self._file = open(path, "wb", buffering=0)  # noqa: SIM115
+        self.append((), header=True)
+
+    def __enter__(self) -> GrowingTable:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._file.close()
+
+    def append(self, rows: Iterable[Mapping[str, Any]], header: bool = False) -> None:
+        """Append rows, all at once."""
+        text = io.BytesIO()
+        _write_rows(text, rows, self._columns, header)
+        with writing(self._path):
+            self._file.write(text.getvalue())
+
+
+def _write_rows(
+    file: BinaryIO, rows: Iterable[Mapping[str, Any]], columns: Sequence[str], header: bool
+) -> None:
+    text = codecs.getwriter("utf-8")(file)
+    table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
+    if header:
+        table.writeheader()
+    for row in rows:
+        values = {n: v.item() if isinstance(v, np.generic) else v for n, v in row.items()}
+        table.writerow({n: None if v != v else v for n, v in values.items()})
 
 
 @contextmanager

@@ -21,6 +21,10 @@ from taichi_ants.errors import AntsError
 MANIFEST = "manifest.json"
 REPORT = "report.txt"  # the text that commands print
 PAGE = "report.html"  # the whole result as a page
+UNFINISHED, BLOCKS = "unfinished", "blocks"  # the folder of work in progress, and that of blocks
+ROWS, FAILED = "rows", "failed.json"  # in UNFINISHED: tables of finished blocks, failed blocks
+# Settings that results of the same runs can differ in, with checksums of plugins.
+_OF_ALL_RUNS = ("version", "kind", "measures", "measure_every", "arch", "plugin")
 
 
 class ResultFolder:
@@ -30,42 +34,75 @@ class ResultFolder:
         path: The folder; it need not exist.
         settings: Everything that determines the results, in types that `files.to_json` accepts.
         leading: Settings that determine others; if they differ, messages name only these.
+        runs: The result of `Study.runs`, if the work is a study.
+        grows: Whether finished results of a part of these runs can become a part of the results.
     """
 
     def __init__(
-        self, path: str | Path, settings: Mapping[str, Any], leading: Sequence[str] = ()
+        self,
+        path: str | Path,
+        settings: Mapping[str, Any],
+        leading: Sequence[str] = (),
+        runs: Mapping[str, Any] | None = None,
+        grows: bool = False,
     ) -> None:
         self.path = Path(path)
+        self._runs, self._grows = {"runs": runs} if runs else {}, grows
         self.seconds_before = 0.0
         self._leading = leading
         self._settings = json.loads(files.to_json(settings))
-        self._unfinished = self.path / "unfinished"
-        self._blocks, self._ready = self._unfinished / "blocks", self._unfinished / "ready"
+        self._unfinished = self.path / UNFINISHED
+        self._blocks, self._ready = self._unfinished / BLOCKS, self._unfinished / "ready"
 
     def is_finished(self) -> bool:
         """Return whether the folder contains finished results of these settings.
 
-        Raises AntsError if it contains anything other than these results or work on them.
+        Raises AntsError if it contains anything other than these results, a part of them, or work
+        on them.
         """
         for place, what in ((self._unfinished, "unfinished work"), (self.path, "results")):
             if not (place / MANIFEST).exists():
                 continue
-            other = read_manifest(place)["settings"]
+            manifest = read_manifest(place)
+            other = manifest["settings"]
+            if other == self._settings:
+                return place == self.path
+            if place == self.path and self.part():
+                return False
+            if place == self._unfinished and self._is_part(manifest):
+                continue
             keys = dict.fromkeys([*self._settings, *other])
             different = [key for key in keys if self._settings.get(key) != other.get(key)]
             different = [key for key in different if key in self._leading] or different
-            if different:
-                raise AntsError(
-                    f"{str(self.path)!r} contains {what} of other settings ({', '.join(different)} "
-                    "differ); choose another --out, or give --force to replace them."
-                )
-            return place == self.path
+            raise AntsError(
+                f"{str(self.path)!r} contains {what} of other settings ({', '.join(different)} "
+                "differ); choose another --out, or give --force to replace them."
+            )
         if self.path.is_dir() and any(item != self._unfinished for item in self.path.iterdir()):
             raise AntsError(
                 f"{str(self.path)!r} contains files, but no finished results; "
                 "choose another --out, or give --force to add results to them."
             )
         return False
+
+    def part(self) -> dict[str, Any] | None:
+        """Return the manifest of finished results that are a part of these; None without any."""
+        if self._grows and (self.path / MANIFEST).exists():
+            manifest = read_manifest(self.path)
+            if manifest["settings"] != self._settings and self._is_part(manifest):
+                return manifest
+        return None
+
+    def _is_part(self, manifest: Mapping[str, Any]) -> bool:
+        """Return whether all runs of a manifest are also runs of this work."""
+        settings, own, theirs = manifest["settings"], self._runs.get("runs"), manifest.get("runs")
+        if any(settings.get(name) != self._settings.get(name) for name in _OF_ALL_RUNS):
+            return False
+        if not (own and theirs):
+            return False
+        wanted, nothing = seeds_by_point(own), frozenset[str]()
+        found = seeds_by_point(theirs).items()
+        return all(seeds <= wanted.get(point, nothing) for point, seeds in found)
 
     def check(self, may_lack: str | None = None) -> None:
         """Check that no file of finished results is altered or missing, except `may_lack`."""
@@ -80,13 +117,16 @@ class ResultFolder:
                 )
 
     @contextmanager
-    def work(self, replace: bool = False) -> Iterator[tuple[Path, Path]]:
+    def work(
+        self, replace: bool = False, more: Mapping[str, Any] | None = None
+    ) -> Iterator[tuple[Path, Path]]:
         """Yield a folder for blocks of work, which survive an interruption, and one for results.
 
         With `replace`, the work starts over; old results stay until the new ones are complete. Two
         processes can do the same work at once, because blocks are written atomically and each
-        process has its own folder for results. Raises AntsError if the folder cannot be written or
-        another process has finished the work.
+        process has its own folder for results. `more` is added to the manifest of the unfinished
+        work. Raises AntsError if the folder cannot be written or another process has finished the
+        work.
         """
         self._listed()  # if the manifest is damaged, this raises before the work
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
@@ -100,6 +140,7 @@ class ResultFolder:
             with tempfile.TemporaryDirectory(dir=self._ready) as name:
                 ready = Path(name)
                 contents = {"settings": self._settings, "seconds": self.seconds_before}
+                contents |= {**self._runs, **(more or {})}
                 _write_manifest(contents, ready).replace(self._unfinished / MANIFEST)
                 try:
                     yield self._blocks, ready
@@ -134,7 +175,7 @@ class ResultFolder:
         for path in paths:
             (self.path / path).parent.mkdir(parents=True, exist_ok=True)
             (ready / path).replace(self.path / path)
-        contents = {**manifest, "files": checksums, "settings": self._settings}
+        contents = {**manifest, "files": checksums, "settings": self._settings, **self._runs}
         _write_manifest(contents, ready).replace(self.path / MANIFEST)
         self._clear()
 
@@ -157,29 +198,41 @@ class ResultFolder:
             self._clear()
 
     def _seconds_so_far(self) -> float:
-        """Return the time that all processes have worked here, including killed ones.
-
-        A process starts by writing a manifest with the time before, and ends with its last block.
-        """
-        manifest = self._unfinished / MANIFEST
-        if not manifest.exists():
-            return 0.0
-        started = manifest.stat().st_mtime
-        times = [block.stat().st_mtime for block in self._blocks.rglob("*.npz")]
-        return read_manifest(self._unfinished)["seconds"] + max([started, *times]) - started
+        """Return the time that all processes have worked here, including killed ones."""
+        return seconds_of(self._unfinished)
 
     def _clear(self) -> None:
         """Remove the files of this class in `unfinished`, and the folder if it is then empty."""
         if not self._unfinished.is_dir():
             return
         (self._unfinished / MANIFEST).unlink(missing_ok=True)
-        for folder in (self._blocks, self._ready):
+        for folder in (self._blocks, self._ready, self._unfinished / ROWS):
             shutil.rmtree(folder, ignore_errors=True)
+        (self._unfinished / FAILED).unlink(missing_ok=True)
         with suppress(OSError):
             self._unfinished.rmdir()
 
     def _listed(self) -> dict[str, str]:
         return read_manifest(self.path)["files"] if (self.path / MANIFEST).exists() else {}
+
+
+def seconds_of(unfinished: Path) -> float:
+    """Return the time that all processes have worked on unfinished work.
+
+    A process starts by writing a manifest with the time before, and ends with its last block.
+    """
+    manifest = unfinished / MANIFEST
+    if not manifest.exists():
+        return 0.0
+    started = manifest.stat().st_mtime
+    times = [block.stat().st_mtime for block in (unfinished / BLOCKS).rglob("*.npz")]
+    return read_manifest(unfinished)["seconds"] + max([started, *times]) - started
+
+
+def seeds_by_point(runs: Mapping[str, Any]) -> dict[str, frozenset[str]]:
+    """Return the names of the seeds of each point, from the result of `Study.runs`."""
+    seeds = [frozenset(names) for names in runs["seeds"]]
+    return {point: seeds[n] for point, n in zip(runs["points"], runs["seeds_of"], strict=True)}
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files, learners, worlds
-from taichi_ants.checks import check_own_rules, checked_seeds, checked_share, checked_table
+from taichi_ants.checks import (
+    check_own_rules,
+    checked_seeds,
+    checked_share,
+    checked_table,
+    refuse_castes,
+)
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid
@@ -66,6 +72,7 @@ class Setup:
         expect("world", self.world, str)
         expect("task", self.task, Task)
         check_cues(self.task)
+        refuse_castes(self.task, "the live page")
         if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "independent"))
             learners.get(self.policy.learner)

@@ -111,6 +111,7 @@ def record_colony(
     """
     expect("colony", colony, Colony)
     checks.check_one_nest(colony, "record_colony")
+    checks.refuse_castes(colony.task, "record_colony")
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
     checks.check_progress(progress)

@@ -127,8 +127,8 @@ class WorldState:
     """The state of a world in an episode.
 
     `ground` maps each cell to EMPTY, OBSTACLE, FOOD or QUEEN; it is EMPTY under ants. `ants` maps
-    cells to ants. `fields` are further pheromones by name, `outbound` and `homing` the names of the
-    cues.
+    cells to ants. `fields` are further pheromones by name. `cues` are the names of the outbound and
+    the homing cue by caste.
     """
 
     def __init__(
@@ -136,8 +136,7 @@ class WorldState:
         world: World,
         pheromone: Pheromone,
         fields: Mapping[str, Field] | None = None,
-        outbound: str = "trail",
-        homing: str = "compass",
+        cues: Sequence[tuple[str, str]] = (("trail", "compass"),),
         foods: Sequence[Food] = (),
         rules: Mapping[str, Parameters] | None = None,
     ) -> None:
@@ -155,16 +154,17 @@ class WorldState:
         self.pheromone = pheromone
         self.trail = Trail(world, pheromone, rules=rules)
         self.fields = {name: Trail(world, one, True, rules) for name, one in (fields or {}).items()}
-        self.outbound, self.homing = outbound, homing
+        self.cues = cues
 
     def has_compass(self, ant: Ant) -> bool:
         """Return whether an ant with this load looks for cells nearer to the queen."""
-        return ant.carries and self.homing == "compass"
+        return ant.carries and self.cues[ant.caste][1] == "compass"
 
     def cue(self, ant: Ant) -> Trail:
         """Return the pheromone that an ant follows; with a compass, that of ants without food."""
-        uses_homing = ant.carries and self.homing != "compass"
-        return self.pheromone_named(self.homing if uses_homing else self.outbound)
+        outbound, homing = self.cues[ant.caste]
+        uses_homing = ant.carries and homing != "compass"
+        return self.pheromone_named(homing if uses_homing else outbound)
 
     def pheromone_named(self, name: str) -> Trail:
         """Return the trail, or a further field."""

@@ -38,9 +38,10 @@ from taichi_ants.report.comparison import (
     what_is_seen,
 )
 from taichi_ants.report.page import made_facts, setting_facts
-from taichi_ants.studies.blocks import Outcome
+from taichi_ants.studies.blocks import Blocks, Outcome
 from taichi_ants.studies.command_line import given_settings, load_plugin, progress_bar
-from taichi_ants.studies.runner import RunPoint, Study
+from taichi_ants.studies.executors import Work, chosen
+from taichi_ants.studies.runner import VALUE, RunPoint, Study
 from taichi_ants.studies.worker_process import WorkerProcess
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import record_colony
@@ -57,11 +58,12 @@ def do_comparison(
     worker: WorkerProcess,
     blocks: Path,
     ready: Path,
-) -> tuple[Results, Seen]:
+) -> tuple[Results, Seen] | None:
     """Do the blocks of a study that are missing in `blocks`, and write all results to `ready`.
 
     Returns:
-        The results, and the figures and recordings of the page.
+        The results, and the figures and recordings of the page; None for a shard, which has no
+        results.
     """
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
     world, task, steps = first.world, first.task, first.max_steps
@@ -69,8 +71,12 @@ def do_comparison(
     worker.begin(rehearse, first, settings.plugin, where, settings.quick)
     discounts = tuple(dict.fromkeys(settings.discounts))
     exact = worker.begin(bounds.bound_rows, world, task, discounts, steps)
-    arrays = measured(study, blocks, where)
-    comparison, tables = with_curves(study, blocks, comparison_of(settings, study, arrays))
+    with chosen(settings) as how:
+        arrays = measured(study, blocks, where, **how)
+        if settings.shard:
+            return None
+        comparison = comparison_of(settings, study, arrays)
+        comparison, tables = with_curves(study, blocks, comparison, **how)
     arrays |= {_CURVE + name: curve for name, curve in comparison.curves.items()}
     archives.write(ready / RUNS, arrays)
     follow = partial(evaluate, **where)
@@ -109,20 +115,38 @@ def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draw
 
 
 def measured(
-    study: Study[RunPoint], folder: Path, where: Mapping[str, Any]
+    study: Study[RunPoint], folder: Path, where: Mapping[str, Any], **how: Any
 ) -> dict[str, np.ndarray]:
-    """Return measures of the runs and behaviours of the final policies: arrays (points, seeds)."""
+    """Return measures of the runs and behaviours of the final policies: arrays (points, seeds).
 
-    def reduce(points: Sequence[RunPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
-        followed = what_policies_do(points[0], seeds, outcome["q_values"])
-        return {**measures_of_runs(outcome), **followed}
-
+    `how` has further arguments of `Study.in_blocks`.
+    """
     with progress_bar("training") as progress:
         # Compile all kernels first; this needs one thread, and the worker process uses another.
         for point in {point.training.learner: point for point in study.points}.values():
             short = replace(point, episodes=1, max_steps=1, rollouts=1)
-            reduce((short,), (0,), short.do((short,), (0,), None, lambda share: None, where))
-        return study.reduced(folder, reduce, progress, **where)
+            Work((short,), (0,), None, with_measures, where).do()
+        return study.reduced(folder, with_measures, progress, **{**where, **how})
+
+
+def with_measures(points: Sequence[RunPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
+    """Return an outcome with the measures of its runs, and with what their policies do."""
+    followed = what_policies_do(points[0], seeds, outcome["q_values"])
+    values = {**measures_of_runs(outcome), **followed}
+    return {**outcome, **{f"{VALUE}{name}": array for name, array in values.items()}}
+
+
+def take_results(folder: Path, runs: Mapping[str, Any], blocks: Blocks) -> None:
+    """Add finished results, whose `Study.runs` were `runs`, to the blocks."""
+    arrays = archives.read(folder / RUNS)
+    for row, place in enumerate(runs["rows"]):
+        values = {
+            f"{VALUE}{name}": array[None, row]
+            for name, array in arrays.items()
+            if not name.startswith(_CURVE)
+        }
+        seeds = runs["seeds"][runs["seeds_of"][place]]
+        blocks.add([runs["points"][place]], seeds, values)
 
 
 def what_policies_do(point: RunPoint, seeds: Sequence[int], q_values: np.ndarray) -> Outcome:
@@ -170,18 +194,23 @@ def world_name(settings: argparse.Namespace, study: Study[RunPoint]) -> str:
 
 
 def with_curves(
-    study: Study[RunPoint], blocks: Path, comparison: Comparison
+    study: Study[RunPoint], blocks: Path, comparison: Comparison, **how: Any
 ) -> tuple[Comparison, dict[tuple[int, int], np.ndarray]]:
     """Read learning curves and the examples' tables of action values from finished blocks.
+
+    Results that were taken over have only measures, so these runs are done again; `how` has the
+    arguments of `Study.in_blocks`.
 
     Returns:
         The comparison with curves, and the tables by indices of row and seed.
     """
     shown, tables = examples(comparison), {}
     rows = [row for row, _ in shown] + [curve_row(comparison, *one) for one in comparison.learners]
+    runs = np.isin(np.arange(len(study.in_order)), rows)[:, None] & study.share(1, 1)
+    study.complete(blocks, runs, "q_values", reduce=with_measures, **how)
 
     def outcomes() -> Iterator[tuple[int, Outcome]]:
-        for row, outcome in study.read(blocks, rows):
+        for row, outcome in study.read(blocks, rows, "q_values"):
             for run in (run for one, run in shown if one == row):
                 tables[row, run] = outcome["q_values"][run].copy()
             yield row, outcome

@@ -20,8 +20,9 @@ if TYPE_CHECKING:
     from taichi_ants import World
 
 EXIT_BAD_INPUT = 2
+MOST_SHARDS = 100_000
 # Help for options that several commands have.
-PLUGIN = "Python file that registers learners, observations or worlds"
+PLUGIN = "Python file that registers learners, observations, worlds or measures"
 THREADS = "number of CPU threads (default: all)"
 # Names of worlds, because an import of their registry would import NumPy.
 WORLDS = (
@@ -124,9 +125,36 @@ def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) 
     add("--no-figures", action="store_true", help="skip figures and animations")
 
 
+def add_machines(parser: argparse.ArgumentParser) -> None:
+    """Add the options of commands that can spread their work, see `executors.chosen`."""
+    add = parser.add_argument
+    workers = "number of worker processes on this machine (default: all work in this process)"
+    add("--workers", type=whole_number(1, 1024), metavar="N", help=workers)
+    shard = (
+        "compute only the I-th of N equal parts, for example of a job array; "
+        "`taichi-ants merge` joins the parts"
+    )
+    add("--shard", type=_shard, metavar="I/N", help=shard)
+
+
+def _shard(text: str) -> tuple[int, int]:
+    """Return the numbers of a shard such as 2/3."""
+    number, slash, shards = text.partition("/")
+    if not (slash and number.isdecimal() and shards.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a shard; write I/N, for example 2/3")
+    if not 1 <= int(number) <= int(shards) <= MOST_SHARDS:
+        raise argparse.ArgumentTypeError(
+            f"there is no shard {text}; write I/N with I from 1 to N, and N at most {MOST_SHARDS}"
+        )
+    return int(number), int(shards)
+
+
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """Return the settings with a folder for the results, which --quick changes."""
-    settings.out = settings.out or Path("results", f"{name}-quick" if settings.quick else name)
+    """Return the settings with a folder for the results, which --quick and --shard change."""
+    name = f"{name}-quick" if getattr(settings, "quick", False) else name
+    if shard := getattr(settings, "shard", None):
+        name = f"{name}-shard-{shard[0]}-of-{shard[1]}"
+    settings.out = settings.out or Path("results", name)
     return settings
 
 
@@ -211,7 +239,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
         _discard_output()
         text = str(error) or "the command needs more memory than is available"
         notice(f"error: {text.rstrip('.')}.")
-        status = EXIT_BAD_INPUT
+        status = getattr(error, "exit_status", EXIT_BAD_INPUT)
     sys.exit(status)
 
 

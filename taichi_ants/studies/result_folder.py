@@ -10,18 +10,31 @@ import subprocess
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
 from taichi_ants import __version__, files
-from taichi_ants.files.results import PAGE, REPORT, ResultFolder, checksum_of, read_manifest
+from taichi_ants.files.results import (
+    FAILED,
+    PAGE,
+    REPORT,
+    ResultFolder,
+    checksum_of,
+    read_manifest,
+    seeds_by_point,
+)
+from taichi_ants.studies.blocks import Blocks
+from taichi_ants.studies.runner import FailedBlocksError, Study
 
 _PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
 Results = TypeVar("Results")
 # (folder of results, results if just computed, manifest) -> HTML
 Pages = Callable[[Path, Results | None, Mapping[str, Any]], str]
+# (folder of finished results, their `Study.runs`, blocks to which it adds them)
+Take = Callable[[Path, Mapping[str, Any], Blocks], None]
 
 
 def work_or_show(
@@ -30,6 +43,8 @@ def work_or_show(
     work: Callable[[Path, Path], Results],
     leading: Sequence[str] = (),
     page: Pages[Results] | None = None,
+    study: Study[Any] | None = None,
+    take: Take | None = None,
 ) -> None:
     """Compute the results of a command unless its folder has them, and print the report.
 
@@ -39,16 +54,26 @@ def work_or_show(
         work: A function of two folders, for blocks and for results; it writes the report.
         leading: The argument of `ResultFolder`, whose errors are raised.
         page: A function that makes the page; a missing page is made again.
+        study: The study that `work` computes, if any.
+        take: A function that writes the blocks of finished results that are a part of the study.
     """
     plugin = checksum_of(Path(settings.plugin)) if settings.plugin else None
     facts = {**determines, "arch": settings.arch, "plugin": plugin}
-    folder = ResultFolder(settings.out, facts, leading)
+    shard = getattr(settings, "shard", None)
+    runs = study.runs(shard or (1, 1)) if study else None
+    folder = ResultFolder(settings.out, facts, leading, runs, take is not None)
     if not settings.force and folder.is_finished():
         _show(settings, folder, page)
     else:
         began = time.perf_counter()
-        with folder.work(settings.force) as (blocks, ready):
-            results = work(blocks, ready)
+        with folder.work(settings.force, _asked(settings)) as (blocks, ready):
+            if take and not settings.force and (part := folder.part()):
+                _take(folder, part, take, blocks)
+            with _noting_failures(blocks.parent / FAILED):
+                results = work(blocks, ready)
+            if shard:
+                print(_of_shard(settings, *shard))
+                return
             report = files.read_text(ready / REPORT)
             seconds = folder.seconds_before + time.perf_counter() - began
             made = provenance(sys.argv) | {"seconds": seconds, "figures": not settings.no_figures}
@@ -58,6 +83,38 @@ def work_or_show(
         print(f"{report}\n{seconds:.1f} s; all results are in {settings.out}/")
     if page:
         print(settings.out / PAGE)
+
+
+def _asked(settings: Namespace) -> dict[str, Any]:
+    """Return what `merge` needs to run a command again, for the manifest of unfinished work."""
+    return {"command": getattr(settings, "command", None), "options": vars(settings)}
+
+
+def _take(folder: ResultFolder, part: Mapping[str, Any], take: Take, blocks: Path) -> None:
+    """Write the blocks of finished results, unless a process that was killed has done that."""
+    saved = Blocks(blocks)
+    runs = seeds_by_point(part["runs"]).items()
+    if not all(saved.has(point, seed) for point, seeds in runs for seed in seeds):
+        folder.check()
+        take(folder.path, part["runs"], saved)
+
+
+@contextmanager
+def _noting_failures(path: Path) -> Iterator[None]:
+    """Write the failed blocks of a study to a file, for `status`."""
+    path.unlink(missing_ok=True)
+    try:
+        yield
+    except FailedBlocksError as error:
+        files.write_text(path, files.to_json(error.several, indent=2))
+        raise
+
+
+def _of_shard(settings: Namespace, number: int, shards: int) -> str:
+    return (
+        f"Shard {number} of {shards} is finished in {settings.out}/; when all shards are finished, "
+        "join them with `taichi-ants merge FOLDER ... --out FOLDER`."
+    )
 
 
 def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None) -> None:

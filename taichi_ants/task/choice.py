@@ -24,7 +24,8 @@ class Choice(Settings, path="task.choice"):
     - "softmax" takes action a with a probability proportional to exp(Q(s, a) / temperature).
     - "deneubourg" needs no action values. The ant gives at the queen, picks up food in view, and
       otherwise enters an open cell ahead with a probability proportional to (k + level)^exponent,
-      after Deneubourg et al. (1990). See `docs/colony.md`. Only colonies support it.
+      after Deneubourg et al. (1990). See `docs/colony.md`. Only colonies support it. Levels are
+      those of the outbound cue or, for ants with food, of the pheromone `carriers_follow`.
     - Other names are those of your rules, see `taichi_ants.rules`. Only colonies support them.
 
     With "greedy" and "softmax", ants also explore: with probability epsilon, any action is taken.
@@ -47,6 +48,11 @@ class Choice(Settings, path="task.choice"):
         float | None,
         Is("exponent of the attraction of a cell; larger values follow stronger trails more"),
         Is(least=0, most=20, usual=2.0, only=("rule", "deneubourg")),
+    ] = None
+    carriers_follow: Annotated[
+        str | None,
+        Is("pheromone whose levels ants with food compare; none: the outbound cue"),
+        Is(only=("rule", "deneubourg")),
     ] = None
 
     @classmethod

@@ -100,6 +100,11 @@ class Pheromone(Settings, path="task.pheromone"):
         return own("evaporation", self.evaporation)
 
     @property
+    def darkest(self) -> int:
+        """The level that pictures show in the darkest colour: a deposit, or ten if they add up."""
+        return min(self.cap or 0, 10 * self.level) if self.deposit == "add" else self.level
+
+    @property
     def fades_after(self) -> int:
         """Ticks with food after which the deposits of an ant are 0, if they fade, else 0."""
         return -(-int(self.level) // self.slope) if self.slope else 0

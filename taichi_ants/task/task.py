@@ -12,10 +12,12 @@ from taichi_ants.errors import AntsError, shown
 from taichi_ants.rules.registry import Parameters, Rule, own, words
 from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
+from taichi_ants.task.caste import Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
-from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_STEPS
+from taichi_ants.task.constants import MAX_CASTES, MAX_FOOD_KINDS, MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.food import Food
+from taichi_ants.task.labour import Labour
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -147,6 +149,12 @@ class Task(Settings, path="task"):
     foods: Annotated[
         Named[Food], Is("kinds of food, in the order of their numbers in worlds; colonies only")
     ] = field(default_factory=Named)
+    castes: Annotated[
+        Named[Caste], Is("castes of ants, in the order of their numbers; colonies only")
+    ] = field(default_factory=Named)
+    labour: Annotated[Labour, Is("rule by which ants start and stop foraging")] = field(
+        default_factory=Labour
+    )
     reward: Annotated[
         str,
         Is("rule of rewards: by_event (task.rewards), or the name of your rule; colonies only"),
@@ -161,6 +169,7 @@ class Task(Settings, path="task"):
         self._check_choice()
         self._check_fields()
         self._check_foods()
+        self._check_castes()
         self._check_rules()
 
     def _check_foods(self) -> None:
@@ -237,6 +246,76 @@ class Task(Settings, path="task"):
         grows = any(food.regrowth is not None for food in self.foods.values())
         return self.life.regrowth is not None or self.life.wander is not None or grows
 
+    def _check_castes(self) -> None:
+        if len(self.castes) > MAX_CASTES:
+            raise AntsError(
+                f"`task.castes` has {len(self.castes)} castes; at most {MAX_CASTES} are allowed."
+            )
+        for name, caste in self.castes.items():
+            self._check_caste(f"`task.castes.{name}", caste)
+        nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
+        for nest in (nests or {0}) if self.castes else ():
+            shares_in(self.castes, nest)
+        has_threshold = any(caste.threshold.exists for caste in self.castes.values())
+        if self.labour.divides and not has_threshold:
+            raise AntsError(
+                f"`task.labour.rule` is {self.labour.rule!r}, but ants have no thresholds; add a "
+                "caste with a `threshold` to `task.castes`."
+            )
+
+    def _check_caste(self, path: str, caste: Caste) -> None:
+        """Raise an AntsError that names `path` if a caste does not fit the other settings."""
+        if caste.threshold.exists and not self.labour.divides:
+            raise AntsError(
+                f"{path}.threshold` is {caste.threshold.distribution!r}; leave it out unless "
+                "`task.labour.rule` is 'thresholds'."
+            )
+        rules = {
+            "greedy": ("policy", "epsilon", "learning_rate", "discount"),
+            "softmax": ("policy", "epsilon", "learning_rate", "discount", "temperature"),
+            "deneubourg": ("k", "exponent"),
+        }
+        for name in {one for several in rules.values() for one in several}:
+            value = getattr(caste, name)
+            if value is not None and name not in rules[self.choice.rule]:
+                raise AntsError(
+                    f"{path}.{name}` is {shown(value)}; leave it out, because `task.choice.rule` "
+                    f"is {self.choice.rule!r}."
+                )
+        pheromones = (TRAIL, *self.fields)
+        for name in caste.laid(pheromones):
+            if name not in pheromones:
+                raise AntsError(
+                    f"{path}.lays` is {shown(caste.lays)}; it must be all, none, or names of "
+                    f"{', '.join(pheromones)}, separated by commas."
+                )
+        for setting, cues in self._cues().items():
+            cue = getattr(caste, setting)
+            if cue is not None and cue not in cues:
+                raise AntsError(
+                    f"{path}.{setting}` is {shown(cue)}; it must be one of {', '.join(cues)}, or "
+                    "the name of a field that you add to `task.fields`."
+                )
+
+    def cues_of(self, caste: Caste | None) -> tuple[int, int]:
+        """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
+        names = [
+            getattr(caste, setting, None) or getattr(self, setting) for setting in self._cues()
+        ]
+        return self.number_of(names[0]), self.number_of(names[1])
+
+    def with_policies(self, policy: str) -> Task:
+        """Return the task with another policy for the castes that have one."""
+        follow = [name for name, caste in self.castes.items() if caste.policy is not None]
+        return self.but(castes={name: {"policy": policy} for name in follow})
+
+    @property
+    def all_cues(self) -> tuple[tuple[int, int], ...]:
+        """The numbers of the outbound and homing cues of all castes, without repetitions."""
+        if not self.castes:
+            return (self.cues_of(None),)
+        return tuple(sorted({self.cues_of(caste) for caste in self.castes.values()}))
+
     @classmethod
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "foraging" and "queueing"."""
@@ -248,6 +327,18 @@ class Task(Settings, path="task"):
                 f"`task.observation` is {self.observation!r}; it must be 'paper' if "
                 f"`task.choice.rule` is {self.choice.rule!r}, which chooses without states."
             )
+        followed, pheromones = self.choice.carriers_follow, (TRAIL, *self.fields)
+        if followed is not None and followed not in pheromones:
+            raise AntsError(
+                f"`task.choice.carriers_follow` is {shown(followed)}; it must be one of "
+                f"{', '.join(pheromones)}, or the name of a field that you add to `task.fields`."
+            )
+        if followed is not None and self.homing_cue != COMPASS:
+            raise AntsError(
+                f"`task.choice.carriers_follow` is {shown(followed)}, but `task.homing_cue` is "
+                f"{shown(self.homing_cue)}, which ants with food follow already; leave one of them "
+                "out."
+            )
 
     def _check_fields(self) -> None:
         for name in (TRAIL, COMPASS):
@@ -257,10 +348,7 @@ class Task(Settings, path="task"):
                     "name."
                 )
         pheromones = (TRAIL, *self.fields)
-        for setting, cues in (
-            ("outbound_cue", pheromones),
-            ("homing_cue", (COMPASS, *pheromones)),
-        ):
+        for setting, cues in self._cues().items():
             cue = getattr(self, setting)
             if cue not in cues:
                 raise AntsError(
@@ -273,6 +361,11 @@ class Task(Settings, path="task"):
                     f"`task.observation` is {self.observation!r}, which reads the field {name!r}; "
                     f"add `task.fields.{name}`."
                 )
+
+    def _cues(self) -> dict[str, tuple[str, ...]]:
+        """Return the names of the cues that each setting allows."""
+        pheromones = (TRAIL, *self.fields)
+        return {"outbound_cue": pheromones, "homing_cue": (COMPASS, *pheromones)}
 
     def __repr__(self) -> str:
         """Return the settings that differ from the paper's."""

@@ -39,7 +39,10 @@ OUTSIDE = {
     "struct",
     "typing",
 }
-RULES = {"Choice", "Field", "Food", "Life", "Pheromone", "Rewards", "Task", "Traffic"}
+RULES = {
+    *("Caste", "Choice", "Field", "Food", "Labour", "Life"),
+    *("Pheromone", "Rewards", "Task", "Threshold", "Traffic"),
+}
 
 
 FILES = sorted(FOLDER.rglob("*.py"))

@@ -56,7 +56,7 @@ def test_blocks_cover_all_runs_once_with_one_task_and_learner_each(study):
     done = []
     limit = runner._STEPS_OF_A_BLOCK // (6 * 80)
     for some, at in study.blocks():
-        points, seeds = POINTS[some], SEEDS[at]
+        points, seeds = [POINTS[p] for p in some], [SEEDS[s] for s in at]
         assert len(points) * len(seeds) <= limit
         assert len({(p.task, p.training.learner) for p in points}) == 1
         done += itertools.product(points, seeds)
@@ -67,9 +67,9 @@ def test_blocks_cover_all_runs_once_with_one_task_and_learner_each(study):
 def test_blocks_are_limited_in_runs_too():
     short = replace(POINTS[0], episodes=1, max_steps=1, rollouts=1)
     study = Study((short,), tuple(range(9000)))
-    assert max(at.stop - at.start for _, at in study.blocks()) <= 5000
+    assert max(len(at) for _, at in study.blocks()) <= 5000
     long = replace(POINTS[0], episodes=10**6, max_steps=10**7)
-    assert {at.stop - at.start for _, at in Study((long,), (0, 1)).blocks()} == {1}
+    assert {len(at) for _, at in Study((long,), (0, 1)).blocks()} == {1}
 
 
 def test_a_study_of_runs_is_training_and_evaluation(study, tmp_path):
@@ -130,6 +130,56 @@ def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
     assert "q_values" not in outcomes[own]  # a table for each ant is not kept
 
 
+@pytest.mark.parametrize("shards", [1, 2, 3, 7, 30])
+def test_shards_have_equal_work_and_keep_points_with_their_tables(shards):
+    seeds = (3, 5, 8, 1, 0)
+    one = replace(ALONE, world=WORLDS[0])
+    large = replace(one, ants=9)
+    study = Study((large, replace(one, ants=4, episodes=0, after=one)), seeds)
+    shares = [study.share(number, shards) for number in range(1, shards + 1)]
+    assert (sum(share.astype(int) for share in shares) == 1).all()
+    place, after = (study.in_order.index(study.points[1]), study.in_order.index(one))
+    for share in shares:
+        assert (share[place] == share[after]).all()
+    works = [study.weights[share].sum() for share in shares]
+    heaviest = study.weights[study.in_order.index(large), 0]
+    assert max(works) - min(works) <= 2 * heaviest
+    if shards == 30:
+        assert sum(share.any() for share in shares) == 2 * len(seeds)
+
+
+def test_shards_fill_one_folder(tmp_path):
+    study = Study((replace(ALONE, ants=4, episodes=0, after=ALONE), ALONE), (3, 5))
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    for number in (2, 1):
+        assert study.run(tmp_path / "a", shard=(number, 2)) == {}
+    blocks = set((tmp_path / "a").iterdir())
+    assert same(study.run(tmp_path / "a"), study.run(tmp_path / "b"))
+    assert set((tmp_path / "a").iterdir()) == blocks
+
+
+def only_deliveries(points, seeds, outcome):
+    return {"value_deliveries": outcome["deliveries"].sum(axis=2)}
+
+
+def test_tables_that_were_not_saved_are_learned_again_for_the_points_that_need_them(tmp_path):
+    copies = replace(ALONE, ants=4, episodes=0, after=ALONE)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    few = Study((ALONE,), (3, 5)).reduced(tmp_path / "a", only_deliveries)
+    grown = Study((copies, ALONE), (3, 5))
+    ((_, saved),) = Study((ALONE,), (3, 5)).read(tmp_path / "a", (0,))
+    assert saved.keys() == {"value_deliveries"}
+    of_copies = np.array([[False, False], [True, True]])
+    grown.complete(tmp_path / "a", of_copies, "deliveries")
+    plain = grown.run(tmp_path / "b")
+    ((_, found),) = grown.read(tmp_path / "a", [1], "deliveries")
+    for name, array in plain[copies].items():
+        assert np.array_equal(found[name], array)
+    assert np.array_equal(few["deliveries"][0], plain[ALONE]["deliveries"].sum(axis=1))
+
+
 def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
     """With worlds of their own, with one for all, from a pool, and going on from others."""
     seeds = (3, 5, 8, 1, 0)
@@ -140,7 +190,7 @@ def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
     study, found = Study(points, seeds), []
     for size in (runner._NUMBERS_OF_A_BLOCK, 8_000):
         monkeypatch.setattr(runner, "_NUMBERS_OF_A_BLOCK", size)
-        blocks = [[at for some, at in study.blocks() if some.start == p] for p in range(6)]
+        blocks = [[at for some, at in study.blocks() if some[0] == p] for p in range(6)]
         folder = tmp_path / str(size)
         folder.mkdir()
         found.append(study.run(folder))
@@ -151,11 +201,24 @@ def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
 
 def test_a_block_of_colonies_is_limited_in_memory(monkeypatch):
     """To a quarter of a gigabyte, but it has one seed at least."""
+    monkeypatch.setattr(runner, "_WORK_OF_A_BLOCK", 1e12)
     many = replace(ALONE, world=WORLDS[0], ants=10_000, start="spread")
     assert 100 < many.runs_of_a_block < 1000
     tables = replace(many, sharing="independent")
     assert 1 <= tables.runs_of_a_block < many.runs_of_a_block / 10
     assert replace(many, ants=16_000_000, capacity=16_000_000).runs_of_a_block == 1
+
+
+@pytest.mark.parametrize("ants", [1, 16, 500, 10**6])
+def test_a_block_of_colonies_is_limited_in_work(ants):
+    """To that of 10^8 ticks of an ant, or to one seed."""
+    diffuses = replace(LIVELY, pheromone=Pheromone("exponential", half_life=9, diffusion=0.1))
+    for task in (LIVELY, diffuses):
+        point = replace(ALONE, world=WORLDS[0], task=task, start="spread", episodes=50, ticks=1000)
+        point = replace(point, ants=ants, capacity=10**6 + 1)
+        assert point.weight >= ants * 52_000
+        assert point.runs_of_a_block * point.weight <= 1e8 or point.runs_of_a_block == 1
+    assert point.weight > 52_000 * (ants + 0.07 * WORLDS[0].grid.size)
 
 
 def test_copies_follow_what_another_point_has_learned_and_train_nothing(tmp_path):

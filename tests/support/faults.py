@@ -113,7 +113,8 @@ def assert_it_survives(
         if ended != KILLED:
             assert ended == 2
             assert_one_sentence(said.read_text("utf-8"))
-        assert run(name, [*arguments, "--out", place]) == (0, ""), f"operation {number}"
+        ended_with = run(name, [*arguments, "--out", place])
+        assert ended_with == (0, ""), f"operation {number}: {ended_with}"
         assert everything(place) == expected, f"operation {number}"
         shutil.rmtree(place)
     raise AssertionError("it does not come to an end")

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import taichi as ti
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import learning, life, own_inputs, steps, trail
+from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
 from taichi_ants.engines.colony.own_rules import own_rule
 from taichi_ants.engines.plugin_check import checked_plugin
@@ -47,9 +47,9 @@ class Features(NamedTuple):
 
     With `own_tables` there is a table for each slot, not one for each world; for the others, see
     `ColonyState` and `Pheromone`. `dense` and `views` have an entry for each pheromone, the trail
-    first. The cues and `reads` are numbers of pheromones; -1 is the compass. A model does not pay
-    for features that it does not use: kernels without births, deaths or food that changes are
-    faster, and compile much faster.
+    first. The cues, `carriers_follow` and `reads` are numbers of pheromones. -1 is the compass, or
+    means that ants with food follow their cue. A model does not pay for features that it does not
+    use: kernels without births, deaths or food that changes are faster, and compile much faster.
     """
 
     learner: Learner | None
@@ -60,6 +60,7 @@ class Features(NamedTuple):
     views: tuple[str, ...]
     outbound: int
     homing: int
+    carriers_follow: int
     reads: tuple[int, ...]  # of the observation
     traffic: Traffic
     ants_change: bool
@@ -71,11 +72,38 @@ class Features(NamedTuple):
     choice: str = "greedy"
     slips: bool = False
     misreads: bool = False
+    n_castes: int = 0  # 0: ants have no castes
+    cues: tuple[tuple[int, int], ...] = ()  # of all castes, outbound and homing, if they differ
+    has_labour: bool = False
     rules: tuple[Rule, ...] = ()  # your own rules, in the order of their parameters
     reward: str = "by_event"
     deposits: tuple[str, ...] = ()  # the rules of each pheromone, if any is your own
     evaporations: tuple[str, ...] = ()
     fields: tuple[str, ...] = ()  # the names of all pheromones, if a rule of your own reads them
+
+
+class Cues(NamedTuple):
+    """The cues of some ants while kernels compile: numbers of pheromones, and their views.
+
+    Ants with food follow the pheromone `followed`, see `steps.cue_level`.
+    """
+
+    outbound: int
+    homing: int
+    followed: int
+    has_compass: bool
+    half: bool
+    homing_view: str
+
+
+def cues_of(features: Features, outbound: int, homing: int) -> Cues:
+    """Return the cues with these numbers; -1 is the compass."""
+    half, followed, view = features.views[outbound] == "half", homing, ""
+    if homing < 0:
+        followed = features.carriers_follow if features.carriers_follow >= 0 else outbound
+    else:
+        view = features.views[homing]
+    return Cues(outbound, homing, followed, homing < 0, half, view)
 
 
 class Variant:
@@ -86,16 +114,16 @@ class Variant:
         self.own_tables, self.dense = features.own_tables, any(features.dense)
         self.is_given_actions = features.is_given_actions
         self.pheromones = tuple(zip(features.dense, features.views, strict=True))
-        self.outbound, self.homing = features.outbound, features.homing
-        self.has_compass = self.homing < 0
-        cues = {self.outbound} | ({self.homing} - {-1})
-        self.half = features.views[self.outbound] == "half"
-        self.homing_view = "" if self.has_compass else features.views[self.homing]
+        pairs = features.cues or ((features.outbound, features.homing),)
+        self.cues = tuple(cues_of(features, *pair) for pair in pairs)
+        cues = {number for one in self.cues for number in (one.outbound, one.followed)}
         self.reads = features.reads
         self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
         self.n_nests, self.n_kinds = features.n_nests, features.n_kinds
+        self.n_castes, self.has_labour = features.n_castes, features.has_labour
+        self.n_groups = self.n_nests * max(1, self.n_castes)  # in a world: nests by castes
         self.has_foods, self.has_loads = features.has_foods, features.has_loads
         # Whether deliveries are counted by nest and kind.
         self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
@@ -122,7 +150,7 @@ class Variant:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
         self.n_numbers = observation.n_states * ROW  # of a table: state-action pairs, and unused
-        self.n_pairs = self.n_numbers * self.n_nests  # of all tables that ants of a world share
+        self.n_pairs = self.n_numbers * self.n_groups  # of all tables that ants of a world share
         self.is_papers = observation.name == "paper"
         # The percept is the state index, unless ants misread cells.
         self.sees_percept = self.is_papers and not self.misreads
@@ -211,7 +239,7 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
         first, last = share_of(c, chunk, c.n_slots)
         last = ti.min(last, c.worlds[WorldRow.TOP, w]) * running
         for ant in range(w * c.n_slots + first, w * c.n_slots + last):
-            if steps.trait(c.stage, ant) != Stage.VACANT:
+            if columns.trait(c.stage, ant) != Stage.VACANT:
                 phase.do(c, v, w, chunk, ant, tick)
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)

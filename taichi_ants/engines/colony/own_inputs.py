@@ -14,6 +14,7 @@ from taichi_ants.engines.colony.steps import (
     cell_ahead,
     cue_level,
     event_reward,
+    explore_below_of,
     owner_of,
     table_of,
     trait,
@@ -32,38 +33,40 @@ _WORDS = 4294967296.0
 
 
 def choice(rule: OwnRule | None) -> Callable[..., Any] | None:
-    """Return a function for kernels (c, v, w, ant, state, percept, tick, bits) -> action, i32."""
+    """Return a function for kernels that returns an action, i32; see `steps.draw_by_cues`."""
     if rule is None:
         return None
 
-    def choose(c: Any, v: Any, w: Any, ant: Any, state: Any, percept: Any, tick: Any, bits: Any):
+    def choose(
+        c: Any, v: Any, cues: Any, w: Any, ant: Any, state: Any, percept: Any, tick: Any, bits: Any
+    ) -> Any:
         seen = state if v.is_papers else percept
         carries = trait(c.carries, ant)
         make = {
             "values": lambda: _values(c, v, w, ant, state),
-            "codes": lambda: _ahead(c, v, w, ant, seen, percept, _CODE),
-            "is_open": lambda: _ahead(c, v, w, ant, seen, percept, _IS_OPEN),
-            "nearer": lambda: _ahead(c, v, w, ant, seen, percept, _NEARER) * carries,
-            "levels": lambda: _levels(c, v, w, ant, -1, seen, percept, tick),
-            "level": lambda: cue_level(c, v, carries, _place(c, w, ant), tick),
+            "codes": lambda: _ahead(c, v, cues, w, ant, seen, percept, _CODE),
+            "is_open": lambda: _ahead(c, v, cues, w, ant, seen, percept, _IS_OPEN),
+            "nearer": lambda: _ahead(c, v, cues, w, ant, seen, percept, _NEARER) * carries,
+            "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, percept, tick),
+            "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick),
             "carries": lambda: carries,
             "percept": lambda: seen,
-            "epsilon": lambda: _share(c.explore_below),
+            "epsilon": lambda: _share(explore_below_of(c, v, ant)),
             "random": lambda: _share(low_word(bits)),
             "random_2": lambda: _share(high_word(bits)),
             "tick": lambda: tick,
         }
-        return rule.bound(c)(**_made(make, rule, c, v, w, ant, seen, percept, tick))
+        return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, percept, tick))
 
     return for_kernels(choose)
 
 
 def reward(rule: OwnRule | None) -> Callable[..., Any] | None:
-    """Return a function for kernels (c, v, w, ant, next_percept, tick) -> reward, i32."""
+    """Return a function for kernels that returns a reward, i32; see `steps.own_reward`."""
     if rule is None:
         return None
 
-    def pay(c: Any, v: Any, w: Any, ant: Any, next_percept: Any, tick: Any) -> Any:
+    def pay(c: Any, v: Any, cues: Any, w: Any, ant: Any, next_percept: Any, tick: Any) -> Any:
         carries, seen = trait(c.carries, ant), next_percept
         make = {
             "reward": lambda: event_reward(c, v, ant),
@@ -71,11 +74,11 @@ def reward(rule: OwnRule | None) -> Callable[..., Any] | None:
             "carries": lambda: carries,
             "percept": lambda: trait(c.percept, ant),
             "next_percept": lambda: next_percept,
-            "levels": lambda: _levels(c, v, w, ant, -1, seen, seen, tick + 1),
-            "level": lambda: cue_level(c, v, carries, _place(c, w, ant), tick + 1),
+            "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, seen, tick + 1),
+            "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick + 1),
             "tick": lambda: tick,
         }
-        return rule.bound(c)(**_made(make, rule, c, v, w, ant, seen, seen, tick + 1))
+        return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, seen, tick + 1))
 
     return for_kernels(pay)
 
@@ -85,6 +88,7 @@ def _made(
     rule: OwnRule,
     c: Any,
     v: Any,
+    cues: Any,
     w: Any,
     ant: Any,
     seen: Any,
@@ -99,7 +103,7 @@ def _made(
         else:
             number = v.field_numbers[field_of(name)]
             if name.startswith("levels_"):
-                inputs[name] = _levels(c, v, w, ant, number, seen, percept, tick)
+                inputs[name] = _levels(c, v, cues, w, ant, number, seen, percept, tick)
             else:
                 inputs[name] = level_of(v.field(c, number), _place(c, w, ant), tick)
     return inputs
@@ -124,11 +128,14 @@ def _place(c: ti.template(), w, ant):
 
 
 @ti.func
-def _ahead(c: ti.template(), v: ti.template(), w, ant, seen, percept, which: ti.template()):
+def _ahead(
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, seen, percept,
+    which: ti.template()
+):  # fmt: skip
     """Return one of the results of `cell_ahead` for the cells ahead, i32 (3,)."""
     found = ti.Vector([0, 0, 0])
     for i in ti.static(range(AHEAD)):
-        code, _, opens, nears = cell_ahead(c, v, w, ant, seen, percept, i)
+        code, _, opens, nears = cell_ahead(c, v, cues, w, ant, seen, percept, i)
         if ti.static(which == _CODE):
             found[i] = code
         elif ti.static(which == _IS_OPEN):
@@ -140,7 +147,8 @@ def _ahead(c: ti.template(), v: ti.template(), w, ant, seen, percept, which: ti.
 
 @ti.func
 def _levels(
-    c: ti.template(), v: ti.template(), w, ant, number: ti.template(), seen, percept, tick
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, number: ti.template(), seen,
+    percept, tick
 ):  # fmt: skip
     """Return the levels ahead of a pheromone, or of the ant's cue for number -1, f64 (3,).
 
@@ -154,7 +162,7 @@ def _levels(
         shows = shows & (code_in_view(seen, i) == code_in_view(percept, i))
         level = ti.f64(0.0)
         if ti.static(number < 0):
-            level = ti.cast(cue_level(c, v, carries, place, tick), ti.f64)
+            level = ti.cast(cue_level(c, v, cues, carries, place, tick), ti.f64)
         else:
             level = ti.cast(level_of(ti.static(v.field(c, number)), place, tick), ti.f64)
         found[i] = ti.select(shows, level, ti.f64(0.0))
