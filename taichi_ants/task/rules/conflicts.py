@@ -16,6 +16,7 @@ import taichi as ti
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.events import Event
 from taichi_ants.task.rules.actions import turn_round
+from taichi_ants.task.rules.policy import lowest_bit_number
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
 # The mark of an ant (u8): 0 for nothing, ENTER or TAKE plus a heading. If ants can enter cells with
@@ -43,24 +44,27 @@ def wanting(kind, heading):
 def prevails(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick):
     """Return whether the ant on `cell` wins the cell `wanted`; False if that is its own cell."""
     kind = ti.cast(c.wants[base + cell], ti.i32) & 8  # 8 to take, else 0
-    rivals = -1  # the loop also counts the ant itself
+    wanting_it = 0  # a bit for each heading; the ant itself is one of them
     for heading in ti.static(range(N_HEADINGS)):
         other = ti.cast(c.wants[base + wanted + c.compass[heading + 1]], ti.i32) & MARK
-        rivals += ti.cast(other == wanting(kind, heading), ti.i32)
+        wanting_it |= ti.cast(other == wanting(kind, heading), ti.i32) << heading
     won = wanted != cell
-    if rivals > 0:
-        won = won and wins(c, traffic, base, cell, wanted, kind, tick)
+    if won & (wanting_it & (wanting_it - 1) != 0):
+        won = wins(c, traffic, base, cell, wanted, wanting_it, tick)
     return won
 
 
 @ti.func
-def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, kind, tick):
-    """Return whether the ant on `cell` precedes all others that want the same."""
-    own, won = conflict_key(cell, tick), True
-    for heading in range(N_HEADINGS):
-        other = wanted + c.compass[heading + 1]
-        mark = ti.cast(c.wants[base + other], ti.i32) & MARK
-        if mark == wanting(kind, heading) and other != cell:
+def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, wanting_it, tick):
+    """Return whether the ant on `cell` precedes all others that want the same.
+
+    `wanting_it` has a bit for the heading, seen from the cell `wanted`, of each of these ants.
+    """
+    own, won, rest = conflict_key(cell, tick), True, wanting_it
+    while rest != 0:
+        other = wanted + c.compass[lowest_bit_number(rest) + 1]
+        rest &= rest - 1
+        if other != cell:
             after = conflict_key(other, tick) > own
             if ti.static(traffic.carriers_first):
                 loaded = c.wants[base + cell] & HAS_FOOD
@@ -155,10 +159,10 @@ def settle(
         if enters:
             goes, event = wanted, entered
     if ti.static(traffic.swap):
-        if not enters:
+        if not enters and gives_way(c, traffic, base, cell):
             follower = entering(c, base, cell)
             if follower >= 0:
-                if c.wants[base + follower] & HAS_FOOD != 0 and gives_way(c, traffic, base, cell):
+                if c.wants[base + follower] & HAS_FOOD != 0:
                     goes, filled, event = follower, True, Event.PUSHED
                     if ti.static(traffic.grant):
                         if moves & (ahead == follower):
