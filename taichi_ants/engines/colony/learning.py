@@ -63,7 +63,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     percept, state = steps.observe(c, v, w, ant, tick + 1)
     next_action = -1
     if steps.trait(c.stage, ant) != Stage.NEWBORN:
-        c.wants[w * c.size + c.want[ant]] = 0
+        marked = w * c.size + c.want[ant]
         if ti.static(v.draws_next_action):
             if terminates(steps.trait(c.event, ant), c.delivery_terminates) == 0:
                 c.streams[ant] = advance(c.streams[ant])
@@ -72,6 +72,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             learn_alone(c, v, ant, state, next_action, tick)
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, state, next_action)
+        c.wants[marked] = 0
     note_seen(c, v, ant, percept, state)
     if ti.static(v.draws_next_action):
         steps.put(c.next_action, ant, next_action)
@@ -198,14 +199,17 @@ def list_of(v: ti.template(), chunk):
 def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, count):
     """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
     place, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
-    known = c.sums_of[SumRow.COUNT, place]
-    if known == 0:
-        c.touched[listed] = c.touched[listed] + 1
-        c.touched[listed + c.touched[listed]] = pair
-        c.sums[place] = 0
-        c.sums_of[SumRow.LATEST, place] = -1
+    known, n = c.sums_of[SumRow.COUNT, place], c.touched[listed]
+    summed = c.sums[place]
+    # Without a branch: a new pair stays in the list, others leave their place to the next one.
+    # There is room, because a table has pairs that do not exist, see `ROW`.
+    c.touched[listed + 1 + n] = pair
+    c.touched[listed] = n + ti.cast(known == 0, ti.i32)
+    if ti.static(v.learner.plans):
+        if known == 0:
+            c.sums_of[SumRow.LATEST, place] = -1
     c.sums_of[SumRow.COUNT, place] = known + count
-    c.sums[place] = c.sums[place] + total
+    c.sums[place] = summed + total
     c.errors[place] = error
 
 
@@ -237,12 +241,13 @@ def join_sums(c: ti.template(), v: ti.template(), w):
             place = v.n_pairs * chunk + pair
             count = c.sums_of[SumRow.COUNT, place]
             add_to_sums(c, v, first, pair, c.errors[place], c.sums[place], count)
-            latest, transition = (
-                c.sums_of[SumRow.LATEST, place],
-                c.sums_of[SumRow.TRANSITION, place],
-            )
-            note_transition(c, v.n_pairs * first + pair, latest, transition)
-            c.sums_of[SumRow.COUNT, place] = 0
+            if ti.static(v.learner.plans):
+                latest, transition = (
+                    c.sums_of[SumRow.LATEST, place],
+                    c.sums_of[SumRow.TRANSITION, place],
+                )
+                note_transition(c, v.n_pairs * first + pair, latest, transition)
+            c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
         c.touched[listed] = 0
 
 
@@ -279,11 +284,10 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
         count = c.sums_of[SumRow.COUNT, place]
         error, value = c.errors[place], place_in_tables(c, v, w, pair)
         rate = c.weights[ti.min(count, c.weights.shape[0] - 1)]  # the last is for more errors
-        if count > 1:
-            mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
-            error = ti.cast(mean, ti.f32)
+        mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
+        error = ti.select(count > 1, ti.cast(mean, ti.f32), error)
         c.q[value] = c.q[value] + rate * error
-        c.sums_of[SumRow.COUNT, place] = 0
+        c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
     c.touched[listed] = 0
 
 
