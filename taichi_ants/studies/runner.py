@@ -515,7 +515,8 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
         return flat({**found, "task": point.task.as_dict(), "training": point.training.as_dict()})
 
     rows = [facts(point) for point in points]
-    columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: [row.get(name) for row in rows] for name in names}
     return {
         "version": __version__,
         "seeds": list(seeds),

@@ -61,7 +61,9 @@ def who_want(c: ti.template(), base, cell, bits: ti.template(), mark):
     for i in ti.static(range(N_HEADINGS)):
         place = base + cell + c.compass[N_HEADINGS - i]
         marks = marks << ti.u64(8) | ti.cast(c.wants[place], ti.u64)
-    others = marks & ti.u64(bits * _EACH) ^ (ti.u64(_WANTING) | ti.cast(mark, ti.u64) * ti.u64(_EACH))
+    others = marks & ti.u64(bits * _EACH) ^ (
+        ti.u64(_WANTING) | ti.cast(mark, ti.u64) * ti.u64(_EACH)
+    )
     # Bytes are below 128, so that adding 127 sets bit 7 where a byte differs.
     return ~(others + ti.u64(127 * _EACH)) & ti.u64(128 * _EACH)
 
