@@ -117,6 +117,9 @@ INLINE int turned(int heading, int action)
     return after[action][heading];
 }
 
+/* 0 for actions that do not move. */
+INLINE int code_in_view(int percept, int action) { return percept << 2 * action >> 4 & 3; }
+
 INLINE int goals_in_view(int percept)
 {
     int both = percept & percept >> 1;
@@ -212,7 +215,7 @@ INLINE void choose_and_want(const Colony *c, const Work *w, int foraging, Ant *a
     uint64_t random = advance(ant->random);
     int action = choose(w->greedy[row].actions, bits_of(random), c->explore_below);
     int cell = ant->cell, heading = turned(ant->heading, action);
-    int enters = !(percept >> (4 - 2 * (action & 3)) & 1);
+    int enters = !(code_in_view(percept, action) & 1);
     if (foraging)
         enters |= c->ground[cell + c->steps[heading + 1]] >> ANT_SHIFT;
     int want = (enters & (action <= RIGHT)) ? ENTER + heading : foraging ? STANDS : 0;
@@ -314,7 +317,7 @@ INLINE void resolve(const Colony *c, const Work *w, Ant *ant, int tick, int cloc
     w->wants[cell] |= WINS;
     if (want < TAKE) {
         int ahead = wanted_by(c, cell, want);
-        int code = ant->percept >> (4 - 2 * ant->action) & 3;
+        int code = code_in_view(ant->percept, ant->action);
         if (w->wants[ahead]) {
             int better = ant->carries ? c->closer[cell] >> ant->heading & 1
                                       : level_of(c, ahead, clock) > level_of(c, cell, clock);
@@ -357,7 +360,7 @@ INLINE void act(const Colony *c, const Work *w, int foraging, Ant *ant, int tick
         int enters = moves & claim;
         goes = enters ? wanted : cell;
         came = enters ? want : 0;
-        event = enters ? ant->percept >> (4 - 2 * (action & 3)) & 3 : FAILED;
+        event = enters ? code_in_view(ant->percept, action) : FAILED;
         counts[3] += moves & !claim;
     }
     counts[2] += moves;
