@@ -113,9 +113,10 @@ def observe(c: ti.template(), v: ti.template(), w, ant, tick):
 def observe_with(c: ti.template(), v: ti.template(), w, ant, carries, tick):
     """Return the percept and the state index of an ant with food (`carries` is 1) or without."""
     view = view_around(c, v, w, ant, carries, tick)
+    percept = view.percept  # the true one
     if ti.static(v.misreads):
         c.streams[ant] = noise.misread_view(view, v.observation, c.streams[ant], c.misread_below)
-    return view.percept, v.encode(view)
+    return percept, v.encode(view)
 
 
 @ti.func
