@@ -779,7 +779,8 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     worlds = list(dict.fromkeys(places))
     numbers = {one: number for several in (points, worlds) for number, one in enumerate(several)}
     rows = [_facts_of(point, lambda name, value: numbers[value]) for point in points]
-    columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: [row.get(name) for row in rows] for name in names}
     return {
         "version": __version__,
         "seeds": list(seeds),

@@ -65,9 +65,8 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action if the learner needs it, and learn."""
-    acts, stops = columns.trait(c.stage, ant) != Stage.NEWBORN, False
-    if acts:
-        c.wants[w * c.size + c.want[ant]] = 0
+    lives, marked = columns.trait(c.stage, ant) != Stage.NEWBORN, w * c.size + c.want[ant]
+    acts, stops = lives, False
     if ti.static(v.has_labour):
         acts = acts & (columns.trait(c.idle, ant) == 0)
         if acts:
@@ -90,6 +89,8 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             learn_alone(c, v, ant, state, next_action, tick, stops)
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, state, next_action)
+    if lives:
+        c.wants[marked] = 0
     note_seen(c, v, ant, percept, state)
     if ti.static(v.has_labour):
         next_action = ti.select(stops, -1, next_action)
@@ -268,14 +269,17 @@ def list_of(v: ti.template(), chunk):
 def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, count):
     """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
     place, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
-    known = c.sums_of[SumRow.COUNT, place]
-    if known == 0:
-        c.touched[listed] = c.touched[listed] + 1
-        c.touched[listed + c.touched[listed]] = pair
-        c.sums[place] = 0
-        c.sums_of[SumRow.LATEST, place] = -1
+    known, n = c.sums_of[SumRow.COUNT, place], c.touched[listed]
+    summed = c.sums[place]
+    # Without a branch: a new pair stays in the list, others leave their place to the next one.
+    # There is room, because a table has pairs that do not exist, see `ROW`.
+    c.touched[listed + 1 + n] = pair
+    c.touched[listed] = n + ti.cast(known == 0, ti.i32)
+    if ti.static(v.learner.plans):
+        if known == 0:
+            c.sums_of[SumRow.LATEST, place] = -1
     c.sums_of[SumRow.COUNT, place] = known + count
-    c.sums[place] = c.sums[place] + total
+    c.sums[place] = summed + total
     c.errors[place] = error
 
 
@@ -307,12 +311,13 @@ def join_sums(c: ti.template(), v: ti.template(), w):
             place = v.n_pairs * chunk + pair
             count = c.sums_of[SumRow.COUNT, place]
             add_to_sums(c, v, first, pair, c.errors[place], c.sums[place], count)
-            latest, transition = (
-                c.sums_of[SumRow.LATEST, place],
-                c.sums_of[SumRow.TRANSITION, place],
-            )
-            note_transition(c, v.n_pairs * first + pair, latest, transition)
-            c.sums_of[SumRow.COUNT, place] = 0
+            if ti.static(v.learner.plans):
+                latest, transition = (
+                    c.sums_of[SumRow.LATEST, place],
+                    c.sums_of[SumRow.TRANSITION, place],
+                )
+                note_transition(c, v.n_pairs * first + pair, latest, transition)
+            c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
         c.touched[listed] = 0
 
 
@@ -349,11 +354,10 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
         count = c.sums_of[SumRow.COUNT, place]
         error, value = c.errors[place], place_in_tables(c, v, w, pair)
         rate = weight_of(c, v, pair, count)
-        if count > 1:
-            mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
-            error = ti.cast(mean, ti.f32)
+        mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
+        error = ti.select(count > 1, ti.cast(mean, ti.f32), error)
         c.q[value] = c.q[value] + rate * error
-        c.sums_of[SumRow.COUNT, place] = 0
+        c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
     c.touched[listed] = 0
 
 

@@ -75,6 +75,8 @@ from taichi_ants.task.rules.policy import (
 )
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
+MOVES = 1 << LEFT | 1 << FORWARD | 1 << RIGHT  # a bit for each action that moves an ant
+
 
 @ti.func
 def state_index_of(c: ti.template(), v: ti.template(), ant):
@@ -107,15 +109,21 @@ def observe_by(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, 
         state = percept
         if ti.static(v.misreads):
             state, c.streams[ant] = noise.misread_percept(percept, c.streams[ant], c.misread_below)
+    elif trait(c.carries, ant) == 1:  # compiled twice, each time without what the other load needs
+        percept, state = observe_with(c, v, cues, w, ant, 1, tick)
     else:
-        view = view_around(c, v, cues, w, ant, tick)
-        percept = view.percept
-        if ti.static(v.misreads):
-            c.streams[ant] = noise.misread_view(
-                view, v.observation, c.streams[ant], c.misread_below
-            )
-        state = v.encode(view)
+        percept, state = observe_with(c, v, cues, w, ant, 0, tick)
     return percept, state
+
+
+@ti.func
+def observe_with(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, carries, tick):
+    """Return the percept and the state index of an ant with food (`carries` is 1) or without."""
+    view = view_around(c, v, cues, w, ant, carries, tick)
+    percept = view.percept  # the true one
+    if ti.static(v.misreads):
+        c.streams[ant] = noise.misread_view(view, v.observation, c.streams[ant], c.misread_below)
+    return percept, v.encode(view)
 
 
 @ti.func
@@ -201,11 +209,11 @@ def strongest_cue(
 
 
 @ti.func
-def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
-    """Return the view of an ant."""
+def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, carries, tick):
+    """Return the view of an ant with food (`carries` is 1) or without."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
-    carries, queen = trait(c.carries, ant), own_queen(c, v, w, ant)
+    queen = own_queen(c, v, w, ant)
     view = v.view_type(carries=carries, own_level=cue_level(c, v, cues, carries, here, tick))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
@@ -462,33 +470,37 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         random_state = advance(random_state)
         state = state_index_of(c, v, ant)
         action = draw_action(c, v, w, ant, state, percept, tick, random_state)
-    put(c.action, ant, action)
+    chosen = action
     if ti.static(v.slips):
         if idle == 0:
             action, random_state = noise.slipped(action, random_state, c.slip_below)
-        put(c.executed, ant, action)
     heading = turned_by(c.compass, trait(c.heading, ant), action)
-    ahead = cell + step_towards(c.compass, heading, FORWARD)
-    enters = is_open(vision.code_in_view(percept, ti.min(action, RIGHT)))
+    step = step_towards(c.compass, heading, FORWARD)
+    # Arithmetic, because the compiler makes branches of selections between values in memory.
+    enters = 1 - (vision.code_in_view(percept, action) & 1)
     if ti.static(v.traffic.shared):
-        enters = enters | holds_nestmate(c, v, ant, w * c.size + ahead)
-    enters = enters & (action <= RIGHT)
-    wanted = ti.select(enters, ahead, cell)
-    mark = ti.select(enters, conflicts.ENTER + heading, v.idle)
+        enters |= ti.cast(holds_nestmate(c, v, ant, w * c.size + cell + step), ti.i32)
+    enters &= MOVES >> action
+    wanted = cell + enters * step
+    mark = v.idle + enters * (conflicts.ENTER + heading - v.idle)
     foods = vision.goals_in_view(percept)
-    if foods != 0 and action == PICK_UP and carries == 0:
+    if (foods != 0) & (action == PICK_UP) & (carries == 0):
         position = lowest_bit_number(foods)
         if foods & (foods - 1) != 0:  # several food items in view
             k, random_state = draw_below(random_state, popcnt(foods))
             position = bit_number(foods, k)
         wanted = cell + step_towards(c.compass, heading, position)
         mark = conflicts.TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
-    c.streams[ant] = random_state
-    put(c.heading, ant, heading)
-    c.want[ant] = wanted
     if ti.static(v.traffic.shared):
         takes = ti.select(mark >= conflicts.TAKE, conflicts.TAKES_FOOD, 0)
-        mark |= ti.select(carries == 1, conflicts.HAS_FOOD, 0) | takes
+        mark |= carries * conflicts.HAS_FOOD | takes
+    # All writes are last, because the compiler reads the addresses of arrays again after each.
+    c.streams[ant] = random_state
+    put(c.action, ant, chosen)
+    if ti.static(v.slips):
+        put(c.executed, ant, action)
+    put(c.heading, ant, heading)
+    c.want[ant] = wanted
     c.wants[w * c.size + cell] = ti.cast(mark, ti.u8)
 
 
@@ -500,10 +512,15 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     depend on the deposits of this tick.
     """
     base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
-    won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
-    c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, conflicts.WINS, 0), ti.u8)
-    c.want[ant] = ti.select(won, wanted, cell)
-    put(c.event, ant, event_of(c, v, base, ant, tick))
+    if ti.static(v.traffic.grant):  # then a pushed ant may need the event, too
+        put(c.event, ant, event_of(c, v, w, ant, tick))
+    if wanted != cell:
+        if conflicts.prevails(c, v.traffic, base, cell, wanted, tick):
+            if ti.static(not v.traffic.grant):
+                put(c.event, ant, event_of(c, v, w, ant, tick))
+            c.wants[base + cell] = c.wants[base + cell] | ti.u8(conflicts.WINS)
+        else:
+            c.want[ant] = cell
 
 
 @ti.func
@@ -513,33 +530,33 @@ def step_ahead(c: ti.template(), ant):
 
 
 @ti.func
-def event_of(c: ti.template(), v: ti.template(), base, ant, tick):
+def event_of(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the event of a successful move; a cell with an ant is a lure if it is better."""
     action, percept = executed_by(c, v, ant), trait(c.percept, ant)
-    event = move_event(vision.code_in_view(percept, ti.min(action, RIGHT)))
-    here = base + c.cell[ant]
+    event = move_event(vision.code_in_view(percept, action))
+    here = w * c.size + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
         better = False
         if ti.static(len(v.cues) == 1):
-            better = is_better(c, v, ti.static(v.cues[0]), base, ant, ahead, here, tick)
+            better = is_better(c, v, ti.static(v.cues[0]), w, ant, ahead, here, tick)
         else:
             for i in ti.static(range(len(v.cues))):
                 if of_caste(c, ant, CasteRow.CUES) == i:
-                    better = is_better(c, v, ti.static(v.cues[i]), base, ant, ahead, here, tick)
+                    better = is_better(c, v, ti.static(v.cues[i]), w, ant, ahead, here, tick)
         event = ti.select(better, Event.ENTERED_LURE, Event.ENTERED_EMPTY)
     return event
 
 
 @ti.func
 def is_better(
-    c: ti.template(), v: ti.template(), cues: ti.template(), base, ant, ahead, here, tick
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, ahead, here, tick
 ):  # fmt: skip
     """Return whether the cell ahead of an ant is better than its own cell, by its cues."""
     better = is_stronger(ti.static(v.field(c, cues.outbound)), ahead, here, tick)
     if trait(c.carries, ant) == 1:
         if ti.static(cues.has_compass):
-            closer = ti.cast(c.closer[own_map(c, v, base // c.size, ant)], ti.i32)
+            closer = ti.cast(c.closer[own_map(c, v, w, ant)], ti.i32)
             better = closer >> trait(c.heading, ant) & 1 == 1
         else:
             better = is_stronger(ti.static(v.field(c, cues.homing)), ahead, here, tick)
@@ -560,28 +577,28 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     action, percept = executed_by(c, v, ant), trait(c.percept, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
-    moves = action <= RIGHT
-    goes, filled, event, enters = cell, False, ti.select(moves, Event.BLOCKED, Event.FAILED), False
-    takes = False
+    moves = MOVES >> action & 1
+    goes, filled, enters, takes = cell, False, 0, False
+    event = Event.FAILED + moves * ti.static(Event.BLOCKED - Event.FAILED)
     if ti.static(v.traffic.shared):
         ahead = cell + step_ahead(c, ant)
-        goes, filled, event, enters = conflicts.settle(
-            *(c, v.traffic, base, cell, wanted, ahead, carries, moves, trait(c.event, ant))
+        goes, filled, event, entered = conflicts.settle(
+            *(c, v.traffic, base, cell, wanted, ahead, carries, moves == 1, trait(c.event, ant))
         )
-        takes = not moves and wanted != cell
+        enters = ti.cast(entered, ti.i32)
+        takes = (moves == 0) & (wanted != cell)
     else:
         won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
-        enters, takes = won & moves, won & (not moves)
-        goes = ti.select(enters, wanted, cell)
-        event = ti.select(
-            enters, move_event(vision.code_in_view(percept, ti.min(action, RIGHT))), event
-        )
+        # Arithmetic, because the compiler would make branches, which nothing can predict here.
+        enters, takes = ti.cast(won, ti.i32) & moves, won & (moves == 0)
+        goes = cell + enters * (wanted - cell)
+        event += enters * (vision.code_in_view(percept, action) + Event.ENTERED_EMPTY - event)
     if not filled:
         c.ground[base + cell] = EMPTY
     c.want[ant] = cell  # the cell with the ant's mark
     had_food, age = carries, c.carried[ant]
     if carries == 1:
-        carried = c.carried[ant]
+        carried = age
         if goes != cell:
             if lays(c, v, ant, 0):
                 deposit(trail, base + goes, tick, carried, carries, event, percept)
@@ -624,8 +641,8 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if ti.static(v.has_labour):
         event = ti.select(trait(c.idle, ant) == 1, ti.cast(Event.NONE, ti.i32), event)
     put(c.event, ant, event)
-    tally(c, Tally.MOVES, chunk, ti.cast(moves, ti.i32))
-    tally(c, Tally.BLOCKED, chunk, ti.cast(moves & (not enters), ti.i32))
+    tally(c, Tally.MOVES, chunk, moves)
+    tally(c, Tally.BLOCKED, chunk, moves & (1 - enters))
     if ti.static(not v.has_own_reward):
         tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
 
