@@ -275,9 +275,10 @@ class Task(Settings, path="task"):
             "softmax": ("policy", "epsilon", "learning_rate", "discount", "temperature"),
             "deneubourg": ("k", "exponent"),
         }
+        usual = rules["greedy"] if self.choice.needs_table else ()  # for your own rules
         for name in {one for several in rules.values() for one in several}:
             value = getattr(caste, name)
-            if value is not None and name not in rules[self.choice.rule]:
+            if value is not None and name not in rules.get(self.choice.rule, usual):
                 raise AntsError(
                     f"{path}.{name}` is {shown(value)}; leave it out, because `task.choice.rule` "
                     f"is {self.choice.rule!r}."

@@ -63,11 +63,12 @@ def _numbers(rng: np.random.Generator, drawn: RandomColony) -> dict[str, Any]:
         "exponent": float(rng.choice([0.0, 1.5, 4.0])),
     }
     rule = task.choice.rule
-    if rule == "deneubourg":
+    if not task.choice.needs_table:
         for name in ("epsilon", "learning_rate", "discount"):
             del able[name]
-    else:
+    if rule != "deneubourg":
         del able["k"], able["exponent"]
+    if task.choice.needs_table:
         if sharing != "independent" and task.observation in FOLLOWED and rng.random() < 0.3:
             found["policy"] = str(rng.choice(["random", "trail_follower"]))
     if rule != "softmax":

@@ -61,15 +61,18 @@ def count(c: ti.template(), v: ti.template(), w, tick):
 @ti.func
 def count_by_nest(c: ti.template(), v: ti.template(), w):
     """Add the deliveries of all chunks by nest and kind to those of a world, and reset them."""
-    for i in ti.static(range(v.n_nests * v.n_kinds)):
-        n = 0
-        for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
-            n += c.delivered[chunk * NESTS_BY_KINDS + i]
-            c.delivered[chunk * NESTS_BY_KINDS + i] = 0
-        c.deliveries_apart[w * (v.n_nests * v.n_kinds) + i] += n
-        c.nests[NestRow.STORE, w * v.n_nests + ti.static(i // v.n_kinds)] += n * c.births
-        if ti.static(v.has_labour):
-            labour.relieve(c, w * v.n_nests + ti.static(i // v.n_kinds), n)
+    for nest in ti.static(range(v.n_nests)):
+        column, of_nest = w * v.n_nests + nest, 0
+        for kind in ti.static(range(v.n_kinds)):
+            i, n = ti.static(nest * v.n_kinds + kind), 0
+            for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
+                n += c.delivered[chunk * NESTS_BY_KINDS + i]
+                c.delivered[chunk * NESTS_BY_KINDS + i] = 0
+            c.deliveries_apart[column * v.n_kinds + kind] += n
+            of_nest += n
+        c.nests[NestRow.STORE, column] += of_nest * c.births
+        if ti.static(v.has_labour):  # once, since it rounds
+            labour.relieve(c, column, of_nest)
 
 
 @ti.func
