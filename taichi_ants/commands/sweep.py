@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from taichi_ants.studies import command_line
 
@@ -33,23 +34,26 @@ def parse_arguments(
 def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
     from taichi_ants.files import read_text
+    from taichi_ants.files.inputs import recorded
     from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.sweep import read_sweep
 
-    command_line.load_plugin(settings.plugin)
-    settings.text = settings.text or read_text(settings.file)
-    asked = read_sweep(settings.file, settings.text)
+    with recorded() as inputs:
+        command_line.load_plugin(settings.plugin)
+        settings.text = settings.text or read_text(settings.file)
+        asked = read_sweep(settings.file, settings.text)
 
     def work(blocks: Path, ready: Path) -> None:
-        with command_line.progress_bar("sweep") as progress, chosen(settings) as how:
-            values = asked.measured(blocks, progress, **how)
+        with command_line.progress_bar("sweep") as progress, chosen(settings) as workers:
+            values = asked.measured(blocks, progress, **workers)
         if settings.shard:
             return
         asked.write(values, ready, draws=not settings.no_figures)
         asked.write_series(blocks, ready)
 
-    work_or_show(settings, asked.facts(), work, study=asked.study, take=asked.take)
+    how: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
+    work_or_show(settings, asked.facts(), work, **how)
 
 
 def main(
