@@ -17,6 +17,8 @@ COMMANDS = {  # modules of this package with their help
     "sweep": "run every combination of the settings in a file, and compare them",
     "merge": "join the shards of a sweep, a comparison or a colony study",
     "status": "show what is done in a folder of results, and how long is left",
+    "archive": "put a finished study into one file with everything that repeats it",
+    "reproduce": "repeat the study in an archive, and compare all files of its results",
     "render": "draw an episode, a colony, learning, or a policy",
     "watch": "watch and change ants in a browser while they run",
 }
@@ -49,7 +51,7 @@ def main() -> None:
         print("usage: taichi-ants COMMAND ...\n")
         print("Simulate ants on a hexagonal grid that lay trails and learn by reinforcement.\n")
         for command, summary in COMMANDS.items():
-            print(f"  {command:9} {summary}")
+            print(f"  {command:10} {summary}")
         print("\nRun `taichi-ants COMMAND --help` for the options of a command.")
     elif name == "--version":
         print(f"taichi-ants {taichi_ants.__version__}")

@@ -7,9 +7,10 @@ without --shard. See docs/many_machines.md.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from taichi_ants.studies import command_line
 
@@ -33,11 +34,15 @@ def merge(settings: argparse.Namespace) -> None:
     manifest = join(settings.folders, settings.out)
     options = {**manifest["options"], "shard": None, "workers": None, "force": False}
     options |= {name: Path(options[name]) for name in ("file",) if options.get(name)}
-    name = manifest["command"]
+    started(manifest["command"], {**options, "out": settings.out})
+
+
+def started(name: str, options: Mapping[str, Any]) -> None:
+    """Run the command with this name and these options, which a manifest contained."""
     start: Callable[[argparse.Namespace], None] = getattr(
         import_module(f"taichi_ants.commands.{name}"), STARTS[name]
     )
-    start(argparse.Namespace(**{**options, "out": settings.out}))
+    start(argparse.Namespace(**{**options, "command": name}))
 
 
 def main(arguments: list[str] | None = None) -> None:
