@@ -31,8 +31,8 @@ _OWN = re.compile(r"\{(\w+)\}")  # the value of a setting in a text
 _LISTS = ("measures", "protocol")  # settings whose value is a list
 _TITLE = """# ODD description of the model
 
-This description follows the ODD protocol (Overview, Design concepts, Details) of Grimm et al. (2006,
-2010, 2020). It was generated from the settings of this study: {command}
+This description follows the ODD protocol (Overview, Design concepts, Details) of Grimm et al.
+(2006, 2010, 2020). It was generated from the settings of this study: {command}
 """
 _REFERENCES = """## References
 
