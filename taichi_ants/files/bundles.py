@@ -30,6 +30,7 @@ _ERRORS = (  # that zipfile raises, and errors of values in the index
     *(zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError),
     *(ValueError, LookupError, TypeError, AttributeError),
 )
+_TYPES = (0, stat.S_IFREG)  # of files; other programs may not store the type
 _CHUNK = 1 << 20
 
 
@@ -117,7 +118,7 @@ class Bundle:
                     f"{name} contains the path {shown(one.orig_filename)}, which leads out of a "
                     "folder, so it is not from `taichi-ants archive`; do not use it."
                 )
-            if one.compress_type not in _COMPRESSIONS or (mode and not stat.S_ISREG(mode)):
+            if one.compress_type not in _COMPRESSIONS or stat.S_IFMT(mode) not in _TYPES:
                 raise ValueError(f"{one.filename} is not a file as this package writes them")
         if len({one.filename for one in members}) < len(members):
             raise ValueError("two files have the same name")

@@ -24,11 +24,19 @@ from taichi_ants.settings import Setting, all_of, declared, flat, named_groups
 from taichi_ants.studies.runner import ColonyPoint, RunPoint
 from taichi_ants.studies.sweep import MEASURES
 from taichi_ants.task import Task, observations
+from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.worlds.registry import BUILT_IN as WORLDS
 
 _MOST = 6  # values of a setting that a sentence lists
 _OWN = re.compile(r"\{(\w+)\}")  # the value of a setting in a text
+_CUES = ("outbound", "homing")
 _LISTS = ("measures", "protocol")  # settings whose value is a list
+# Built-in worlds with the kinds of world of the colony study that are drawn from them.
+_PRESETS = {
+    "paper": {"paper"},
+    "open": {"open", "rocks", "slow", "small", "wide", "large"},
+    "far_piles": {"piles", "one_pile", "moving"},
+}
 _TITLE = """# ODD description of the model
 
 This description follows the ODD protocol (Overview, Design concepts, Details) of Grimm et al.
@@ -156,18 +164,14 @@ def described(model: Model, command: str) -> str:
 
 
 def _purpose(model: Model) -> Iterator[str]:
-    who = (
-        "colonies of ants that lay and follow pheromone trails"
-        if model.of_colony
-        else ("a single ant that follows a pheromone trail")
-    )
-    how = "learn by reinforcement to forage" if model.learns else "forage by a fixed rule"
+    who, verb = ("colonies of ants", "learn") if model.of_colony else ("one ant", "learns")
+    how = f"{verb} by reinforcement to forage" if model.learns else "forage by a fixed rule"
     varied = _varied(model)
     yield (
-        f"The model describes {who} on a hexagonal grid and {how}. Its purpose in this study is to "
-        f"measure how {_words(varied) if varied else 'the settings below'} "
-        f"{'affect' if len(varied) != 1 else 'affects'} the measures listed here, over "
-        f"{count(len(model.seeds), 'seed')}."
+        f"The model describes how {who} on a hexagonal grid {how}, with pheromone trails. Its "
+        f"purpose in this study is to measure how {_words(varied) or 'the settings below'} "
+        f"{'affects' if len(varied) == 1 else 'affect'} the measures listed here. Each combination "
+        f"of settings runs with {count(len(model.seeds), 'seed')}."
     )
     lines = [f"- `{name}`: {words}" for name, words in _measures(model).items()]
     yield "Patterns by which the model is judged:\n\n" + "\n".join(lines)
@@ -402,7 +406,7 @@ def _initialisation(model: Model) -> Iterator[str]:
             f"The study has worlds of the kinds {kinds}. Each seed has one world of each drawn "
             "kind for the evaluation, and draws a world for each training episode from 64 others."
         )
-        presets = ["paper", "open", "far_piles"]
+        presets = [one for one, own in _PRESETS.items() if own & {*model.settings["world_kinds"]}]
     else:
         presets = given.pop("preset", ["paper"])
     known = [f"- `{one}`: {rules.WORLDS[one]}" for one in presets if one in rules.WORLDS]
@@ -430,7 +434,8 @@ def _initialisation(model: Model) -> Iterator[str]:
     )
     values = f"{model.text('training.initial_q')}" if model.learns else ""
     yield (
-        "Ants carry nothing. Further pheromones start at level 0."
+        "Ants carry nothing."
+        + (" Further pheromones start at level 0." if model.fields() else "")
         + (f" Action values start at {values}." if values else "")
         + f" Seeds: {_seeds(model.seeds)}."
     )
@@ -491,13 +496,8 @@ def _observation(model: Model) -> Iterator[str]:
     for name in model.all("task.observation"):
         words = observations.get(name).summary if name in known else "defined by the plugin"
         yield f"Observation `{name}`: {words}."
-    views = [rules.VIEW.get(one, one) for one in model.all("task.pheromone.view")]
-    outbound, homing = model.text("task.outbound_cue"), model.text("task.homing_cue")
-    nearer = "an empty cell nearer to the queen than the ant's own cell (the compass)"
-    if not model.has("task.homing_cue", "compass"):
-        nearer = f"as T, by the levels of `{homing}`"
-    elif len(model.all("task.homing_cue")) > 1:
-        nearer += f"; with another `task.homing_cue` ({homing}), as T by the levels of that cue"
+    outbound, homing = ([f"`{one}`" for one in model.all(f"task.{cue}_cue")] for cue in _CUES)
+    seen_as_t = f"T: by the levels of {_several(outbound)}, see below"
     yield _table(
         ("Code", "Ant without food", "Ant with food"),
         [
@@ -507,10 +507,14 @@ def _observation(model: Model) -> Iterator[str]:
                 "O: an obstacle, an ant, a queen, or no cell",
                 "O: an obstacle, an ant, food, or no cell",
             ),
-            ("2", f"T: {' or '.join(views)}, by the levels of `{outbound}`", f"S: {nearer}"),
+            ("2", seen_as_t, _seen_as_s(homing)),
             ("3", "F: food", "Q: its queen"),
         ],
     )
+    for cue in dict.fromkeys(one for name in _CUES for one in model.all(f"task.{name}_cue")):
+        group = "task.pheromone." if cue == TRAIL else f"task.fields.{cue}."
+        for words in model.choices(f"{group}view", rules.VIEW, group):
+            yield f"By the levels of `{cue}`, a cell is T (for ants with food S) if it is: {words}."
     yield (
         "With the observation `paper`, the ant sees the three cells ahead. Its state index is "
         "`64 · load + 16 · left + 4 · forward + right`."
@@ -522,6 +526,17 @@ def _observation(model: Model) -> Iterator[str]:
             f"With probability {model.text('task.noise.misread')}, the ant sees a cell as one of "
             "the three other codes, drawn uniformly."
         )
+
+
+def _seen_as_s(homing: Sequence[str]) -> str:
+    """Return what ants with food see as S, by their cues."""
+    nearer = "S: an empty cell nearer to the queen than the ant's own cell"
+    others = [one for one in homing if one != f"`{COMPASS}`"]
+    if not others:
+        return nearer
+    by_levels = f"by the levels of {_several(others)}, see below"
+    both = f"{nearer} (with the homing cue `{COMPASS}`), or {by_levels}"
+    return both if len(others) < len(homing) else f"S: {by_levels}"
 
 
 def _actions(model: Model) -> Iterator[str]:
@@ -560,7 +575,8 @@ def _actions(model: Model) -> Iterator[str]:
         ],
     )
     if model.has("task.turns_at_queen", True):
-        yield "After a delivery the ant turns round (`task.turns_at_queen`)."
+        some = " in some points" if model.has("task.turns_at_queen", False) else ""
+        yield f"After a delivery the ant turns round{some} (`task.turns_at_queen`)."
 
 
 def _traffic(model: Model) -> Iterator[str]:
@@ -739,7 +755,7 @@ def _listed(value: Any) -> list[Any]:
 
 
 def _words(several: Sequence[str]) -> str:
-    *others, last = several
+    *others, last = several or [""]
     return f"{', '.join(others)} and {last}" if others else last
 
 

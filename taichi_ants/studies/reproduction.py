@@ -59,7 +59,7 @@ def write_archive(path: Path, folder: Path, manifest: Mapping[str, Any], odd: st
         f"{RESULTS}{name}": folder / name for name in (*manifest["files"], MANIFEST)
     }
     contents |= {"ODD.md": odd, "requirements.txt": lock(manifest)}
-    contents["README.md"] = _readme(path.name, manifest, contents)
+    contents["README.md"] = _readme(manifest)
     facts = {name: manifest[name] for name in ("command", "finished")}
     bundles.write(path, contents, {"version": __version__, **facts})
 
@@ -75,7 +75,7 @@ def lock(manifest: Mapping[str, Any]) -> str:
     return "".join(f"{line}\n" for line in lines)
 
 
-def _readme(name: str, manifest: Mapping[str, Any], contents: Mapping[str, Any]) -> str:
+def _readme(manifest: Mapping[str, Any]) -> str:
     given = "".join(
         f"- `{RESULTS}{place}`, read from `{path}`\n" for path, place in manifest["inputs"].items()
     )
@@ -86,8 +86,9 @@ The results come from this command, which finished {manifest["finished"]}:
     {manifest["command"]}
 
 To compute them again and compare every file, install the versions in `requirements.txt` and run
+this command with the name of this archive:
 
-    taichi-ants reproduce {name}
+    taichi-ants reproduce FILE
 
 - `ODD.md` describes the model of this study by the ODD protocol (Grimm et al. 2020).
 - `requirements.txt` has the versions of all packages that the study used.
