@@ -276,7 +276,7 @@ def _schedule(model: Model) -> Iterator[str]:
         "*Resolve.* Conflicts over cells and food items are decided (7.4).",
         "*Act.* Ants turn, move, pick up and give, and get rewards (7.3).",
         "*Deposit.* Ants lay pheromone (7.5).",
-        "*Evaporate and diffuse.* Levels of all cells change (7.5).",
+        f"*{_change_of_levels(model)}.* Levels of all cells change (7.5).",
     ]
     if _lives(model):
         steps.append("*Live.* Births, deaths and the regrowth of food (7.7).")
@@ -301,6 +301,12 @@ def _schedule(model: Model) -> Iterator[str]:
         f"{model.text('rollouts')} episodes of evaluation without learning. The updates of one "
         "tick are synchronous: no result depends on the order in which ants are processed."
     )
+
+
+def _change_of_levels(model: Model) -> str:
+    groups = ("task.pheromone", *(f"task.fields.{name}" for name in model.fields()))
+    diffuse = any(model.has(f"{group}.diffusion") for group in groups)
+    return "Evaporate and diffuse" if diffuse else "Evaporate"
 
 
 def _lives(model: Model) -> bool:
