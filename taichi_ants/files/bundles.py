@@ -176,7 +176,7 @@ class Bundle:
         return b"".join(parts)
 
     def unpack(self, name: str, target: Path) -> Path:
-        """Write a file to a path, whose folder is created; return the path."""
+        """Return a path after writing a file to it; its folder is created."""
         files.check_writable_folder(target.parent)
         files.write_atomically(target, lambda file: self._each_chunk(name, file.write))
         return target

@@ -633,19 +633,27 @@ def _learning(model: Model) -> Iterator[str]:
     targets = model.choices("training.learner", rules.LEARNERS, "training.hyperparameters.")
     lines = [f"- {_with_label(model, number)}{target}" for number, target in enumerate(targets)]
     yield "with this target:\n\n" + "\n".join(lines)
-    rate, least = model.text("training.learning_rate"), model.text("training.min_learning_rate")
-    decay = model.text("training.learning_rate_decay")
     yield (
-        f"The discount factor γ is {model.text('training.discount')}. The learning rate α starts "
-        f"at {rate}; after each episode it becomes `max({least}, {decay} · α)`. The exploration "
-        f"rate ε starts at {model.text('training.epsilon')}; after each episode it becomes "
-        f"`max({model.text('training.min_epsilon')}, {model.text('training.epsilon_decay')} · ε)`. "
-        "Bounds above the initial value have no effect. The evaluation uses "
+        f"The discount factor γ is {model.text('training.discount')}. "
+        f"{_decay(model, 'learning rate α', 'learning_rate')} "
+        f"{_decay(model, 'exploration rate ε', 'epsilon')} The evaluation uses "
         + ("the lowest ε." if model.of_colony else "ε = 0.")
     )
     yield from model.choices("task.delivery", rules.DELIVERY, "task.")
     if model.of_colony:
         yield from model.choices("sharing", rules.SHARING, "")
+
+
+def _decay(model: Model, words: str, name: str) -> str:
+    """Return how a rate changes over episodes, in words."""
+    first, decay = model.text(f"training.{name}"), model.text(f"training.{name}_decay")
+    if model.all(f"training.{name}_decay") == [1.0]:
+        return f"The {words} is {first} in all episodes."
+    least = model.text(f"training.min_{name}")
+    return (
+        f"The {words} starts at {first}; after each episode, the factor {decay} multiplies it, but "
+        f"it does not fall below {least} (or its start, if that is smaller)."
+    )
 
 
 def _with_label(model: Model, number: int) -> str:

@@ -44,10 +44,10 @@ def checked_manifest(folder: Path) -> dict[str, Any]:
             f"{str(folder)!r} has results of {written} of this package, and this is {__version__}; "
             "archive it with that version, or run the command again with --force."
         )
-    if manifest["asked"]["command"] not in COMMANDS:
+    if manifest["asked"]["command"] not in COMMANDS or "runs" not in manifest:
         raise AntsError(
-            f"{str(folder)!r} has results of another command; name a folder of sweep, compare or "
-            "colony study."
+            f"{str(folder)!r} has results of another kind; name a folder of a sweep with [vary], "
+            "a comparison or a colony study."
         )
     ResultFolder(folder, manifest["settings"]).check()
     return manifest

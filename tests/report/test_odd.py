@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, files, learners, worlds
 from taichi_ants.protocol import At
@@ -14,6 +15,7 @@ from taichi_ants.report import odd_rules
 from taichi_ants.report.odd import Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
 from taichi_ants.studies.runner import ColonyPoint, RunPoint, Study
+from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.task import Field, Food, Pheromone, Task, foraging, queueing
 from taichi_ants.task.choice import Choice
 from taichi_ants.task.field import Field as FieldSettings
@@ -212,3 +214,14 @@ def test_sentences_are_short_and_tables_have_even_rows():
         else:
             for sentence in re.split(r"(?<=[.:])\s", block.split("## References")[0]):
                 assert len(sentence.split()) <= 45, sentence
+
+
+def test_the_guide_shows_a_part_of_a_real_description():
+    path = ROOT / "experiments/sweeps/trails.toml"
+    facts = json.loads(files.to_json(read_sweep(path).facts()))
+    asked = {"command": "sweep", "options": {}}
+    text = described(Model(facts, asked, files.tomllib.loads(path.read_text())), "")
+    guide = (ROOT / "docs/archives.md").read_text("utf-8")
+    shown = guide.split("```markdown\n")[1].split("```")[0]
+    assert len(shown) > 1000
+    assert " ".join(shown.split()) in " ".join(text.split())
