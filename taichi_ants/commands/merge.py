@@ -14,8 +14,12 @@ from typing import Any
 
 from taichi_ants.studies import command_line
 
-# The functions of commands that compute or show results from their settings.
-STARTS = {"sweep": "sweep", "compare": "compare", "colony": "start"}
+# The functions of commands that compute or show results from their settings, with their modules.
+STARTS = {
+    "sweep": ("taichi_ants.commands.sweep", "sweep"),
+    "compare": ("taichi_ants.commands.compare", "compare"),
+    "colony": ("taichi_ants.commands.colony", "start"),
+}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -39,9 +43,8 @@ def merge(settings: argparse.Namespace) -> None:
 
 def started(name: str, options: Mapping[str, Any]) -> None:
     """Run the command with this name and these options, which a manifest contained."""
-    start: Callable[[argparse.Namespace], None] = getattr(
-        import_module(f"taichi_ants.commands.{name}"), STARTS[name]
-    )
+    module, function = STARTS[name]
+    start: Callable[[argparse.Namespace], None] = getattr(import_module(module), function)
     start(argparse.Namespace(**{**options, "command": name}))
 
 
