@@ -221,6 +221,10 @@ def test_bad_archives_are_refused_and_leave_nothing(here, capsys, monkeypatch):
     changed(good, "more.zip", [("results/more.txt", "")])
     changed(good, "less.zip", drops=["results/runs.csv"])
     changed(good, "other.zip", [("results/runs.csv", "0")], drops=["results/runs.csv"])
+    with bundles.reading(good) as bundle:
+        altered = bundle.read("results/runs.csv").replace(b",0,", b",1,", 1)
+        assert altered != bundle.read("results/runs.csv")
+    changed(good, "same.zip", [("results/runs.csv", altered)], drops=["results/runs.csv"])
     changed(good, "plain.zip", drops=["archive.json"])
     changed(good, "index.zip", [("archive.json", "[]")], drops=["archive.json"])
     facts = json.loads(zipfile.ZipFile(good).read("archive.json"))
@@ -240,6 +244,7 @@ def test_bad_archives_are_refused_and_leave_nothing(here, capsys, monkeypatch):
         "more.zip": "'results/more.txt' is not in its index",
         "less.zip": "'results/runs.csv' is missing",
         "other.zip": "'results/runs.csv' is shorter than declared",
+        "same.zip": "'results/runs.csv' differs from its checksum",
         "plain.zip": "is a zip file, but not an archive of a study",
         "index.zip": "is damaged (",
         "later.zip": "has format 2 of ",
