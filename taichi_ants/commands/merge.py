@@ -14,11 +14,12 @@ from typing import Any
 
 from taichi_ants.studies import command_line
 
-# The functions of commands that compute or show results from their settings, with their modules.
+# The functions of commands that compute or show results from their settings, with their modules
+# and the arguments without which the command line is not complete.
 STARTS = {
-    "sweep": ("taichi_ants.commands.sweep", "sweep"),
-    "compare": ("taichi_ants.commands.compare", "compare"),
-    "colony": ("taichi_ants.commands.colony", "start"),
+    "sweep": ("taichi_ants.commands.sweep", "sweep", ["FILE"]),
+    "compare": ("taichi_ants.commands.compare", "compare", []),
+    "colony": ("taichi_ants.commands.colony", "start", ["study"]),
 }
 
 
@@ -42,10 +43,15 @@ def merge(settings: argparse.Namespace) -> None:
 
 
 def started(name: str, options: Mapping[str, Any]) -> None:
-    """Run the command with this name and these options, which a manifest contained."""
-    module, function = STARTS[name]
-    start: Callable[[argparse.Namespace], None] = getattr(import_module(module), function)
-    start(argparse.Namespace(**{**options, "command": name}))
+    """Run the command with this name and these options, which a manifest contained.
+
+    Options that another version of the package did not have get their defaults.
+    """
+    place, function, arguments = STARTS[name]
+    module = import_module(place)
+    start: Callable[[argparse.Namespace], None] = getattr(module, function)
+    usual = vars(module.parse_arguments(arguments))
+    start(argparse.Namespace(**{**usual, **options, "command": name}))
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -45,15 +45,15 @@ def sweep(settings: argparse.Namespace) -> None:
         asked = read_sweep(settings.file, settings.text)
 
     def work(blocks: Path, ready: Path) -> None:
-        with command_line.progress_bar("sweep") as progress, chosen(settings) as workers:
-            values = asked.measured(blocks, progress, **workers)
+        with command_line.progress_bar("sweep") as progress, chosen(settings) as how:
+            values = asked.measured(blocks, progress, **how)
         if settings.shard:
             return
         asked.write(values, ready, draws=not settings.no_figures)
         asked.write_series(blocks, ready)
 
-    how: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
-    work_or_show(settings, asked.facts(), work, **how)
+    more: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
+    work_or_show(settings, asked.facts(), work, **more)
 
 
 def main(

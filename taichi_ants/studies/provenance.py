@@ -10,6 +10,8 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from email.message import Message
+from email.parser import HeaderParser
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -71,18 +73,28 @@ def packages() -> dict[str, str]:
             continue
         done.add((name, extras))
         with suppress(metadata.PackageNotFoundError):
-            found[name] = metadata.version(name)
-            waiting.extend(_needed(name, extras))
+            facts = _facts_of(name)
+            found[name] = facts["Version"]
+            waiting.extend(_needed(name, facts, extras))
     found.pop("taichi-ants", None)
     return {"taichi_ants": __version__, **dict(sorted(found.items()))}
 
 
-def _needed(name: str, extras: frozenset[str]) -> Iterator[tuple[str, frozenset[str]]]:
+def _facts_of(name: str) -> Message:
+    """Return the metadata of a package without its description, which takes long to parse."""
+    found = metadata.distribution(name)
+    text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
+    return HeaderParser().parsestr(text.partition("\n\n")[0])
+
+
+def _needed(
+    name: str, facts: Message, extras: frozenset[str]
+) -> Iterator[tuple[str, frozenset[str]]]:
     """Yield the packages, with their extras, that a package with some extras requires."""
     is_own = name == "taichi-ants"
     if is_own:
-        extras = frozenset(metadata.metadata(name).get_all("Provides-Extra") or ()) - _OF_DEVELOPERS
-    for text in metadata.requires(name) or ():
+        extras = frozenset(facts.get_all("Provides-Extra") or ()) - _OF_DEVELOPERS
+    for text in facts.get_all("Requires-Dist") or ():
         one = Requirement(text)
         marker, other = one.marker, canonicalize_name(one.name)
         always = marker is None or marker.evaluate({"extra": ""})

@@ -278,6 +278,17 @@ def test_a_flipped_bit_never_changes_what_is_read(here):
     assert found > 60
 
 
+def test_an_archive_without_a_new_option_uses_its_default(copy, capsys):
+    manifest = read_manifest(copy)
+    del manifest["asked"]["options"]["no_figures"]
+    _write(copy, manifest)
+    assert call("archive", ["copy"], capsys)[0] == 0
+    status, out, _ = call("reproduce", ["copy.zip", "--trust-plugins"], capsys)
+    assert status == 1
+    assert "DIFFERENT  figures/deliveries.png (is not in the archive)\n" in out
+    assert "1 of 9 files differ" in out
+
+
 def test_an_index_that_declares_less_than_is_there_is_refused(here):
     with bundles.reading(here / "done.zip") as bundle:
         bundle._listed["results/runs.csv"]["bytes"] -= 1

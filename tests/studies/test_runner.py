@@ -424,4 +424,6 @@ def test_provenance():
     facts = provenance(["compare.py", "--out", "a b"])
     assert facts["command"] == "compare.py --out 'a b'"
     assert facts["packages"]["taichi"] == "1.7.4"
+    assert {"kiwisolver", "mdurl"} <= facts["packages"].keys()  # which Matplotlib and Rich need
+    assert not {"pytest", "mypy", "pip"} & facts["packages"].keys()
     assert {name: facts[name] for name in ("commit", "clean")} == source()
