@@ -1,17 +1,27 @@
-/* A colony of ants that share one table, in C with OpenMP, for comparison in colony_in_c.py.
+/* A colony of ants that share one table, in C, for comparison in colony_in_c.py.
  *
  * The rules, random numbers and arithmetic are those of the package (taichi_ants/engines/colony),
  * for two of its tasks: the paper's and foraging(). Results are equal to the bit if the compiler
- * does not fuse multiplications and additions (-ffp-contract=off). The design is that of a patient
- * programmer: small columns, one byte per cell for its content and one for what its ant wants,
- * three or four passes over the ants in a tick, and ants sorted by cell from time to time.
+ * does not fuse multiplications and additions (-ffp-contract=off). With OpenMP, several threads
+ * share each tick.
+ *
+ * The ants are an array of small structs, sorted by cell from time to time. A cell has one byte for
+ * its content and one for what its ant wants, so that a conflict reads all neighbours of a cell in
+ * three loads. The largest value of each state and the actions that have it are stored, and change
+ * only with the values of the state. A tick makes three or four passes over the ants, and one over
+ * the pairs of state and action that had errors.
  */
 #include <math.h>
-#include <omp.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#ifdef __BMI2__
+#ifdef _OPENMP
+#include <omp.h>
+#else
+static int omp_get_thread_num(void) { return 0; }
+static int omp_get_num_threads(void) { return 1; }
+#endif
+#ifdef __AVX2__
 #include <immintrin.h>
 #endif
 
@@ -24,7 +34,7 @@ enum { ENTER = 1, STANDS = 7, TAKE = 9, MARK = 15 };
 /* Flags in the same byte, which other ants read. */
 enum { HAS_FOOD = 16, TAKES_FOOD = 32, WINS = 64 };
 enum { ANT_SHIFT = 4 }; /* above the ground: 1 for an ant, 2 for a carrier */
-enum { TICKS_BETWEEN_SORTS = 8, CELLS_TOGETHER = 64, MOST_THREADS = 64 };
+enum { TICKS_BETWEEN_SORTS = 8, FEWEST_TO_SORT = 2048, CELLS_TOGETHER = 64, MOST_THREADS = 64 };
 
 typedef struct {
     int32_t size, n;
@@ -45,14 +55,32 @@ typedef struct {
     int64_t counts[4];      /* the results: returns, deliveries, moves, blocked */
 } Colony;
 
-/* Further columns of the ants, and the sums of TD errors of each thread. */
 typedef struct {
-    uint8_t *carries, *percept, *action, *want, *event, *wants;
-    uint16_t *state;
-    int32_t *carried;
-    int64_t *sums[MOST_THREADS];
-    int32_t *updates[MOST_THREADS];
-    float *latest[MOST_THREADS];
+    uint64_t random;
+    int32_t cell, carried;
+    uint16_t state;
+    uint8_t heading, carries, percept, action, want, event;
+} Ant;
+
+/* The largest value of a state, and a bit for each action that has it. */
+typedef struct {
+    float best;
+    uint32_t actions;
+} Greedy;
+
+/* The TD errors of a pair of state and action in a tick. */
+typedef struct {
+    int64_t sum; /* with 32 binary places */
+    int32_t updates;
+    float latest;
+} Errors;
+
+typedef struct {
+    Ant *ants;      /* (n) */
+    uint8_t *wants; /* (size) */
+    Greedy *greedy; /* (states) */
+    Errors *errors[MOST_THREADS]; /* of each thread, (states * ROW) */
+    int32_t *pairs[MOST_THREADS]; /* the pairs with errors: their number, then the pairs */
 } Work;
 
 #define INLINE static inline __attribute__((always_inline))
@@ -70,7 +98,7 @@ INLINE int below(uint64_t word, int n) { return (int)((word * (uint64_t)n) >> 32
 
 INLINE int bit_number(unsigned mask, int k)
 {
-#ifdef __BMI2__
+#ifdef __AVX2__
     return __builtin_ctz(_pdep_u32(1u << k, mask));
 #else
     while (k--)
@@ -89,22 +117,39 @@ INLINE int turned(int heading, int action)
     return after[action][heading];
 }
 
+/* 0 for actions that do not move. */
+INLINE int code_in_view(int percept, int action) { return percept << 2 * action >> 4 & 3; }
+
 INLINE int goals_in_view(int percept)
 {
     int both = percept & percept >> 1;
     return (both >> 4 & 1) | (both >> 1 & 2) | (both & 1) << 2;
 }
 
-/* Without a branch, because the processor cannot predict what the next ant does. */
-INLINE int choose(const float *q, uint64_t bits, uint64_t explore_below)
+/* Unused places of a row hold minus infinity. */
+INLINE Greedy greedy_of(const float *row)
 {
-    float best = q[0];
+#ifdef __AVX2__
+    __m256 values = _mm256_loadu_ps(row);
+    __m128 best = _mm_max_ps(_mm256_castps256_ps128(values), _mm256_extractf128_ps(values, 1));
+    best = _mm_max_ps(best, _mm_movehl_ps(best, best));
+    best = _mm_max_ss(best, _mm_movehdup_ps(best));
+    __m256 equal = _mm256_cmp_ps(values, _mm256_broadcastss_ps(best), _CMP_EQ_OQ);
+    return (Greedy){_mm_cvtss_f32(best), (uint32_t)_mm256_movemask_ps(equal)};
+#else
+    Greedy greedy = {row[0], 0};
     for (int a = 1; a < N_ACTIONS; a++)
-        best = q[a] > best ? q[a] : best;
-    unsigned mask = 0;
+        greedy.best = row[a] > greedy.best ? row[a] : greedy.best;
     for (int a = 0; a < N_ACTIONS; a++)
-        mask |= (unsigned)(q[a] == best) << a;
-    mask = bits >> 32 < explore_below ? (1 << N_ACTIONS) - 1 : mask;
+        greedy.actions |= (uint32_t)(row[a] == greedy.best) << a;
+    return greedy;
+#endif
+}
+
+/* Without a branch, because the processor cannot predict what the next ant does. */
+INLINE int choose(unsigned greedy, uint64_t bits, uint64_t explore_below)
+{
+    unsigned mask = bits >> 32 < explore_below ? (1 << N_ACTIONS) - 1 : greedy;
     return bit_number(mask, below(bits & 0xFFFFFFFFu, __builtin_popcount(mask)));
 }
 
@@ -152,7 +197,8 @@ INLINE int see(const Colony *c, int foraging, int cell, int heading, int carries
     return carries << 6 | codes[0] << 4 | codes[1] << 2 | codes[2];
 }
 
-INLINE void deposit(const Colony *c, int foraging, int cell, int clock, int carried)
+/* The new value of a cell in `trail`. */
+INLINE int after_deposit(const Colony *c, int foraging, int cell, int clock, int carried)
 {
     int laid = c->level;
     if (foraging) {
@@ -160,21 +206,21 @@ INLINE void deposit(const Colony *c, int foraging, int cell, int clock, int carr
         int before = level_of(c, cell, clock);
         laid = before > laid ? before : laid;
     }
-    c->trail[cell] = clock + laid;
+    return clock + laid;
 }
 
-INLINE void choose_and_want(const Colony *c, const Work *w, int foraging, int i)
+INLINE void choose_and_want(const Colony *c, const Work *w, int foraging, Ant *ant)
 {
-    int row = foraging ? w->state[i] : w->percept[i], percept = w->percept[i];
-    uint64_t random = advance(c->random[i]);
-    int action = choose(c->q + row * ROW, bits_of(random), c->explore_below);
-    int cell = c->cells[i], heading = turned(c->headings[i], action);
-    int enters = !(percept >> (4 - 2 * (action & 3)) & 1);
+    int percept = ant->percept, row = foraging ? ant->state : percept;
+    uint64_t random = advance(ant->random);
+    int action = choose(w->greedy[row].actions, bits_of(random), c->explore_below);
+    int cell = ant->cell, heading = turned(ant->heading, action);
+    int enters = !(code_in_view(percept, action) & 1);
     if (foraging)
         enters |= c->ground[cell + c->steps[heading + 1]] >> ANT_SHIFT;
-    int want = enters & (action <= RIGHT) ? ENTER + heading : foraging ? STANDS : 0;
+    int want = (enters & (action <= RIGHT)) ? ENTER + heading : foraging ? STANDS : 0;
     int foods = goals_in_view(percept);
-    if (foods && action == PICK_UP && !w->carries[i]) {
+    if ((foods != 0) & (action == PICK_UP) & !ant->carries) {
         int k = 0;
         if (foods & (foods - 1)) {
             random = advance(random);
@@ -183,11 +229,11 @@ INLINE void choose_and_want(const Colony *c, const Work *w, int foraging, int i)
         int towards = heading + bit_number(foods, k) + N_HEADINGS - 1;
         want = (TAKE + towards % N_HEADINGS) | (foraging ? TAKES_FOOD : 0);
     }
-    c->random[i] = random;
-    c->headings[i] = heading;
-    w->action[i] = action;
-    w->want[i] = want & MARK;
-    w->wants[cell] = want | (foraging && w->carries[i] ? HAS_FOOD : 0);
+    ant->random = random;
+    ant->heading = heading;
+    ant->action = action;
+    ant->want = want & MARK;
+    w->wants[cell] = want | (foraging ? ant->carries * HAS_FOOD : 0);
 }
 
 INLINE int wanted_by(const Colony *c, int cell, int want)
@@ -195,14 +241,38 @@ INLINE int wanted_by(const Colony *c, int cell, int want)
     return cell + c->steps[(want & 7)]; /* both ENTER and TAKE are 1 modulo 8, as `steps` begins */
 }
 
+/* Return the bytes of the neighbours of a cell, in the order of AROUND. Cells are stored in rows:
+ * the neighbours at headings 4 and 5, at 2 and 1, and at 3 and 0 with the cell between them are
+ * next to each other. The last byte is of another cell. */
+INLINE uint64_t around(const Colony *c, const uint8_t *wants, int cell)
+{
+    uint16_t before, after;
+    uint32_t row;
+    memcpy(&before, wants + cell + c->steps[5], sizeof before);
+    memcpy(&after, wants + cell + c->steps[3], sizeof after);
+    memcpy(&row, wants + cell - 1, sizeof row);
+    return before | (uint64_t)after << 16 | (uint64_t)row << 32;
+}
+
+static const int8_t AROUND[8] = {4, 5, 2, 1, 3, -1, 0, -1};
+#define EACH(byte) ((byte) * (uint64_t)0x0101010101010101)
+
+/* Return bit 7 of the byte of each neighbour that wants to enter or take a cell, and whose other
+ * `bits` are those of `mark`; the bytes are those of `around` this cell. */
+INLINE uint64_t who_want(uint64_t marks, int bits, int mark)
+{
+    const uint64_t enters = 0xFF04FF0105060302, neighbours = 0x00FF00FFFFFFFFFF;
+    uint64_t other = (marks & EACH(bits) & neighbours) ^ (enters | EACH(mark));
+    return ~(((other & EACH(127)) + EACH(127)) | other) & EACH(128);
+}
+
 static __attribute__((noinline)) int beats_rivals(
-    const int32_t *steps, const uint8_t *wants, int cell, int wanted, int kind, int tick)
+    const int32_t *steps, uint64_t rivals, int cell, int wanted, int tick)
 {
     uint64_t own = bits_of(advance(bits_of(advance(cell)) ^ (uint64_t)tick));
-    for (int h = 0; h < N_HEADINGS; h++) {
-        int other = wanted + steps[h + 1];
-        if ((wants[other] & MARK) == (kind | (1 + round_turned(h))) && other != cell &&
-            bits_of(advance(bits_of(advance(other)) ^ (uint64_t)tick)) <= own)
+    for (; rivals; rivals &= rivals - 1) {
+        int other = wanted + steps[AROUND[__builtin_ctzll(rivals) >> 3] + 1];
+        if (other != cell && bits_of(advance(bits_of(advance(other)) ^ (uint64_t)tick)) <= own)
             return 0;
     }
     return 1;
@@ -211,10 +281,9 @@ static __attribute__((noinline)) int beats_rivals(
 /* Whether an ant wins: no other ant wants the same, or its key is the smallest. */
 INLINE int wins(const Colony *c, const Work *w, int cell, int want, int tick)
 {
-    int wanted = wanted_by(c, cell, want), kind = want & 8, rivals = -1;
-    for (int h = 0; h < N_HEADINGS; h++)
-        rivals += (w->wants[wanted + c->steps[h + 1]] & MARK) == (kind | (1 + round_turned(h)));
-    return rivals <= 0 || beats_rivals(c->steps, w->wants, cell, wanted, kind, tick);
+    int wanted = wanted_by(c, cell, want);
+    uint64_t rivals = who_want(around(c, w->wants, wanted), MARK, want & 8);
+    return !(rivals & (rivals - 1)) || beats_rivals(c->steps, rivals, cell, wanted, tick);
 }
 
 INLINE int claims(int want) { return want != 0 && want != STANDS; }
@@ -222,12 +291,9 @@ INLINE int claims(int want) { return want != 0 && want != STANDS; }
 /* The heading towards the carrier that wins the cell of another ant, -1 if none does. */
 INLINE int pushed_towards(const Colony *c, const Work *w, int cell)
 {
-    int found = -1;
-    for (int h = 0; h < N_HEADINGS; h++) {
-        int mark = w->wants[cell + c->steps[h + 1]] & (MARK | WINS | HAS_FOOD);
-        found = mark == ((1 + round_turned(h)) | WINS | HAS_FOOD) ? h : found;
-    }
-    return found;
+    const int bits = WINS | HAS_FOOD;
+    uint64_t found = who_want(around(c, w->wants, cell), MARK | bits, bits);
+    return found ? AROUND[__builtin_ctzll(found) >> 3] : -1;
 }
 
 INLINE int gives_way(const Colony *c, const Work *w, int cell)
@@ -239,31 +305,32 @@ INLINE int gives_way(const Colony *c, const Work *w, int cell)
 }
 
 /* Under the rules of foraging: mark winners, and judge whether a cell with an ant is a lure. */
-INLINE void resolve(const Colony *c, const Work *w, int i, int tick, int clock)
+INLINE void resolve(const Colony *c, const Work *w, Ant *ant, int tick, int clock)
 {
-    int cell = c->cells[i], want = w->want[i];
+    int cell = ant->cell, want = ant->want;
     if (!claims(want))
         return;
     if (!wins(c, w, cell, want, tick)) {
-        w->want[i] = STANDS;
+        ant->want = STANDS;
         return;
     }
     w->wants[cell] |= WINS;
     if (want < TAKE) {
         int ahead = wanted_by(c, cell, want);
-        int code = w->percept[i] >> (4 - 2 * w->action[i]) & 3;
+        int code = code_in_view(ant->percept, ant->action);
         if (w->wants[ahead]) {
-            int better = w->carries[i] ? c->closer[cell] >> c->headings[i] & 1
-                                       : level_of(c, ahead, clock) > level_of(c, cell, clock);
+            int better = ant->carries ? c->closer[cell] >> ant->heading & 1
+                                      : level_of(c, ahead, clock) > level_of(c, cell, clock);
             code = better ? ENTERED_LURE : ENTERED_EMPTY;
         }
-        w->event[i] = code;
+        ant->event = code;
     }
 }
 
-INLINE void act(const Colony *c, const Work *w, int foraging, int i, int tick, int clock, int64_t *counts)
+INLINE void act(const Colony *c, const Work *w, int foraging, Ant *ant, int tick, int clock,
+                int64_t *counts)
 {
-    int cell = c->cells[i], want = w->want[i], action = w->action[i], carries = w->carries[i];
+    int cell = ant->cell, want = ant->want, action = ant->action, carries = ant->carries;
     int wanted = wanted_by(c, cell, want), claim = claims(want), event = FAILED, goes = cell;
     int moves = action <= RIGHT, filled = 0, came = 0;
     if (foraging) {
@@ -275,7 +342,7 @@ INLINE void act(const Colony *c, const Work *w, int foraging, int i, int tick, i
             if (enters) {
                 goes = wanted;
                 came = want;
-                event = w->event[i];
+                event = ant->event;
             }
         }
         if (!enters) {
@@ -289,105 +356,99 @@ INLINE void act(const Colony *c, const Work *w, int foraging, int i, int tick, i
         }
         counts[3] += moves && !enters;
     } else {
-        claim &= wins(c, w, cell, want, tick); /* also if it wants nothing, which is faster than a branch */
+        claim &= wins(c, w, cell, want, tick); /* also if it wants nothing: faster than a branch */
         int enters = moves & claim;
         goes = enters ? wanted : cell;
         came = enters ? want : 0;
-        event = enters ? w->percept[i] >> (4 - 2 * (action & 3)) & 3 : FAILED;
+        event = enters ? code_in_view(ant->percept, action) : FAILED;
         counts[3] += moves & !claim;
     }
     counts[2] += moves;
     if (!filled)
         c->ground[cell] = EMPTY;
-    if (carries) {
-        if (goes != cell)
-            deposit(c, foraging, goes, clock, foraging ? w->carried[i] : 0);
-        else if (action == GIVE && goals_in_view(w->percept[i])) {
-            event = DELIVERED;
-            carries = w->carries[i] = 0;
-            if (foraging)
-                w->carried[i] = 0;
-            counts[1]++;
-        }
-    } else if (!moves && claim) {
+    int32_t nowhere; /* without a branch, too */
+    *((carries & (goes != cell)) ? &c->trail[goes] : &nowhere) =
+        after_deposit(c, foraging, goes, clock, ant->carried);
+    if (carries & (action == GIVE) & (goals_in_view(ant->percept) != 0)) {
+        event = DELIVERED;
+        carries = ant->carries = 0;
+        if (foraging)
+            ant->carried = 0;
+        counts[1]++;
+    } else if (!carries & !moves & claim) {
         event = PICKED_UP;
-        carries = w->carries[i] = 1;
+        carries = ant->carries = 1;
         c->ground[wanted] = EMPTY;
-        deposit(c, foraging, wanted, clock, 0);
-        deposit(c, foraging, cell, clock, 0);
-        c->headings[i] = round_turned(c->headings[i]);
+        c->trail[wanted] = after_deposit(c, foraging, wanted, clock, 0);
+        c->trail[cell] = after_deposit(c, foraging, cell, clock, 0);
+        ant->heading = round_turned(ant->heading);
     }
     c->ground[goes] = OBSTACLE | (1 + carries) << ANT_SHIFT;
-    c->cells[i] = goes;
+    ant->cell = goes;
     if (foraging)
-        w->carried[i] += carries;
-    w->event[i] = event;
-    w->want[i] = came;
+        ant->carried += carries;
+    ant->event = event;
+    ant->want = came;
     counts[0] += c->rewards[event];
 }
 
-INLINE void sense_and_learn(const Colony *c, const Work *w, int foraging, int i, int clock, int thread)
+/* `pairs` has the n pairs that the thread has updated in this tick; return the new n. */
+INLINE int sense_and_learn(const Colony *c, const Work *w, int foraging, Ant *ant, int clock,
+                           Errors *errors, int32_t *pairs, int n)
 {
-    int event = w->event[i], row = 0, cell = c->cells[i];
-    int percept = see(c, foraging, cell, c->headings[i], w->carries[i], clock, &row);
-    row = foraging ? row : percept;
-    int pair = (foraging ? w->state[i] : w->percept[i]) * ROW + w->action[i];
-    const float *next = c->q + row * ROW;
-    float best = next[0], discount = event == DELIVERED ? 0.0f : c->discount;
-    for (int a = 1; a < N_ACTIONS; a++)
-        best = next[a] > best ? next[a] : best;
-    float error = (float)c->rewards[event] + discount * best - c->q[pair];
-    w->updates[thread][pair]++;
-    w->sums[thread][pair] += (int64_t)floor((double)error * 4294967296.0 + 0.5);
-    w->latest[thread][pair] = error;
-    w->percept[i] = percept;
+    int event = ant->event, row = 0, cell = ant->cell;
+    int percept = see(c, foraging, cell, ant->heading, ant->carries, clock, &row);
+    int next = foraging ? row : percept;
+    int pair = (foraging ? ant->state : ant->percept) * ROW + ant->action;
+    float discount = event == DELIVERED ? 0.0f : c->discount;
+    float error = (float)c->rewards[event] + discount * w->greedy[next].best - c->q[pair];
+    pairs[n] = pair;
+    n += errors[pair].updates == 0;
+    errors[pair].updates++;
+    errors[pair].sum += (int64_t)floor((double)error * 4294967296.0 + 0.5);
+    errors[pair].latest = error;
+    ant->percept = percept;
     if (foraging)
-        w->state[i] = row;
-    w->wants[cell - (w->want[i] ? c->steps[w->want[i]] : 0)] = 0; /* its previous cell */
+        ant->state = row;
+    w->wants[cell - (ant->want ? c->steps[ant->want] : 0)] = 0; /* its previous cell */
+    return n;
 }
 
 /* Update the table by the errors of all threads, and reset the errors. */
 INLINE void apply(const Colony *c, const Work *w, int threads)
 {
-    for (int pair = 0; pair < c->states * ROW; pair++) {
-        int updates = 0;
-        int64_t sum = 0;
-        float error = 0;
-        for (int t = 0; t < threads; t++) {
-            if (w->updates[t][pair]) {
-                updates += w->updates[t][pair];
-                sum += w->sums[t][pair];
-                error = w->latest[t][pair];
-                w->updates[t][pair] = 0;
-                w->sums[t][pair] = 0;
-            }
+    Errors *all = w->errors[0];
+    int32_t *pairs = w->pairs[0] + 1, n = w->pairs[0][0];
+    for (int t = 1; t < threads; t++)
+        for (int k = 1; k <= w->pairs[t][0]; k++) {
+            int pair = w->pairs[t][k];
+            pairs[n] = pair;
+            n += all[pair].updates == 0;
+            all[pair].updates += w->errors[t][pair].updates;
+            all[pair].sum += w->errors[t][pair].sum;
+            all[pair].latest = w->errors[t][pair].latest;
+            w->errors[t][pair] = (Errors){0};
         }
-        if (updates) {
-            if (updates > 1)
-                error = (float)((double)sum / ((double)updates * 4294967296.0));
-            c->q[pair] += c->weights[updates] * error;
-        }
+    for (int k = 0; k < n; k++) {
+        int pair = pairs[k], updates = all[pair].updates;
+        float error = all[pair].latest;
+        if (updates > 1)
+            error = (float)((double)all[pair].sum / ((double)updates * 4294967296.0));
+        c->q[pair] += c->weights[updates] * error;
+        all[pair] = (Errors){0};
+        w->greedy[pair / ROW] = greedy_of(c->q + pair / ROW * ROW);
     }
 }
 
-#define REORDER(column)                                                                            \
-    do {                                                                                           \
-        _Pragma("omp for schedule(static)") for (int i = 0; i < c->n; i++)                         \
-            memcpy((char *)spare + (size_t)i * sizeof *(column), &(column)[order[i]],              \
-                   sizeof *(column));                                                              \
-        _Pragma("omp for schedule(static)") for (int i = 0; i < c->n; i++)                         \
-            memcpy(&(column)[i], (char *)spare + (size_t)i * sizeof *(column), sizeof *(column));  \
-    } while (0)
-
 /* Store the ants in the order of groups of cells, by a counting sort of all threads. */
-INLINE void sort(const Colony *c, const Work *w, int foraging, int *places, int *order, void *spare)
+INLINE void sort(const Colony *c, const Work *w, int *places, Ant *spare)
 {
     int groups = c->size / CELLS_TOGETHER + 1, thread = omp_get_thread_num();
     int threads = omp_get_num_threads();
     memset(places + thread * groups, 0, groups * sizeof *places);
 #pragma omp for schedule(static)
     for (int i = 0; i < c->n; i++)
-        places[thread * groups + c->cells[i] / CELLS_TOGETHER]++;
+        places[thread * groups + w->ants[i].cell / CELLS_TOGETHER]++;
 #pragma omp single
     for (int group = 0, before = 0; group < groups; group++)
         for (int t = 0; t < threads; t++) {
@@ -397,23 +458,17 @@ INLINE void sort(const Colony *c, const Work *w, int foraging, int *places, int 
         }
 #pragma omp for schedule(static)
     for (int i = 0; i < c->n; i++)
-        order[places[thread * groups + c->cells[i] / CELLS_TOGETHER]++] = i;
-    REORDER(c->cells);
-    REORDER(c->headings);
-    REORDER(c->random);
-    REORDER(w->carries);
-    REORDER(w->percept);
-    if (foraging) {
-        REORDER(w->state);
-        REORDER(w->carried);
-    }
+        spare[places[thread * groups + w->ants[i].cell / CELLS_TOGETHER]++] = w->ants[i];
+#pragma omp for schedule(static)
+    for (int i = 0; i < c->n; i++)
+        w->ants[i] = spare[i];
 }
 
 INLINE void run_as(Colony *colony, const Work *work, int foraging, int ticks, int threads)
 {
     int groups = colony->size / CELLS_TOGETHER + 1;
-    int *places = malloc(sizeof(int) * groups * threads), *order = malloc(sizeof(int) * colony->n);
-    void *spare = malloc(8 * (size_t)colony->n);
+    int *places = malloc(sizeof(int) * groups * threads);
+    Ant *spare = malloc(sizeof(Ant) * colony->n);
 #pragma omp parallel num_threads(threads)
     {
         /* Copies that no store through a byte pointer can change. */
@@ -423,29 +478,34 @@ INLINE void run_as(Colony *colony, const Work *work, int foraging, int ticks, in
         int thread = omp_get_thread_num();
 #pragma omp for schedule(static)
         for (int i = 0; i < c->n; i++) {
-            int row = 0;
-            w->percept[i] = see(c, foraging, c->cells[i], c->headings[i], 0, 0, &row);
-            if (foraging)
-                w->state[i] = row;
+            int row = 0, cell = c->cells[i], heading = c->headings[i];
+            int percept = see(c, foraging, cell, heading, 0, 0, &row);
+            w->ants[i] = (Ant){.random = c->random[i], .cell = cell, .heading = heading,
+                               .percept = percept, .state = row};
         }
         for (int tick = 0; tick < ticks; tick++) {
-            int clock = tick * c->evaporates;
-            if (tick % TICKS_BETWEEN_SORTS == 0)
-                sort(c, w, foraging, places, order, spare);
+            int clock = tick * c->evaporates, n = 0;
+            if (c->n >= FEWEST_TO_SORT && tick % TICKS_BETWEEN_SORTS == 0)
+                sort(c, w, places, spare);
 #pragma omp for schedule(static)
             for (int i = 0; i < c->n; i++)
-                choose_and_want(c, w, foraging, i);
+                choose_and_want(c, w, foraging, w->ants + i);
             if (foraging) {
 #pragma omp for schedule(static)
                 for (int i = 0; i < c->n; i++)
-                    resolve(c, w, i, tick, clock);
+                    resolve(c, w, w->ants + i, tick, clock);
             }
 #pragma omp for schedule(static)
             for (int i = 0; i < c->n; i++)
-                act(c, w, foraging, i, tick, clock, counts);
-#pragma omp for schedule(static)
+                act(c, w, foraging, w->ants + i, tick, clock, counts);
+            clock += c->evaporates;
+            Errors *errors = w->errors[thread];
+            int32_t *pairs = w->pairs[thread];
+#pragma omp for schedule(static) nowait
             for (int i = 0; i < c->n; i++)
-                sense_and_learn(c, w, foraging, i, (tick + 1) * c->evaporates, thread);
+                n = sense_and_learn(c, w, foraging, w->ants + i, clock, errors, pairs + 1, n);
+            pairs[0] = n;
+#pragma omp barrier
 #pragma omp single
             apply(c, w, threads);
         }
@@ -454,34 +514,32 @@ INLINE void run_as(Colony *colony, const Work *work, int foraging, int ticks, in
             colony->counts[k] += counts[k];
     }
     free(places);
-    free(order);
     free(spare);
 }
 
-/* Run an episode of some ticks, in which ants start without food. Return the seconds of the ticks. */
-double run(Colony *c, int foraging, int ticks, int threads)
+/* Run an episode of some ticks, in which ants start without food. */
+void run(Colony *c, int foraging, int ticks, int threads)
 {
     Work w;
-    size_t n = c->n, pairs = (size_t)c->states * ROW;
-    uint8_t *columns = calloc(n, 5);
-    w.carries = columns, w.percept = columns + n, w.action = columns + 2 * n;
-    w.want = columns + 3 * n, w.event = columns + 4 * n;
+    size_t pairs = (size_t)c->states * ROW;
+    w.ants = malloc(c->n * sizeof *w.ants);
     w.wants = calloc(c->size, 1);
-    w.state = calloc(n, sizeof *w.state);
-    w.carried = calloc(n, sizeof *w.carried);
+    w.greedy = malloc(c->states * sizeof *w.greedy);
     for (int t = 0; t < threads; t++) {
-        w.sums[t] = calloc(pairs + 64, sizeof **w.sums);
-        w.updates[t] = calloc(pairs + 64, sizeof **w.updates);
-        w.latest[t] = calloc(pairs + 64, sizeof **w.latest);
+        w.errors[t] = calloc(pairs + 64, sizeof **w.errors); /* no cache line is shared */
+        w.pairs[t] = calloc(pairs + 64, sizeof **w.pairs);
     }
-    double began = omp_get_wtime();
+    for (int state = 0; state < c->states; state++) {
+        float *row = c->q + state * ROW;
+        for (int a = N_ACTIONS; a < ROW; a++)
+            row[a] = -INFINITY;
+        w.greedy[state] = greedy_of(row);
+    }
     if (foraging)
         run_as(c, &w, 1, ticks, threads);
     else
         run_as(c, &w, 0, ticks, threads);
-    double seconds = omp_get_wtime() - began;
     for (int t = 0; t < threads; t++)
-        free(w.sums[t]), free(w.updates[t]), free(w.latest[t]);
-    free(columns), free(w.wants), free(w.state), free(w.carried);
-    return seconds;
+        free(w.errors[t]), free(w.pairs[t]);
+    free(w.ants), free(w.wants), free(w.greedy);
 }

@@ -2,15 +2,15 @@
 
 Ants are spread over open worlds, with eight cells per ant, and learn into one table by Q-learning,
 under the rules of `paper()` and of `foraging()`. The program colony.c does the same with as many
-threads, and its results are bit-for-bit equal. The command measures both in turn, several times.
-The table contains medians, and ratios above 1 where Taichi Ants is faster. On a busy machine, use
-`--threads 1`, which is measured by processor time; several threads in C wait long for each other.
+threads, and its results are bit-for-bit equal. CC sets its compiler; else it is clang, which makes
+it faster than gcc does. The command measures both in turn, several times. The table contains
+medians, and ratios above 1 where Taichi Ants is faster. On a busy machine, use `--threads 1`, which
+is measured by processor time; several threads in C wait long for each other.
 """
 
 from __future__ import annotations
 
 import ctypes
-import subprocess
 import tempfile
 from collections.abc import Sequence
 from dataclasses import astuple
@@ -19,13 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 from measuring import PAGE, Work, a_ratio, machine, pace, publish
-from throughput import FLAGS, compiler
+from throughput import compile_c, compiler, compiler_note
 
 from taichi_ants import Task, TrainingConfig, runtime, worlds
 from taichi_ants.analysis.tables import Table, figure, interval, plain_text, thousands
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.stepping import kernel_numbers
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, count
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 from taichi_ants.task import foraging
 
@@ -62,14 +62,15 @@ class Lived(NamedTuple):
     blocked: int
 
 
-def load(command: str, folder: str | Path) -> ctypes.CDLL:
-    """Return the library of colony.c, compiled in a folder."""
-    library = Path(folder) / "colony.so"
-    given = [command, *FLAGS, "-fopenmp", "-o", library, SOURCE, "-lm"]
-    subprocess.run(given, check=True, capture_output=True)
-    loaded = ctypes.CDLL(str(library))
+def load(command: str, folder: str | Path, threads: int) -> ctypes.CDLL:
+    """Return the library of colony.c, compiled in a folder for some threads.
+
+    Raises:
+        AntsError: The compiler fails, for example because it has no OpenMP.
+    """
+    loaded = compile_c(command, [SOURCE], Path(folder) / "colony.so", threads)
     loaded.run.argtypes = ctypes.POINTER(CColony), ctypes.c_int, ctypes.c_int, ctypes.c_int
-    loaded.run.restype = ctypes.c_double
+    loaded.run.restype = None
     return loaded
 
 
@@ -165,8 +166,8 @@ def _millions(work: Work, seconds: float, threads: int) -> float:
     return 1e3 / nanoseconds if threads == 1 else steps / 1e6
 
 
-def table(found: dict[tuple[str, int], np.ndarray], threads: int) -> Table:
-    """Return a table of medians, and of ratios within the rounds."""
+def table(found: dict[tuple[str, int], np.ndarray], threads: int, compiled: str) -> Table:
+    """Return a table of medians, and of ratios within the rounds; `compiled` is a note."""
     rows = []
     for (rules, n), paces in found.items():
         ratios = paces[:, 0] / paces[:, 1]
@@ -175,8 +176,9 @@ def table(found: dict[tuple[str, int], np.ndarray], threads: int) -> Table:
         rows.append([rules, thousands(n), *shown, figure(np.median(ratios)), spread])
     columns = ["rules", "ants", "ours, M steps/s", "C", "ours to C", "lowest, highest"]
     rounds = len(next(iter(found.values())))
-    about = f"Medians of {rounds} rounds, with {threads} threads. {machine(('taichi', 'numpy'))}"
-    return Table("A colony compared with C", columns, rows, [about], text_columns=1)
+    medians = f"Medians of {count(rounds, 'round')}, with {count(threads, 'thread')}."
+    notes = [f"{medians} {machine(('taichi', 'numpy'))}", compiled]
+    return Table("A colony compared with C", columns, rows, notes, text_columns=1)
 
 
 def compare(
@@ -189,11 +191,11 @@ def compare(
     """
     threads = runtime.start(threads).threads
     if (command := compiler()) is None:
-        print("There is no C compiler (cc, gcc, clang or CC), so the comparison is skipped.")
+        print("There is no C compiler (CC, clang, gcc or cc), so the comparison is skipped.")
         return
     with tempfile.TemporaryDirectory() as folder:
-        found = measured(load(command, folder), ants, rounds, threads, _SECONDS)
-    made = table(found, threads)
+        found = measured(load(command, folder, threads), ants, rounds, threads, _SECONDS)
+    made = table(found, threads, compiler_note(command, threads))
     print(plain_text([made], 120), end="")
     if publishes:
         publish("colony", [made], PAGE)
@@ -210,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    sizes = [10_000, 100_000, 1_000_000]
+    sizes = [64, 1000, 10_000, 100_000, 1_000_000]
     several = {"type": whole_number(1), "nargs": "+", "default": sizes, "metavar": "N"}
     add("--ants", **several, help="measure worlds with N ants")
     add("--rounds", type=whole_number(1), default=5, metavar="N", help="measure each N times")

@@ -1,8 +1,11 @@
 """Compare the speed of vector environments with that of the engine of `taichi_ants.train`.
 
-All ants act at random in the paper's world. Environments get actions that were drawn before; the
-engine draws them itself, with epsilon 1. The command measures both in turn, several times. The
-table contains medians, and the ratio of each median to that of the engine.
+All ants act at random in the paper's world. `step` and `rollout` get actions that were drawn
+before. "policy" is a rollout that draws them itself, as the engine does, with epsilon 1. Rollouts
+have up to two million steps of all environments, and reuse their arrays. The command measures
+all in turn, several times. The table contains medians: steps per second by the wall clock, and
+processor time per step of all threads together. Ratios are those of the engine's processor time,
+which other programs hardly change, and of its wall-clock time.
 """
 
 from __future__ import annotations
@@ -19,66 +22,94 @@ from taichi_ants.studies.command_line import Parser, run_command, whole_number
 
 ID = "taichi_ants/HexForage-v0"
 _STEPS = 6_000_000  # of all ants in a measurement, roughly
-_BATCHES = 16  # of actions that are drawn before the measurement
+_STEPS_OF_ROLLOUT = 1 << 21  # of all environments
+_MOST_LENGTH = 1024
 
 
-def engine() -> tuple[int, float]:
-    """Return steps and wall-clock seconds of random ants in the engine of independent runs."""
-    rollouts = _STEPS // 600
-    began = time.perf_counter()
-    outcome = evaluate(worlds.paper(), random_policy()[None], rollouts, epsilon=1.0)
-    return int(outcome.steps.sum()), time.perf_counter() - began
+Measured = tuple[int, float, float]  # steps, wall-clock seconds, processor seconds
 
 
-def vector(num_envs: int) -> Callable[[], tuple[int, float]]:
-    """Return a function that steps a vector environment, and returns steps and seconds."""
-    env = gymnasium.make_vec(ID, num_envs=num_envs)
+def timed(work: Callable[[], int]) -> Measured:
+    """Return the steps of some work, and the time it takes."""
+    began, cpu = time.perf_counter(), time.process_time()
+    steps = work()
+    return steps, time.perf_counter() - began, time.process_time() - cpu
+
+
+def engine() -> int:
+    """Return the steps of random ants in the engine of independent runs."""
+    outcome = evaluate(worlds.paper(), random_policy()[None], _STEPS // 600, epsilon=1.0)
+    return int(outcome.steps.sum())
+
+
+def vector(num_envs: int) -> dict[str, Callable[[], int]]:
+    """Return functions that step a vector environment in several ways."""
+    env = gymnasium.make_vec(ID, num_envs=num_envs, observation_format="index")
     env.reset(seed=0)
-    actions = np.random.default_rng(0).integers(0, 5, (_BATCHES, num_envs))
-    for batch in actions:  # compiles kernels and spreads the ants
-        env.step(batch)
+    length = max(1, min(_MOST_LENGTH, _STEPS_OF_ROLLOUT // num_envs))
+    actions = np.random.default_rng(0).integers(0, 5, (length, num_envs))
+    given, drawn = env.rollout(actions), env.rollout("random", length)  # compiles kernels
+    rollouts = max(1, _STEPS // (length * num_envs))
 
-    def measured() -> tuple[int, float]:
-        steps = max(1, _STEPS // num_envs)
-        began = time.perf_counter()
-        for step in range(steps):
-            env.step(actions[step % _BATCHES])
-        return steps * num_envs, time.perf_counter() - began
+    def step() -> int:
+        for t in range(steps := max(1, _STEPS // num_envs)):
+            env.step(actions[t % length])
+        return steps * num_envs
 
-    return measured
+    def rollout() -> int:
+        for _ in range(rollouts):
+            env.rollout(actions, out=given)
+        return rollouts * length * num_envs
+
+    def policy() -> int:
+        for _ in range(rollouts):
+            env.rollout("random", length, epsilon=1.0, out=drawn)
+        return rollouts * length * num_envs
+
+    return {f"{num_envs} {one.__name__}": one for one in (step, rollout, policy)}
 
 
-def single() -> tuple[int, float]:
-    """Return steps and seconds of one environment, with all wrappers of `gymnasium.make`."""
+def single() -> int:
+    """Return the steps of one environment, with all wrappers of `gymnasium.make`."""
     env = gymnasium.make(ID)
     env.reset(seed=0)
     actions = np.random.default_rng(0).integers(0, 5, 20_000).tolist()
-    began = time.perf_counter()
     for action in actions:
         _, _, terminated, truncated, _ = env.step(action)
         if terminated or truncated:
             env.reset()
-    return len(actions), time.perf_counter() - began
+    return len(actions)
 
 
 def measure(num_envs: list[int], rounds: int, threads: int | None) -> None:
-    """Print a line for the engine, and for each number of environments."""
+    """Print a line for the engine, and for each way to step each number of environments."""
     runtime.start(threads)
     import taichi_ants.envs  # noqa: F401 (registers)
 
-    subjects: dict[str, Callable[[], tuple[int, float]]] = {"engine": engine, "1": single}
-    subjects |= {str(n): vector(n) for n in num_envs if n > 1}
-    engine(), single()
-    paces: dict[str, list[float]] = {name: [] for name in subjects}
+    subjects: dict[str, Callable[[], int]] = {"engine": engine, "1 step": single}
+    for n in num_envs:
+        subjects |= vector(n) if n > 1 else {}
+    for subject in subjects.values():
+        subject()
+    measured: dict[str, list[Measured]] = {name: [] for name in subjects}
     for _ in range(rounds):
         for name, subject in subjects.items():
-            steps, seconds = subject()
-            paces[name].append(steps / seconds / 1e6)
-    medians = {name: float(np.median(values)) for name, values in paces.items()}
-    print(f"{'environments':>14}{'M steps/s':>11}{'lowest':>9}{'highest':>9}{'of engine':>11}")
+            measured[name].append(timed(subject))
+    print(
+        f"{'':>14}{'M steps/s':>11}{'lowest':>9}{'highest':>9}{'of engine':>11}"
+        f"{'CPU ns':>9}{'of engine':>11}"
+    )
+    paces = {name: [n / wall / 1e6 for n, wall, _ in given] for name, given in measured.items()}
+    costs = {
+        name: float(np.median([cpu / n * 1e9 for n, _, cpu in given]))
+        for name, given in measured.items()
+    }
     for name, values in paces.items():
-        share = medians[name] / medians["engine"]
-        print(f"{name:>14}{medians[name]:11.3f}{min(values):9.3f}{max(values):9.3f}{share:11.3f}")
+        share = float(np.median(values) / np.median(paces["engine"]))
+        print(
+            f"{name:>14}{np.median(values):11.3f}{min(values):9.3f}{max(values):9.3f}"
+            f"{share:11.3f}{costs[name]:9.1f}{costs['engine'] / costs[name]:11.3f}"
+        )
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -89,7 +120,7 @@ def main(arguments: list[str] | None = None) -> None:
         "--num-envs",
         type=whole_number(1),
         nargs="+",
-        default=[256, 4096, 65536],
+        default=[64, 4096, 65536],
         metavar="N",
         help="measure N environments that step together",
     )

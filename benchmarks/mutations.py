@@ -26,6 +26,8 @@ RUNS = "tests/engines/runs/test_against_reference.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
 NESTS = "tests/engines/colony/test_nests.py"
+RASTER = "tests/rendering/test_raster.py"
+CASTES = "tests/engines/colony/test_castes.py"
 SCHEDULES = "tests/engines/colony/test_schedules.py"
 TRAFFIC = "tests/engines/colony/test_traffic.py"
 STATISTICS = "tests/analysis/test_statistics.py"
@@ -46,13 +48,33 @@ MEASURES = "tests/measures"
 RESULTS_OF_RUNS = "tests/analysis/test_results.py"
 SWEEPS = "tests/commands/test_sweep_measures.py"
 CHOICE = "tests/task/test_choice.py"
+OWN_RULES = "tests/rules"
 ARCHIVE = "tests/commands/test_archive.py"
 ODD = "tests/report/test_odd.py"
 NUMBERS = "tests/task/test_numbers.py"
+ROLLOUT = "tests/envs/test_rollout.py"
+DESIGN = "tests/studies/test_design.py"
+SENSITIVITY = "tests/analysis/test_sensitivity.py"
+SEARCH = "tests/studies/test_search.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
+    # Rules of users.
+    ("rules/language.py", '"modulo({}, {})"', '"ti.floor({} / {})"', OWN_RULES),
     # Rules.
+    ("engines/colony/labour.py", "chance = 1.0 / (1.0 + raised)", "chance = 1.0 - raised", CASTES),
+    ("engines/colony/labour.py", "waits = drawn < 0.0", "waits = False", CASTES),
+    ("engines/colony/labour.py", "and trait(c.carries, ant) == 0:", "and True:", CASTES),
+    ("engines/colony/labour.py", "lowered > 0.0, lowered", "True, lowered", COLONY),
+    (
+        "engines/colony/learning.py",
+        "does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0",
+        "does = True",
+        CASTES,
+    ),
+    ("engines/colony/steps.py", ">> number & 1 == 1", ">> 0 & 1 == 1", COLONY),
+    ("engines/colony/life.py", "ti.cast(bound <= word, ti.i32)", "0", COLONY),
+    ("task/caste.py", "int(quotas[i]) - quotas[i])", "quotas[i])", CASTES),
     ("engines/colony/steps.py", "if c.counts_without_food == 1:", "if False:", COLONY),
     ("engines/colony/steps.py", "ti.select(carries == had_food, age, 0)", "age", COLONY),
     (
@@ -63,7 +85,11 @@ MUTATIONS = [
     ),
     ("engines/colony/trail.py", "event == Event.DELIVERED", "event == Event.BLOCKED", COLONY),
     ("engines/colony/trail.py", "(action == PICK_UP) & (event", "(event", COLONY),
-    ("engines/colony/steps.py", "homing.half", "v.half", COLONY),
+    ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
+    ("engines/colony/kernels.py", "features.carriers_follow if", "outbound if", CHOICE),
+    ("measures/tidy.py", "else parts", "else []", RESULTS_OF_RUNS),
+    ("rendering/rasteriser.py", "snapshot.ant_nests % len", "0 * snapshot.ant_nests % len", RASTER),
+    ("engines/colony/state.py", "np.where(carries, of_ants", "np.where(~carries, of_ants", NESTS),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
     ("task/rules/conflicts.py", "(other, tick) > own", "(other, tick) < own", CONFLICTS),
@@ -77,6 +103,16 @@ MUTATIONS = [
         COLONY,
     ),
     ("task/rules/conflicts.py", "loaded > other_loaded or", "loaded < other_loaded or", TRAFFIC),
+    ("task/rules/conflicts.py", "rest &= rest - ti.u64(1)", "rest = ti.u64(0)", CONFLICTS),
+    ("task/rules/conflicts.py", "compass[N_HEADINGS - i]", "compass[i + 1]", CONFLICTS),
+    ("engines/colony/steps.py", "enters &= MOVES >> action", "enters &= 1", COLONY),
+    ("engines/colony/steps.py", "goes = cell + enters * (wanted - cell)", "goes = wanted", COLONY),
+    (
+        "engines/colony/learning.py",
+        "n + ti.cast(known == 0, ti.i32)",
+        "n + ti.cast(known <= 1, ti.i32)",
+        COLONY,
+    ),
     ("task/rules/conflicts.py", "stays = had_ant(", "stays = not had_ant(", TRAFFIC),
     ("task/rules/conflicts.py", "(WINS | TAKES_FOOD) == WINS", "WINS == WINS", TRAFFIC),
     ("task/rules/conflicts.py", "True, Event.PUSHED", "True, Event.ENTERED_EMPTY", COLONY),
@@ -132,9 +168,14 @@ MUTATIONS = [
     # Engines.
     ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
     ("engines/runs/kernels.py", "clock += a.evaporates", "clock += 1", RUNS),
+    ("engines/runs/rollout_kernel.py", "steps == a.max_steps", "steps > a.max_steps", ROLLOUT),
+    ("engines/runs/rollout_kernel.py", "base = own", "base = origin", ROLLOUT),
+    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", ROLLOUT),
+    ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
+    ("envs/vector.py", "else rows.any(0)", "else rows[-1]", ROLLOUT),
     ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
-    ("engines/colony/life.py", "c.age[ant] >= c.lifespan", "c.age[ant] > c.lifespan", COLONY),
+    ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
     ("engines/colony/life.py", "tick >= taken + c.regrowth", "tick > taken + c.regrowth", COLONY),
     ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
     ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),
@@ -150,8 +191,8 @@ MUTATIONS = [
     ("engines/colony/learning.py", "shape[0] - 1)]  #", "shape[0] - 2)]  #", COLONY),
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
     ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
-    ("engines/colony/steps.py", "moves & (not enters), ti", "moves & enters, ti", COLONY),
-    ("engines/colony/steps.py", "clock) > level_of", "clock) >= level_of", TRAFFIC),
+    ("engines/colony/steps.py", "moves & (1 - enters)", "moves & enters", COLONY),
+    ("engines/colony/steps.py", "tick) > level_of", "tick) >= level_of", TRAFFIC),
     ("engines/colony/steps.py", "c.carried[ant] = 1", "c.carried[ant] = 0", COLONY),
     (
         "engines/colony/interventions.py",
@@ -290,6 +331,24 @@ MUTATIONS = [
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "made[one.name] = one.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
+    # Designs and searches.
+    ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
+    ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
+    ("studies/design.py", "random_base2(whole)[: self.samples]", "random_base2(whole)", DESIGN),
+    ("studies/design.py", "if self.kind == LATIN_HYPERCUBE else {}", "if False else {}", DESIGN),
+    ("analysis/sensitivity.py", "- drawn.mean(axis=0)", "", SENSITIVITY),
+    ("analysis/sensitivity.py", "(seeds - 1)) / seeds", "(seeds - 1))", SENSITIVITY),
+    ("analysis/sensitivity.py", '"seed": RANDOM_SEED', '"seed": 0', SENSITIVITY),
+    ("studies/search.py", "SeedSequence((self.seed, number))", "SeedSequence(self.seed)", SEARCH),
+    (
+        "studies/search.py",
+        "world=point.world[at]",
+        "world=point.world[: at.stop - at.start]",
+        SEARCH,
+    ),
+    ("studies/search.py", "max(seeds) + 1, max(seeds) + 1 + n", "n", SEARCH),
+    ("studies/search.py", "sign * (best - default)", "best - default", SEARCH),
+    ("studies/search.py", "PRUNED if done.state == PRUNED", "PRUNED if False", SEARCH),
     # Archives of studies, and descriptions of models.
     ("files/bundles.py", 'not {"", ".", ".."}.intersection(parts)', "True", ARCHIVE),
     ("files/bundles.py", 'if digest.hexdigest() != facts["sha256"]:', "if False:", ARCHIVE),

@@ -93,18 +93,44 @@ Yardstick = Callable[[Any, Any, Any], int]  # a function of C
 
 
 def compiler() -> str | None:
-    """Return the C compiler of this machine: CC, cc, gcc or clang; None if there is none."""
-    names = (os.environ.get("CC"), "cc", "gcc", "clang")
+    """Return the C compiler of this machine: CC, clang, gcc or cc; None if there is none."""
+    names = (os.environ.get("CC"), "clang", "gcc", "cc")
     return next((found for name in names if name and (found := shutil.which(name))), None)
+
+
+def compile_c(command: str, sources: Sequence[Path], library: Path, threads: int) -> ctypes.CDLL:
+    """Return C sources as a library, compiled into a file; with OpenMP for several threads.
+
+    Raises:
+        AntsError: The compiler fails, for example because it has no OpenMP.
+    """
+    parallel = ["-fopenmp"] if threads > 1 else []
+    done = subprocess.run(
+        [command, *FLAGS, *parallel, "-o", library, *sources, "-lm"],
+        capture_output=True,
+        text=True,
+    )
+    if done.returncode:
+        said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr)
+        advice = "install its OpenMP, use `--threads 1`, or " if parallel else ""
+        raise AntsError(
+            f"{command} cannot compile {', '.join(one.name for one in sources)}: {said.strip()}; "
+            f"{advice}set CC to another compiler."
+        )
+    return ctypes.CDLL(str(library))
+
+
+def compiler_note(command: str, threads: int) -> str:
+    """Return the version of a compiler and the flags, for tables."""
+    done = subprocess.run([command, "--version"], capture_output=True, text=True)
+    name = next(iter(done.stdout.splitlines()), command)
+    parallel = " -fopenmp" if threads > 1 else ""
+    return f"C by {name}, {' '.join(FLAGS[:-2])}{parallel}."
 
 
 def load_yardsticks(command: str, folder: str | Path, threads: int) -> dict[str, Yardstick]:
     """Return the two functions in C by name, compiled in a folder; vector C requires AVX-512."""
-    library = Path(folder) / "ant.so"
-    parallel = ["-fopenmp"] if threads > 1 else []
-    given = [command, *FLAGS, *parallel, "-o", library, *SOURCES]
-    subprocess.run(given, check=True, capture_output=True)
-    loaded = ctypes.CDLL(str(library))
+    loaded = compile_c(command, SOURCES, Path(folder) / "ant.so", threads)
     return {name: getattr(loaded, f) for f, name in YARDSTICKS.items() if hasattr(loaded, f)}
 
 
@@ -210,6 +236,7 @@ def table(
     seconds: dict[str, np.ndarray],
     seeds: int,
     threads: int,
+    compiled: Sequence[str] = (),
 ) -> Table:
     """Return a table with a row for each learner and one for all: paces, and medians of ratios."""
     rows, missing = [], [MISSING] * (len(YARDSTICKS) - len(names))
@@ -224,6 +251,7 @@ def table(
     what = "one thread, by processor time" if threads == 1 else f"{threads} threads, by wall clock"
     taken_of = f"{count(seeds, 'seed')}, medians of {count(len(taken), 'round')}"
     notes = [f"Million steps/s of {what}; {taken_of}. {machine(('taichi', 'numpy'))}"]
+    notes += compiled
     if "C" in names and "vector C" not in names:
         notes.append("No vector C: this processor or its compiler has no AVX-512.")
     return Table("Training compared with C", columns, rows, notes)
@@ -240,12 +268,13 @@ def compare(seeds: int, rounds: int, threads: int, least: float, publishes: bool
         command = compiler()
         yardsticks = load_yardsticks(command, folder, threads) if command else {}
         steps, seconds = measured(yardsticks, range(seeds), rounds, threads)
-    made = table(list(yardsticks), steps, seconds, seeds, threads)
+    compiled = [compiler_note(command, threads)] if command else []
+    made = table(list(yardsticks), steps, seconds, seeds, threads, compiled)
     print(plain_text([made], 120), end="")
     if publishes:
         publish("training", [made], PAGE)
     if not yardsticks:
-        print("There is no C compiler (cc, gcc, clang or CC), so the comparison is skipped.")
+        print("There is no C compiler (CC, clang, gcc or cc), so the comparison is skipped.")
         return
     ratios = {name: float(np.median(one[:, 1] / one[:, 0])) for name, one in seconds.items()}
     worst = min(ratios, key=ratios.__getitem__)

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
         offline,
         reference,
         rendering,
+        rules,
         task,
+        testing,
         worlds,
     )
     from taichi_ants.analysis.results import compare
@@ -65,8 +67,10 @@ _MODULES = (
         "offline",
         "reference",
         "rendering",
+        "rules",
         "task",
         "task.states",
+        "testing",
         "worlds",
     ),
 )
@@ -106,10 +110,12 @@ __all__ = [
     "reference",
     "rendering",
     "rollout",
+    "rules",
     "save_policy",
     "states",
     "tabulate",
     "task",
+    "testing",
     "to_minari",
     "trace_training",
     "train",

@@ -22,7 +22,7 @@ from taichi_ants.errors import (
     whole,
 )
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.policies import checked_values
+from taichi_ants.learners.policies import checked_values, frozen_policy
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL
@@ -67,9 +67,66 @@ def check_one_nest(colony: Colony, who: str) -> None:
         )
 
 
+def check_own_rules(task: Task, who: str) -> None:
+    """Raise AntsError if a task uses rules that the user wrote, which `who` cannot have."""
+    if task.rules:
+        raise AntsError(
+            f"the task uses your rules {', '.join(task.rules)}; {who} supports only built-in "
+            "rules, so use a Colony, or leave them out."
+        )
+
+
+def check_rewards(task: Task, who: str) -> None:
+    """Raise AntsError if the rewards are by a rule that the user wrote, which `who` cannot have."""
+    if task.reward != "by_event":
+        raise AntsError(
+            f"`task.reward` is {task.reward!r}; {who} supports only 'by_event', so leave it out."
+        )
+
+
+def check_castes(task: Task, sharing: str, is_given_actions: bool) -> None:
+    """Raise AntsError if the castes of a task do not fit how the ants of a colony learn."""
+    if is_given_actions:
+        refuse_castes(task, "a colony with given actions")
+    follow = [name for name, caste in task.castes.items() if caste.policy is not None]
+    if follow and sharing == "independent":
+        raise AntsError(
+            f"`task.castes.{follow[0]}.policy` is {task.castes[follow[0]].policy!r}, but sharing "
+            'is "independent", so each ant learns into its own table; set sharing to "shared" or '
+            '"frozen".'
+        )
+
+
+def caste_policies(task: Task) -> dict[int, np.ndarray]:
+    """Return the tables of the castes that follow a policy, by the numbers of castes.
+
+    AntsError if a policy cannot be used.
+    """
+    tables = {}
+    for number, (name, caste) in enumerate(task.castes.items()):
+        if caste.policy is not None:
+            try:
+                tables[number] = frozen_policy(caste.policy, task.observation)
+            except AntsError as error:
+                raise AntsError(
+                    str(error).replace("policy is", f"`task.castes.{name}.policy` is", 1)
+                ) from None
+    return tables
+
+
+def refuse_castes(task: Task, who: str) -> None:
+    """Raise AntsError if a task has castes, which `who` does not support."""
+    if task.castes:  # labour requires castes
+        raise AntsError(
+            f"`task.castes` is {', '.join(task.castes)}; {who} does not support castes, so leave "
+            "them out."
+        )
+
+
 def checked_runs_task(task: Task | None) -> Task:
     """Return the task, by default the paper's; AntsError if runs of one ant cannot have it."""
     task = checked_task(Task() if task is None else task)
+    check_own_rules(task, "a run of one ant")
     if task.life.changes:
         raise AntsError(
             f"life of the task is {task.life}; only colonies support it, so use a Colony."
@@ -77,6 +134,11 @@ def checked_runs_task(task: Task | None) -> Task:
     if task.foods:
         raise AntsError(
             f"`task.foods` is {', '.join(task.foods)}; only colonies support it, so use a Colony."
+        )
+    if task.castes:
+        raise AntsError(
+            f"`task.castes` is {', '.join(task.castes)}; only colonies support them, so use a "
+            "Colony."
         )
     if task.pheromone.dense:
         raise AntsError(
@@ -147,11 +209,11 @@ def refuse_table(task: Task, sharing: str) -> None:
 
 
 def check_table(task: Task) -> None:
-    """Raise AntsError if the ants of a task do not choose by action values."""
-    if not task.choice.needs_table:
+    """Raise AntsError if the probabilities of actions do not follow from action values alone."""
+    if not task.choice.needs_table or task.choice.own_rule:
         raise AntsError(
-            f"`task.choice.rule` is {task.choice.rule!r}, which has no action values, so the "
-            "probabilities of actions are not known; record ants that are greedy or softmax."
+            f"`task.choice.rule` is {task.choice.rule!r}, so the probabilities of actions do not "
+            "follow from action values; record ants that are greedy or softmax."
         )
 
 
@@ -171,7 +233,11 @@ def check_choices(configs: Sequence[TrainingConfig], task: Task) -> None:
 
 
 def check_given_actions(task: Task) -> None:
-    """Raise AntsError if the task has a rule of choice, which given actions would not follow."""
+    """Raise AntsError if the task has a rule of choice, which given actions would not follow.
+
+    The same applies to castes.
+    """
+    refuse_castes(task, "an environment")
     if task.choice.rule != "greedy":
         raise AntsError(
             f"`task.choice.rule` is {task.choice.rule!r}, but the actions of an environment are "

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_one_of, entries_of, is_flag, shown, whole
+from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
 from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.policies import NAMED, checked_values, load_policy
@@ -36,11 +36,13 @@ from taichi_ants.settings import (
 )
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
+from taichi_ants.task.field import TRAIL
 from taichi_ants.task.pheromone import MAX_DEPOSIT
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.grid.hexgrid import AxialGrid
+    from taichi_ants.worlds.world import World
 
 One = TypeVar("One", bound="Record")
 _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
@@ -107,9 +109,14 @@ class Intervention(Record):
         """Return the name and the settings, JSON-compatible; see `from_dict`."""
         return {self.path: self.as_dict()}
 
-    def check_in(self, grid: AxialGrid, task: Task) -> None:
-        """Raise an AntsError if the change is impossible in worlds with this grid and task."""
-        indices(grid, getattr(self, "cells", None) or ())
+    def check_in(self, world: World, task: Task) -> None:
+        """Raise an AntsError if the change is impossible in worlds like this one."""
+        indices(world.grid, getattr(self, "cells", None) or ())
+        if (nest := getattr(self, "nest", None)) is not None and nest >= world.n_nests:
+            raise AntsError(
+                f"`{self.path}.nest` is {nest}, but the world has {count(world.n_nests, 'nest')}, "
+                "numbered from 0; choose one of them."
+            )
 
     def apply(self, to: Interventions) -> None:
         """Apply the change; AntsError if a world does not allow it."""
@@ -158,7 +165,7 @@ class OfAnts(OfCells):
 
 @dataclass(frozen=True)
 class RemoveAnts(OfAnts, path="remove_ants"):
-    """Remove ants with the food that they carry: random ants, or those on cells.
+    """Remove ants with the food that they carry: random ants, or those on cells; or of one nest.
 
     A share is rounded to a number of ants, halves up.
     """
@@ -166,12 +173,13 @@ class RemoveAnts(OfAnts, path="remove_ants"):
     number: Annotated[int | None, Is("number of ants", least=0, most=_MOST)] = None
     share: Annotated[float | None, Is("share of the living ants", least=0, most=1)] = None
     cells: Annotated[Sequence | None, _CELLS] = None
+    nest: Annotated[int | None, Is("nest of the ants; any if left out", least=0)] = None
 
     def apply(self, to: Interventions) -> None:
         if self.cells is None:
-            to.remove_some(self.number, self.share)
+            to.remove_some(self.number, self.share, self.nest)
         else:
-            to.remove_ants(to.index(self.cells))
+            to.remove_ants(to.index(self.cells), self.nest)
 
 
 @dataclass(frozen=True)
@@ -179,7 +187,8 @@ class AddAnts(OfAnts, path="add_ants"):
     """Add ants on the cells on which further ants would start, or on those of the cells given
     that are empty.
 
-    A share of the living ants is rounded to a number, halves up.
+    A share of the living ants, or of those of the nest, is rounded to a number, halves up. Without
+    `nest`, nests take turns, and ants on given cells belong to the nearest queen.
     """
 
     number: Annotated[int | None, Is("number of ants", least=0, most=_MOST)] = None
@@ -188,23 +197,26 @@ class AddAnts(OfAnts, path="add_ants"):
     heading: Annotated[
         int | None, Is("heading of the new ants; random if left out", least=0, most=N_HEADINGS - 1)
     ] = None
+    nest: Annotated[int | None, Is("nest of the new ants", least=0)] = None
 
     def apply(self, to: Interventions) -> None:
         if self.cells is None:
-            to.add_some(self.number, self.share, self.heading)
+            to.add_some(self.number, self.share, self.heading, self.nest)
         else:
-            to.add_ants(to.index(self.cells), self.heading)
+            to.add_ants(to.index(self.cells), self.heading, self.nest)
 
 
 @dataclass(frozen=True)
 class Place(OfCells, path="place"):
     """Place rock or food on cells, or the queen on one cell; ants there move aside.
 
-    Rock and food leave out the queen's cell, and cells whose ant has no room nearby.
+    Rock and food leave out the cells of queens, and cells whose ant has no room nearby.
     """
 
     what: Annotated[Literal["rock", "food", "queen"], Is("thing to place")]
     cells: Annotated[Sequence, _CELLS]
+    nest: Annotated[int | None, Is("nest of the queen, by default 0", least=0)] = None
+    kind: Annotated[str | None, Is("kind of food; the first if left out")] = None
 
     def check(self) -> None:
         super().check()
@@ -212,13 +224,25 @@ class Place(OfCells, path="place"):
             raise AntsError(
                 f"`place.cells` has {len(self.cells)} cells; give a single cell for the queen."
             )
+        for name, of in (("nest", "queen"), ("kind", "food")):
+            if getattr(self, name) is not None and self.what != of:
+                raise AntsError(
+                    f"`place.{name}` is for what = {of!r}, not {self.what!r}; leave it out."
+                )
+
+    def check_in(self, world: World, task: Task) -> None:
+        super().check_in(world, task)
+        if self.kind is not None:
+            check_one_of("place.kind", self.kind, tuple(task.foods))
 
     def apply(self, to: Interventions) -> None:
         cells = to.index(self.cells)
         if self.what == "queen":
-            to.move_queen(int(cells[0]))
+            to.move_queen(int(cells[0]), self.nest or 0)
         else:
-            to.put(cells, _GROUNDS[self.what])
+            self.check_in(to.colony.worlds[0], to.colony.task)
+            kind = list(to.colony.task.foods).index(self.kind) if self.kind else 0
+            to.put(cells, _GROUNDS[self.what], kind)
 
 
 @dataclass(frozen=True)
@@ -255,18 +279,24 @@ class Clear(OfCells, path="clear"):
 
 @dataclass(frozen=True)
 class Trail(OfCells, path="trail"):
-    """Set the trail of cells without rock; level 0 clears it."""
+    """Set the trail, or a further field, of cells without rock; level 0 clears it."""
 
     level: Annotated[int, Is("trail level", least=0, most=MAX_DEPOSIT)]
     cells: Annotated[Sequence | None, Is("cells, each [x, y, z]; all cells if left out")] = None
+    field: Annotated[str, Is("name of the field")] = TRAIL
 
     @classmethod
     def short(cls, value: Any) -> dict[str, Any] | None:
         return {"level": value} if isinstance(value, (int, np.integer)) else None
 
+    def check_in(self, world: World, task: Task) -> None:
+        super().check_in(world, task)
+        check_one_of("trail.field", self.field, (TRAIL, *task.fields))
+
     def apply(self, to: Interventions) -> None:
+        self.check_in(to.colony.worlds[0], to.colony.task)
         cells = to.everywhere() if self.cells is None else to.index(self.cells)
-        to.lay_trail(cells, self.level)
+        to.lay_trail(cells, self.level, self.field)
 
 
 @dataclass(frozen=True)
@@ -303,7 +333,11 @@ class TaskNumbers(Intervention, path="task"):
             of = rest.partition(".")[0]
             here = known
             if rest and group in _NAMED:
-                here = {f"{group}.{of}.{one.name}": one for one in declared(_NAMED[group].entry)}
+                entry = _NAMED[group].entry.entry_named(of)  # type: ignore[attr-defined]
+                before = f"{entry.path}."
+                here = {
+                    f"{group}.{of}.{one.path.removeprefix(before)}": one for one in all_of(entry)
+                }
             if name not in here:
                 raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")
             values.append((name, here[name].checked(value)))
@@ -328,7 +362,7 @@ class TaskNumbers(Intervention, path="task"):
                 raise AntsError(f"`task.{name}` {not_a_setting(of, known, f'task.{group}')}")
         return task.but(**nested(dict(self.values)))
 
-    def check_in(self, grid: AxialGrid, task: Task) -> None:
+    def check_in(self, world: World, task: Task) -> None:
         self.changed(task)
 
     def apply(self, to: Interventions) -> None:
@@ -407,7 +441,7 @@ class Policy(Intervention, path="policy"):
         table = NAMED[self.source](task.observation) if self.table is None else self.table
         return checked_values(table, task)
 
-    def check_in(self, grid: AxialGrid, task: Task) -> None:
+    def check_in(self, world: World, task: Task) -> None:
         self.table_for(task)
 
     def apply(self, to: Interventions) -> None:

@@ -10,6 +10,7 @@ import gc
 import io
 import math
 import os
+import textwrap
 import threading
 import time
 from collections.abc import Iterator
@@ -139,19 +140,39 @@ def quiet() -> Iterator[None]:
 
     Our kernels narrow numbers on purpose. Errors show their line without a mark of the place,
     because marks for all expressions take half of the time in which Taichi loads a cached kernel.
+    Taichi reads the source of a function at each call of it in a kernel; here, once.
     """
     from taichi._lib import core
+    from taichi.lang import kernel_impl
     from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context
 
     levels = ("trace", "debug", "info", "warn", "error")
     before = next((level for level in levels if core.logging_effective(level)), "critical")
     core.set_logging_level("error")
     marked, Context.get_pos_info = Context.get_pos_info, _line_of
+    reads = kernel_impl.getsourcelines, kernel_impl.textwrap
+    kernel_impl.getsourcelines, kernel_impl.textwrap = _source_lines, _Textwrap
     try:
         yield
     finally:
         Context.get_pos_info = marked
+        kernel_impl.getsourcelines, kernel_impl.textwrap = reads
         core.set_logging_level(before)
+
+
+class _Textwrap:
+    """The functions of the module textwrap that Taichi uses; lines are formatted once."""
+
+    fill = staticmethod(cache(textwrap.fill))
+    dedent = staticmethod(cache(textwrap.dedent))
+
+
+@cache
+def _source_lines(function: Any) -> tuple[list[str], int]:
+    """Return the source lines of a function, and the number of the first one."""
+    from taichi.lang._wrap_inspect import getsourcelines
+
+    return getsourcelines(function)
 
 
 def _line_of(context: Any, node: Any) -> str:

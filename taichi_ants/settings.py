@@ -190,7 +190,8 @@ class Setting(NamedTuple):
                     "underscores, and does not begin with a digit."
                 )
             try:
-                entries[name] = one if isinstance(one, entry) else _entry(entry, one, start, name)
+                kind = entry.entry_named(name)  # type: ignore[attr-defined]
+                entries[name] = one if isinstance(one, kind) else _entry(kind, one, start, name)
             except AntsError as error:
                 raise AntsError(
                     str(error).replace(f"{self.path}.NAME", f"{self.path}.{name}")
@@ -268,6 +269,11 @@ class Settings:
     def converted(cls, value: Any) -> Any:
         """Return the settings that another value stands for, by default a name; else the value."""
         return cls.named().get(value) if isinstance(value, str) else value
+
+    @classmethod
+    def entry_named(cls, name: str) -> type[Settings]:
+        """Return the class of the entry of this name in a `Named` of this class."""
+        return cls
 
     def check(self) -> None:
         """Check each value, and convert it to its kind."""

@@ -15,16 +15,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.analysis import style
+from taichi_ants.analysis.findings import LEAST_SEEDS
 from taichi_ants.analysis.statistics import RESAMPLES, bootstrap_interval
 from taichi_ants.analysis.tables import Table, plain_text, sentence
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
-from taichi_ants.measures.tidy import Measured, Tidy, checked_measure, last_rows
+from taichi_ants.measures.tidy import Measured, Tidy, checked_measure, last_rows, parts_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _RESAMPLES = 4000  # of figures, which have many intervals
 _MOST_LINES = 8
+_NO_NUMBERS = "the result has no measures that are numbers; run the colony with other measures."
 _WIDE = 100  # the number of columns of a table in a terminal
 _EPISODES, _TICKS = "episode", "tick"
 
@@ -152,6 +154,8 @@ def compare(
 def summary(result: Tidy, last: int | None = None) -> Summary:
     """Return means over seeds with intervals; see `Tidy.summary`."""
     table, rows = result.measured(), []
+    if not table.values:
+        raise AntsError(_NO_NUMBERS)
     for name in table.values:
         for group, values in zip(table.groups, of_seeds(table, name, last), strict=True):
             mean, low, high = (float(one[0]) for one in _means(values[None]))
@@ -169,9 +173,9 @@ def plot(result: Tidy, measures: Sequence[str], path: str | Path | None = None) 
         expect("path", path, str, Path)
         check_one_of("the suffix of path", Path(path).suffix, (".png",))
     table = result.measured()
-    names = list(measures) or list(table.usual)
+    names = [part for name in measures for part in parts_of(table, name)] or list(table.usual)
     if not names:
-        raise AntsError("the result has no numbers to plot; run the colony with other measures.")
+        raise AntsError(_NO_NUMBERS)
     if len(table.groups) > _MOST_LINES:
         raise AntsError(
             f"the result has {len(table.groups)} configurations; a figure shows at most "
@@ -196,7 +200,8 @@ def plot(result: Tidy, measures: Sequence[str], path: str | Path | None = None) 
         several = len(table.groups) > 1
         entries = style.legend_entries([panels[0]]) if several else {}
         n = len(table.seeds)
-        caption = f"Means over {n} seeds with 95 % intervals." if n > 1 else "One seed."
+        few = f" (too few for these: use {LEAST_SEEDS} or more)" if n < LEAST_SEEDS else ""
+        caption = f"Means over {n} seeds with 95 % intervals{few}." if n > 1 else "One seed."
         style.frame(figure, f"Measures by {across}", caption, entries)
     if path is not None:
         style.save(figure, Path(path))

@@ -20,6 +20,7 @@ COMMANDS = {  # modules of this package with their help
     "archive": "pack a finished study, with all that repeats it, into one file",
     "reproduce": "repeat the study in an archive, and compare all of its files",
     "render": "draw an episode, a colony, learning, or a policy",
+    "check-rule": "compare the rules of a file with the plain reference",
     "watch": "watch and change ants in a browser while they run",
 }
 
@@ -39,7 +40,7 @@ def run(
         from taichi_ants.studies.command_line import Parser
 
         Parser.program = program
-        import_module(f"{__name__}.{name}").main(arguments, **more)
+        import_module(f"{__name__}.{name.replace('-', '_')}").main(arguments, **more)
 
 
 def main() -> None:

@@ -263,10 +263,17 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     """Return a new colony from the settings, at the start of its episode."""
     from taichi_ants import AntsError, Colony, load_policy, worlds
 
-    of_world = {"seed": settings.seed, **command_line.given_settings(settings).get("world", {})}
-    world = worlds.build(settings.world, **of_world)
+    given = command_line.given_settings(settings)
+    world = worlds.build(settings.world, **{"seed": settings.seed, **given.get("world", {})})
     policy = load_policy(settings.policy) if settings.policy else None
-    if settings.sharing == "frozen" and policy is None:
+    task = rules(settings, policy)
+    learns_nothing = not task.choice.needs_table
+    if learns_nothing and (policy or given.get("training")):
+        raise AntsError(
+            f"--task.choice.rule is {task.choice.rule}, by which ants choose without learning; "
+            "leave out --policy and the options of --training."
+        )
+    if settings.sharing == "frozen" and policy is None and not learns_nothing:
         raise AntsError(
             "--sharing frozen requires a policy; add --policy FILE, or choose another --sharing."
         )
@@ -274,8 +281,10 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     options: dict[str, Any] = {name: getattr(settings, name) for name in names}
     seeds = range(settings.seed, settings.seed + settings.colonies)
     options["q_values"] = policy.q_values if policy else None
-    training = training_config(settings, 0.1)
-    colony = Colony(world, rules(settings, policy), training, seeds, **options)
+    training = None if learns_nothing else training_config(settings, 0.1)
+    if learns_nothing and settings.sharing == "shared":  # the default
+        options["sharing"] = "frozen"
+    colony = Colony(world, task, training, seeds, **options)
     colony.begin_episode()
     return colony
 

@@ -306,7 +306,7 @@ def _save_snapshots(
     from taichi_ants.rendering.writers import is_picture
 
     look: dict[str, Any] = {"size": settings.size, "title": title, "overlay": settings.overlay}
-    look["strongest"] = task.pheromone.level
+    look["task"] = task
     if is_picture(settings.out):
         last = deque(snapshots, maxlen=1)
         save_picture(settings.out, next(frames(last, **look)))

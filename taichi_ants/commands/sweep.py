@@ -1,17 +1,23 @@
 """Sweep any settings of the world, the task, the learner or the colony, from a TOML file.
 
-FILE lists fixed settings, the values of settings to vary, seeds, and measures. The command runs
-every combination of values with every seed, and writes tables and a figure to a folder. See
-docs/sweeps.md.
+FILE lists fixed settings, the values or ranges of settings to vary, seeds, and measures. The
+command runs every combination of values, or the points of a design, with every seed, and writes
+tables and figures to a folder. With [search], it looks for the best settings. See docs/sweeps.md
+and docs/designs.md.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
+
+if TYPE_CHECKING:
+    from taichi_ants.studies.search import Search
 
 
 def parse_arguments(
@@ -37,12 +43,16 @@ def sweep(settings: argparse.Namespace) -> None:
     from taichi_ants.files.inputs import recorded
     from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.sweep import read_sweep
+    from taichi_ants.studies.search import Search, read
 
     with recorded() as inputs:
         command_line.load_plugin(settings.plugin)
         settings.text = settings.text or read_text(settings.file)
-        asked = read_sweep(settings.file, settings.text)
+        asked = read(settings.file, settings.text)
+    if isinstance(asked, Search):
+        return _search(settings, asked, inputs)
+    if not settings.force:
+        asked.design.check_folder(settings.out)
 
     def work(blocks: Path, ready: Path) -> None:
         with command_line.progress_bar("sweep") as progress, chosen(settings) as how:
@@ -54,6 +64,25 @@ def sweep(settings: argparse.Namespace) -> None:
 
     more: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
     work_or_show(settings, asked.facts(), work, **more)
+
+
+def _search(settings: argparse.Namespace, asked: Search, inputs: Mapping[str, bytes]) -> None:
+    """Run a search, or show its results if it is finished."""
+    from taichi_ants.studies.executors import chosen
+    from taichi_ants.studies.result_folder import work_or_show
+
+    if settings.shard:
+        raise AntsError(
+            "a search cannot be split into shards, because each trial depends on those before it; "
+            "leave out --shard."
+        )
+
+    def work(blocks: Path, ready: Path) -> None:
+        with command_line.progress_bar("search") as progress, chosen(settings) as how:
+            found = asked.measured(blocks, progress, **how)
+        asked.write(found, ready, draws=not settings.no_figures)
+
+    work_or_show(settings, asked.facts(), work, inputs=inputs)
 
 
 def main(

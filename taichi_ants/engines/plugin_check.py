@@ -1,4 +1,4 @@
-"""The plugin check: tests of learners from outside the package before kernels include them.
+"""The plugin check: tests of code from outside the package before kernels include it.
 
 Taichi's compiler can crash on unexpected code, and compiled code can crash when it reads outside an
 array. So a new learner is first compiled in a forked process, in which it learns for 1000 steps.
@@ -10,7 +10,8 @@ import re
 import signal
 import sys
 import warnings
-from functools import cache
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 
 import numpy as np
 
@@ -30,24 +31,28 @@ def checked_plugin(learner: Learner) -> Learner:
     """Return the learner; AntsError if it does not pass the plugin check."""
     if learner.name in registry.BUILT_IN:
         return learner
-    arch = runtime.start().arch
-    # A forked process cannot use the GPU or the fields of this one. Forks are unreliable on macOS
-    # and missing on Windows.
-    apart = sys.platform == "linux" and arch == "cpu" and not runtime.holds_data()
-    fault = _fault_apart(learner) if apart else _fault_of(learner, False)
+    fault = fault_apart(partial(_fault_of, learner, False), partial(_fault_of, learner, True))
     if fault:
         raise unusable(learner, fault)
     return learner
 
 
-def _fault_apart(learner: Learner) -> str:
-    """Return the fault that a check in a forked process finds, or an empty string."""
+def fault_apart(check: Callable[[], str], *more: Callable[[], str]) -> str:
+    """Return the first fault that checks in a forked process find, or an empty string.
+
+    Where Taichi cannot run in a forked process, only the first check runs, in this process.
+    """
+    arch = runtime.start().arch
+    # A forked process cannot use the GPU or the fields of this one. Forks are unreliable on macOS
+    # and missing on Windows.
+    if not (sys.platform == "linux" and arch == "cpu" and not runtime.holds_data()):
+        return check()
     reader, writer = os.pipe()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)  # Python warns of forks with threads
         child = os.fork()
     if child == 0:
-        _check_in_child(learner, writer)
+        _check_in_child((check, *more), writer)
     os.close(writer)
     try:
         with open(reader, encoding="utf-8") as pipe:
@@ -63,7 +68,7 @@ def _fault_apart(learner: Learner) -> str:
     return fault if code == 0 else "it crashes, for example with an index outside an array"
 
 
-def _check_in_child(learner: Learner, writer: int) -> None:
+def _check_in_child(checks: Sequence[Callable[[], str]], writer: int) -> None:
     """Write the fault and end the process silently, with exit status 0 if the check completed."""
     import resource
 
@@ -78,7 +83,7 @@ def _check_in_child(learner: Learner, writer: int) -> None:
         # Taichi's handlers print a trace, and can wait forever for a lock that the fork copied.
         for fatal in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
             signal.signal(fatal, signal.SIG_DFL)
-        os.write(writer, (_fault_of(learner, False) or _fault_of(learner, True)).encode())
+        os.write(writer, next(filter(None, (check() for check in checks)), "").encode())
         os._exit(0)
     finally:
         os._exit(1)

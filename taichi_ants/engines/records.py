@@ -57,6 +57,13 @@ class Snapshot(Record):
         ant_numbers: int32 (n,), the numbers of the ants.
         ant_actions: int32 (n,), the last action of each ant; -1 before its first one.
         ant_events: int32 (n,), the result of the last action, an `Event`.
+        ant_nests: int32 (n,), the nest of each ant.
+        ant_foods: int32 (n,), the kind of the food that each ant carries; -1 without food.
+        food_kinds: uint8 (grid.size,), the kind of the food in each cell; 0 without food.
+        queens: int32 (nests,), the flat cell index of the queen of each nest.
+        ant_castes: int32 (n,), the castes of the ants; 0 without castes.
+        ant_idle: bool (n,), whether each ant is idle, see `Labour`.
+        ant_thresholds: float32 (n,), the response thresholds of the ants; 0 without one.
         fields: The levels of each pheromone by name, (grid.size,); "trail" is `trail`.
         counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers.
         world: The world at the start of the episode; None if unknown.
@@ -72,6 +79,13 @@ class Snapshot(Record):
     ant_numbers: np.ndarray = field(default_factory=_none)
     ant_actions: np.ndarray = field(default_factory=_none)
     ant_events: np.ndarray = field(default_factory=_none)
+    ant_nests: np.ndarray = field(default_factory=_none)
+    ant_foods: np.ndarray = field(default_factory=_none)
+    food_kinds: np.ndarray = field(default_factory=lambda: np.zeros(0, np.uint8))
+    queens: np.ndarray = field(default_factory=_none)
+    ant_castes: np.ndarray = field(default_factory=_none)
+    ant_idle: np.ndarray = field(default_factory=_none)
+    ant_thresholds: np.ndarray = field(default_factory=_none)
     fields: Mapping[str, np.ndarray] = field(default_factory=dict)
     counts: Mapping[str, int] = field(default_factory=dict)
     world: World | None = None

@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
+from taichi_ants.envs.rollout import Choices, Rollout
 from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, Arguments, Worlds
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.task import Task
@@ -32,6 +33,8 @@ class ColonyWorlds(Ants):
         rewards: The rewards of these actions, float64.
         events: The results of these actions, `Event` as int64; NONE if no ant acted.
     """
+
+    colonies = True
 
     def __init__(
         self,
@@ -94,22 +97,57 @@ class ColonyWorlds(Ants):
     def advance(
         self, actions: np.ndarray, mode: AutoresetMode, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        results = _, terminated, truncated = self._take(actions, waiting)
+        if mode is AutoresetMode.SAME_STEP and (terminated | truncated).any():
+            self._last = self.facts()
+        self._renew(truncated, mode, waiting)
+        return results
+
+    def _take(
+        self, actions: np.ndarray, waiting: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Take a step, and return its rewards, terminations and truncations, (n,)."""
         self.step(actions.reshape(self.acted.shape))
-        rewards, ended = self.rewards.reshape(-1), self.ended & ~waiting
-        truncated = np.repeat(ended, self.colony.capacity)
+        truncated = np.repeat(self.ended & ~waiting, self.colony.capacity)
         terminated = (self.events.reshape(-1) == Event.DELIVERED) & (
             self.task.delivery == "terminates"
         )
-        if mode is AutoresetMode.SAME_STEP:
-            begins = ended
-            if (terminated | truncated).any():
-                self._last = self.facts()
-        else:
-            begins = waiting
+        return self.rewards.reshape(-1), terminated, truncated
+
+    def _renew(self, truncated: np.ndarray, mode: AutoresetMode, waiting: np.ndarray) -> None:
+        """Stop or begin worlds after a step, as the mode says."""
+        begins = ended = truncated.reshape(self.acted.shape)[:, 0]
+        if mode is not AutoresetMode.SAME_STEP:
             self.colony.stop(ended)
+            begins = waiting & (mode is AutoresetMode.NEXT_STEP)
         if begins.any():
             self.begin(begins)
-        return rewards, terminated, truncated
+
+    def play(
+        self,
+        into: Rollout,
+        finals: np.ndarray,
+        mode: AutoresetMode,
+        waiting: np.ndarray,
+        choices: Choices | None,
+    ) -> None:
+        masks = choices.masks() if choices is not None else None
+        for t, actions in enumerate(into.actions):
+            if choices is not None and masks is not None:
+                actions[:] = choices.draw(masks.take(self.states()))
+            results = into.rewards[t], into.terminated[t], into.truncated[t]
+            for row, result in zip(results, self._take(actions, waiting), strict=True):
+                row[:] = result
+            into.events[t] = self.events.reshape(-1)
+            if mode is AutoresetMode.SAME_STEP:
+                finals[t] = self.states()
+            self._renew(into.truncated[t], mode, waiting)
+            ended = into.truncated[t].reshape(self.acted.shape)[:, 0]
+            waiting = ended | (waiting & (mode is AutoresetMode.DISABLED))
+            into.observations[t + 1] = self.shown.show(self.states())
+
+    def states(self) -> np.ndarray:
+        return self.colony.states.reshape(-1)
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
         if last:

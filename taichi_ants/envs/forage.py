@@ -12,9 +12,11 @@ from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
+from taichi_ants.engines.layout import Command
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
+from taichi_ants.envs.rollout import Choices, Rollout
 from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, Arguments, StepLimit
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
 from taichi_ants.task import Task
@@ -31,6 +33,12 @@ _GROUNDS = {
 }
 # The cells of all environments together take up to 4 GiB, with a margin.
 _MOST_CELLS = (1 << 30) - (1 << 24)
+# The command to an ant after the last step of an episode.
+_AFTER_END = {
+    AutoresetMode.SAME_STEP: Command.STEP,
+    AutoresetMode.NEXT_STEP: Command.BEGIN,
+    AutoresetMode.DISABLED: Command.WAIT,
+}
 # Each row as a number of 8 bytes, because `take` of numbers is three times as fast.
 _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64)[:, 0]
 
@@ -71,6 +79,28 @@ class LoneAnts(Ants):
         ends = (arrays[name].astype(bool) for name in ("terminations", "truncations"))
         return arrays["rewards_of"].copy(), *ends
 
+    def play(
+        self,
+        into: Rollout,
+        finals: np.ndarray,
+        mode: AutoresetMode,
+        waiting: np.ndarray,
+        choices: Choices | None,
+    ) -> None:
+        rows = {
+            "taken": into.actions,
+            "seen": into.observations[1:],
+            "paid": into.rewards,
+            "terminated": into.terminated.view(np.uint8),
+            "truncated": into.truncated.view(np.uint8),
+            "event_rows": into.events,
+            "finals": finals,
+        }
+        self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[mode], choices)
+
+    def states(self) -> np.ndarray:
+        return self.batched.arrays["states"]
+
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
         arrays, when = self.batched.arrays, "final_" if last else ""
         packed = _PACKED_MASKS.take(arrays[f"{when}percepts"], mode="clip")
@@ -95,8 +125,7 @@ class LoneAnts(Ants):
         from taichi_ants import rendering
 
         if self._scene is None:
-            strongest = self.task.pheromone.level
-            self._scene = rendering.Scene(now.grid, view=True, strongest=strongest)
+            self._scene = rendering.Scene(now.grid, view=True, task=self.task)
         return self._scene.draw(now, rendering.Status(facts, state, observation=sees))
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.error import InvalidAction, ResetNeeded
+from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Discrete
 from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -17,7 +17,17 @@ from gymnasium.vector.utils import batch_space
 
 from taichi_ants import checks
 from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, count, shown
+from taichi_ants.envs.rollout import Choices, Rollout, checked_actions, checked_plan
+from taichi_ants.errors import (
+    AntsError,
+    check_one_of,
+    checked_flag,
+    checked_whole,
+    count,
+    expect,
+    shown,
+    whole,
+)
 from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, N_STATES, PICK_UP
 from taichi_ants.task.states import state_from_index
@@ -63,12 +73,15 @@ class Ants(ABC):
         evaporates: Whether trails evaporate.
         max_steps: The step limit of an episode.
         shown: The format of observations.
+        colonies: Whether worlds can have several nests and kinds of food.
     """
+
+    colonies = False
 
     def __init__(
         self, n_worlds: int, task: Task, given: Arguments, render_modes: Sequence[str]
     ) -> None:
-        self.task, self.worlds = task, _worlds_of(given.world, n_worlds)
+        self.task, self.worlds = task, _worlds_of(given.world, n_worlds, self.colonies)
         self.evaporates = task.evaporation_in_training
         if given.evaporation is not None:
             self.evaporates = checked_flag("evaporation", given.evaporation)
@@ -95,6 +108,29 @@ class Ants(ABC):
         """
 
     @abstractmethod
+    def play(
+        self,
+        into: Rollout,
+        finals: np.ndarray,
+        mode: AutoresetMode,
+        waiting: np.ndarray,
+        choices: Choices | None,
+    ) -> None:
+        """Take the steps of a rollout, and write its arrays.
+
+        Args:
+            into: Has the actions, unless there are `choices`. Its first observations stay as they
+                are, as do its final ones.
+            finals: int32 (steps, n): where an episode ends and `mode` is SAME_STEP, its last state.
+            waiting: As in `advance`. Worlds that end in mode DISABLED wait in all further steps.
+            choices: The policy of all ants, or None.
+        """
+
+    @abstractmethod
+    def states(self) -> np.ndarray:
+        """Return the present state of each ant, integers (n,)."""
+
+    @abstractmethod
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
         """Return infos of all ants, (n, ...): now or, if `last`, at the end of an episode."""
 
@@ -106,7 +142,7 @@ class Ants(ABC):
         return {**vars(self), "_scene": None}  # `draw` creates it again
 
 
-def _worlds_of(world: Any, most: int) -> tuple[World, ...]:
+def _worlds_of(world: Any, most: int, colonies: bool) -> tuple[World, ...]:
     given = [world] if isinstance(world, (str, World)) else world
     if not isinstance(given, (list, tuple)) or not given:
         raise AntsError(
@@ -116,7 +152,8 @@ def _worlds_of(world: Any, most: int) -> tuple[World, ...]:
         raise AntsError(f"world lists {count(len(given), 'world')}; it must list at most {most}.")
     several = tuple(
         checks.checked_world(
-            one if not isinstance(one, str) else from_text(one) if "\n" in one else build(one)
+            one if not isinstance(one, str) else from_text(one) if "\n" in one else build(one),
+            several=colonies,
         )
         for one in given
     )
@@ -242,17 +279,9 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
             InvalidAction: The number of actions is wrong, or an action does not exist.
         """
-        if self._over is None:
-            raise ResetNeeded("no episode has begun; call reset() before step().")
-        ants, mode = self._ants, self.autoreset_mode
-        if mode is AutoresetMode.DISABLED and self._over.any():
-            number = self._over.argmax() * (self.num_envs // self._n_worlds)
-            raise ResetNeeded(
-                f"the episode of environment {number} has ended; call reset() with "
-                'options={"reset_mask": ...} before step().'
-            )
-        given = _checked_actions(actions, self.num_envs)
-        rewards, terminated, truncated = ants.advance(given, mode, self._over)
+        waiting, ants, mode = self._waiting("step"), self._ants, self.autoreset_mode
+        given = checked_actions(actions, (self.num_envs,))
+        rewards, terminated, truncated = ants.advance(given, mode, waiting)
         over, final = terminated | truncated, {}
         facts = ants.facts()
         if mode is not AutoresetMode.SAME_STEP:
@@ -267,6 +296,77 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             facts |= {name: np.where(over, 0, facts[name]) for name in results}  # NONE
         infos = self._infos(facts, self._all) | final
         return ants.shown.show(facts["state"]), rewards, terminated, truncated, infos
+
+    def _waiting(self, method: str) -> np.ndarray:
+        """Return the worlds at an episode's end; ResetNeeded if the method needs a reset before."""
+        if self._over is None:
+            raise ResetNeeded(f"no episode has begun; call reset() before {method}().")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
+            number = self._over.argmax() * (self.num_envs // self._n_worlds)
+            raise ResetNeeded(
+                f"the episode of environment {number} has ended; call reset() with "
+                f'options={{"reset_mask": ...}} before {method}().'
+            )
+        return self._over
+
+    def rollout(
+        self,
+        policy: Any,
+        steps: int | None = None,
+        *,
+        epsilon: float = 0.0,
+        seed: int | None = None,
+        out: Rollout | None = None,
+    ) -> Rollout:
+        """Return the results of several steps, with given actions or by a policy.
+
+        The results are equal to those of `step` with the same actions, in all autoreset modes, and
+        you can mix both. In mode "Disabled", an environment whose episode has ended waits in the
+        remaining steps, with reward 0 and the same observation.
+
+        Args:
+            policy: The actions, integers 0 to 4 (steps, num_envs). Or a policy that all ants
+                follow: action values, float (n_states, 5), an object with such `q_values`, the name
+                of a policy ("trail_follower", "random"), or the path of a policy file.
+            steps: The number of steps, if a policy is given.
+            epsilon: The probability with which an ant that follows a policy acts at random.
+            seed: The seed of the policy's random numbers, which also break ties. None draws one
+                from `np_random`, which `reset(seed=...)` seeds.
+            out: An earlier rollout of the same size. This call overwrites its arrays, instead of
+                creating new ones.
+
+        Raises:
+            ResetNeeded: No episode has begun, or autoreset_mode is "Disabled" and one has ended.
+            InvalidAction: The actions have another shape or type, or an action does not exist.
+            AntsError: The policy or another argument is not allowed.
+        """
+        waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
+        length, actions, q_values = checked_plan(policy, steps, n, ants.task)
+        epsilon, choices = checks.checked_share("epsilon", epsilon), None
+        if q_values is None and (epsilon or seed is not None):
+            raise AntsError(
+                f"epsilon is {epsilon} and seed is {seed}, but the actions are given; leave both "
+                "out."
+            )
+        into = Rollout.empty(length, n, ants.shown)
+        if out is not None:
+            expect("out", out, Rollout)
+            out.check_like(into)
+            into = out
+        if actions is not None:
+            into = into._replace(actions=actions)
+        if q_values is not None:
+            drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
+            choices = Choices.of(q_values, n, epsilon, drawn)
+        finals = np.empty((length, n), np.int32)
+        into.observations[0] = ants.shown.show(ants.states())
+        ants.play(into, finals, self.autoreset_mode, waiting, choices)
+        over = into.terminated | into.truncated
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            return into._replace(final_observations=ants.shown.show(finals[over]))
+        rows = over.reshape(length, self._n_worlds, -1)[:, :, 0]
+        self._over = rows[-1] if self.autoreset_mode is AutoresetMode.NEXT_STEP else rows.any(0)
+        return into._replace(final_observations=into.observations[1:][over])
 
     def _infos(self, facts: dict[str, np.ndarray], have: np.ndarray) -> dict[str, Any]:
         infos: dict[str, Any] = dict(facts)
@@ -300,19 +400,3 @@ def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
             raise ValueError(f"a seed is {shown(one)}; it must be a whole number, at least 0.")
         seeding.np_random(int(one))  # raises Gymnasium's error for negative seeds
     return [None if one is None else int(one) for one in seed]
-
-
-def _checked_actions(actions: Any, n: int) -> np.ndarray:
-    try:
-        given = np.asarray(actions)
-    except ValueError:  # lists of several lengths
-        given = np.empty(0)
-    if given.shape != (n,) or given.dtype.kind not in "iu":
-        raise InvalidAction(
-            f"the actions are {shown(actions)}; they must be an array of an integer type and of "
-            f"shape ({n},)."
-        )
-    if given.min() < 0 or given.max() >= N_ACTIONS:
-        wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
-        raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
-    return given

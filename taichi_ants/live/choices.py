@@ -19,7 +19,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
 from taichi_ants.live.setup import MOST_ANTS, MOST_TEXT, Setup, check_cues
 from taichi_ants.settings import MISSING, Named, Setting, all_of, declared, flat, nested
-from taichi_ants.task import Task, observations
+from taichi_ants.task import Labour, Task, observations
 
 WORLDS = {
     "paper": "the paper's world",
@@ -47,7 +47,9 @@ def fields() -> Iterator[dict[str, Any]]:
     "default". "only" (a path and its values), "world" and "learner" limit a field to these.
     """
     for one in all_of(Task):
-        if not one.is_group and one.kind is not Named and not one.is_text:
+        # The page has no castes, which labour requires.
+        is_labour = one.path.startswith(f"{Labour.path}.")
+        if not one.is_group and one.kind is not Named and not one.is_text and not is_labour:
             yield _field(one)
     for one in declared(TrainingConfig)[1:]:
         yield {**_field(one), "default": _LEARNING.get(one.name, one.default), "learner": ""}
@@ -187,7 +189,11 @@ def _settings(given: Any, world: str, learner: str) -> dict[str, Any]:
     """Return a page's settings by group; raise AntsError if the form lacks one of them."""
     expect("settings", given, dict)
     # Tasks have defaults of settings that the form lacks.
-    lacking = {one.path: one.default for one in all_of(Task) if one.is_text}
+    lacking = {
+        one.path: one.default
+        for one in all_of(Task)
+        if one.is_text or one.path.startswith(f"{Labour.path}.")
+    }
     given = {
         path: one for path, one in given.items() if path not in lacking or one != lacking[path]
     }

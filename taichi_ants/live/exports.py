@@ -34,7 +34,7 @@ def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300
 
     passed = _snapshots(log, most_frames, progress)
     shown = (one for session, _ in passed for one in colony_snapshots(session.colony))
-    pictures = frames(shown, strongest=log.setup.task.pheromone.level)
+    pictures = frames(shown, task=log.setup.task)
     return bytes_of("session.gif", lambda path: save_animation(path, pictures, fps=12.0))
 
 

@@ -10,7 +10,13 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files, learners, worlds
-from taichi_ants.checks import checked_seeds, checked_share, checked_table
+from taichi_ants.checks import (
+    check_own_rules,
+    checked_seeds,
+    checked_share,
+    checked_table,
+    refuse_castes,
+)
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid
@@ -31,7 +37,8 @@ _MOST_NUMBERS = 1 << 27  # elements of independent tables
 
 
 def check_cues(task: Task) -> None:
-    """Raise AntsError if a task has pheromones that the live page cannot show."""
+    """Raise AntsError if a task has pheromones or rules that the live page cannot show."""
+    check_own_rules(task, "the live page")
     if task.fields or (task.outbound_cue, task.homing_cue) != (TRAIL, COMPASS):
         names = ", ".join(task.fields) or "no"
         raise AntsError(
@@ -65,6 +72,7 @@ class Setup:
         expect("world", self.world, str)
         expect("task", self.task, Task)
         check_cues(self.task)
+        refuse_castes(self.task, "the live page")
         if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "independent"))
             learners.get(self.policy.learner)

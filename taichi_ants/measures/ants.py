@@ -25,6 +25,11 @@ def carriers(snapshot: Snapshot) -> float:
     return share_of(snapshot.ant_carries)
 
 
+def foraging(snapshot: Snapshot) -> float:
+    """Return the share of the living ants that are not idle; nan without ants."""
+    return share_of(~snapshot.ant_idle)
+
+
 def distance(snapshot: Snapshot) -> float:
     """Return the mean distance of the ants to the nearest queen in steps; nan without ants."""
     if not len(snapshot.ant_cells):

@@ -110,4 +110,10 @@ class Measure:
                 f"the measure {self.name!r} returned {shown(value)}; it must return a number, "
                 "numbers by the names of parts, or an array."
             )
-        return float(value)
+        number = float(value)
+        if math.isinf(number):
+            raise AntsError(
+                f"the measure {self.name!r} returned {number}; it must return a finite number, or "
+                "nan if it has no value."
+            )
+        return number

@@ -131,14 +131,27 @@ def seed_array(seeds: Any) -> np.ndarray:
         return np.array(seeds, object)
 
 
-def checked_measure(table: Measured, name: object) -> np.ndarray:
-    """Return the values of a measure; AntsError if the result does not have it."""
-    if not isinstance(name, str) or name not in table.values:
+def parts_of(table: Measured, name: object) -> list[str]:
+    """Return a measure as a list, or the names of its parts; AntsError if there is none."""
+    parts = [one for one in table.values if one.startswith(f"{name}.")]
+    found = [name] if isinstance(name, str) and name in table.values else parts
+    if not found:
         raise AntsError(
-            f"the result has no measure {name!r}; choose one of {', '.join(table.values)}, or run "
-            "the colony with measures=[...]."
+            f"the result has no measure {name!r} that is a number; "
+            + (f"choose one of {', '.join(table.values)}, or " if table.values else "")
+            + "run the colony with measures=[...]."
         )
-    return np.asarray(table.values[name], float)
+    return found
+
+
+def checked_measure(table: Measured, name: object) -> np.ndarray:
+    """Return the values of a measure, or of its only part; AntsError if there is not one."""
+    found = parts_of(table, name)
+    if len(found) > 1:
+        raise AntsError(
+            f"the measure {name!r} has {len(found)} parts; choose one of {', '.join(found)}."
+        )
+    return np.asarray(table.values[found[0]], float)
 
 
 def last_rows(table: Measured) -> np.ndarray:

@@ -111,10 +111,12 @@ def record_colony(
     """
     expect("colony", colony, Colony)
     checks.check_one_nest(colony, "record_colony")
+    checks.refuse_castes(colony.task, "record_colony")
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
     checks.check_progress(progress)
     checks.check_table(colony.task)
+    checks.check_rewards(colony.task, "record_colony")
     if len(dict.fromkeys(colony.worlds)) > 1:
         raise AntsError("the worlds of the colony differ; record a separate colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.castes import lays
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.random_stream import hash_of, pick
@@ -47,6 +48,7 @@ class Intent:
             view, or the action is to give.
         lured: Whether the target looks T or S or, with an ant on it, is better than the own cell.
         gives: Whether the ant delivers.
+        rests: Whether the ant is idle; its action is then GIVE, which has no effect.
     """
 
     ant: Ant
@@ -55,6 +57,7 @@ class Intent:
     target: Cell | None = None
     lured: bool = False
     gives: bool = False
+    rests: bool = False
 
     @property
     def enters(self) -> bool:
@@ -159,23 +162,29 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
     for intent in intents:
         ant, slot = intent.ant, intent.ant.slot
         start, had_food = ant.cell, ant.carries
-        ant.executed = intent.action
+        ant.executed = -1 if intent.rests else intent.action
         if intent.action < PICK_UP:
             # Ants turn even if the way is blocked, so that they get out of dead ends.
             ant.heading = intent.heading
         if slot in pushed:
             ant.cell, event = pushed[slot], Event.PUSHED
         elif intent.action < PICK_UP:
-            event = _move(world, intent, entered.get(slot))
+            event = _move(world, intent, entered.get(slot), task, tick)
         else:
-            event = _handle(world, intent, slot in winning, task)
+            event = _handle(world, intent, slot in winning, task, tick)
+        if intent.rests:
+            ant.event, ant.reward = Event.NONE, 0
+            ant.carried += 1
+            continue
         paid = getattr(task.rewards, PAID[event])
         if world.foods and event in (Event.PICKED_UP, Event.DELIVERED):
             paid = getattr(world.foods[ant.kind], PAID[event])
         ant.event, ant.reward = event, paid
         for name, trail in world.fields.items():
+            if not lays(task, ant, name):
+                continue
             for cell in _marked(task.fields[name].laid, intent, start, had_food):
-                trail.deposit(cell, ant.carried)
+                trail.deposit(cell, ant.carried, ant, event, tick)
         ant.carried += 1
     world.ants = {intent.ant.cell: intent.ant for intent in intents}
 
@@ -204,17 +213,20 @@ def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell
     return [ant.cell] if ant.cell != start else []
 
 
-def _move(world: WorldState, intent: Intent, destination: Cell | None) -> Event:
+def _move(
+    world: WorldState, intent: Intent, destination: Cell | None, task: Task, tick: int
+) -> Event:
     ant = intent.ant
     if destination is None:
         return Event.BLOCKED
     ant.cell = destination
-    if ant.carries:
-        world.trail.deposit(destination, ant.carried)
-    return Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
+    event = Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
+    if ant.carries and lays(task, ant, "trail"):
+        world.trail.deposit(destination, ant.carried, ant, event, tick)
+    return event
 
 
-def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
+def _handle(world: WorldState, intent: Intent, wins: bool, task: Task, tick: int) -> Event:
     """Do a pick-up or a delivery if it is possible, and return the event."""
     ant = intent.ant
     if intent.gives:
@@ -227,9 +239,9 @@ def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
         world.loads[intent.target] -= 1
         if world.loads[intent.target] == 0:
             world.ground[intent.target] = EMPTY
-        world.trail.deposit(intent.target, 0)
-        world.trail.deposit(ant.cell, 0)
         ant.carries, ant.carried = True, 0
+        for cell in (intent.target, ant.cell) if lays(task, ant, "trail") else ():
+            world.trail.deposit(cell, 0, ant, Event.PICKED_UP, tick)
         ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.PICKED_UP
     return Event.FAILED

@@ -36,6 +36,9 @@ class Ant:
         carried: Ticks since the ant's last pick-up or delivery, its birth, or the start.
         nest: The number of its nest.
         kind: The kind of the last food that it picked up.
+        caste: The number of its caste.
+        threshold: Its response threshold, 0 without one.
+        idle: Whether it does not forage; its last action is then -1 and its last event NONE.
         percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
         misread: The codes of cells in view that the ant misreads, by turns from its heading.
@@ -62,6 +65,9 @@ class Ant:
     chosen: int | None = None
     nest: int = 0
     kind: int = 0
+    caste: int = 0
+    threshold: np.float32 = field(default_factory=lambda: np.float32(0))
+    idle: bool = False
 
 
 @dataclass(kw_only=True, slots=True)
@@ -94,6 +100,7 @@ class Transition:
     terminated: bool
     truncated: bool
     nest: int = 0
+    caste: int = 0
     td_error: np.float32 | None = None
     executed: int = -1
 

@@ -81,6 +81,9 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
     if SEES_GOAL in seen:
         return GIVE if ant.carries else PICK_UP
     weights, nearer = [0.0, 0.0, 0.0], [False, False, False]
+    cue = world.cue(ant)
+    if world.has_compass(ant) and choice.carriers_follow is not None:
+        cue = world.pheromone_named(choice.carriers_follow)
     for side in (LEFT, FORWARD, RIGHT):
         cell = neighbour(ant.cell, (ant.heading + side - 1) % N_HEADINGS)
         misread = side - 1 in ant.misread
@@ -90,15 +93,11 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
             enters = ant.carries or traffic.follow
             nearer[side] = ant.carries and is_better(world, ant, cell)
         if enters:
-            level = 0.0 if misread else float(world.cue(ant).level(cell))
+            level = 0.0 if misread else float(cue.level(cell))
             weights[side] = power(choice.k + level, choice.exponent)
     if not any(weights):
         return (LEFT, RIGHT)[pick(low, 2)]
-    if (
-        ant.carries
-        and world.homing == "compass"
-        and any(weights[side] and nearer[side] for side in range(3))
-    ):
+    if world.has_compass(ant) and any(weights[side] and nearer[side] for side in range(3)):
         weights = [weights[side] if nearer[side] else 0.0 for side in range(3)]
     return weighted(weights, low)
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import copy
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -19,8 +20,16 @@ from taichi_ants.grid.constants import (
     STREAM_ROLLOUT,
 )
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.reference.actions import carry_out, intend
+from taichi_ants.learners.policies import frozen_policy
+from taichi_ants.reference.actions import Intent, carry_out, intend
 from taichi_ants.reference.ants import Ant, Transition, nest_of, starts
+from taichi_ants.reference.castes import (
+    castes_at_start,
+    draw_caste,
+    draw_threshold,
+    starts_foraging,
+    stops_foraging,
+)
 from taichi_ants.reference.choice import (
     choose_action,
     choose_cell,
@@ -29,13 +38,14 @@ from taichi_ants.reference.choice import (
 )
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
-from taichi_ants.reference.learners import LEARNERS
+from taichi_ants.reference.learners import LEARNERS, Learner
 from taichi_ants.reference.observations import OBSERVATIONS, TURNS, codes_in_view, observe
+from taichi_ants.reference.own_rules import choose_by_rule, pay
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.reference.sharing import SHARING, ByNest
+from taichi_ants.reference.sharing import SHARING, ByGroup, FrozenTable
 from taichi_ants.reference.world_state import WorldState
-from taichi_ants.task import Task
-from taichi_ants.task.constants import EMPTY, PICK_UP
+from taichi_ants.task import Caste, Choice, Food, Task
+from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
@@ -55,6 +65,7 @@ class EpisodeRecord:
     deaths: int = 0
     regrown: int = 0
     apart: Counter[tuple[int, int]] = field(default_factory=Counter)  # by nest and kind of food
+    by_caste: Counter[int] = field(default_factory=Counter)
 
 
 class ReferenceColony:
@@ -66,12 +77,14 @@ class ReferenceColony:
     Attributes:
         world: The present state of the world; each episode starts from `start_world`.
         n_ants: The number of ants at the start of an episode.
+        starting: The number of these ants by nest.
         pheromone: The task's pheromone, without evaporation where the task switches it off.
         fields: The task's further pheromones by name, likewise.
         ants: The living ants by slot, 0 to `slots` - 1.
         streams: The random streams of the initial ants, which continue through all episodes.
         next_number: The number of the next ant that is added.
         stores: Food items that each queen will turn into ants.
+        stimuli: The stimulus of each nest, to which idle ants respond.
         queen_stream: The queen's random stream, which continues; wandering food also uses it.
         minds: The tables; see `sharing`.
         epsilon, learning_rate: Values in the present episode, float64.
@@ -118,40 +131,86 @@ class ReferenceColony:
         self.streams = [RandomStream(stream_state(seed, STREAM_ANT, n)) for n in range(ants)]
         self.queen_stream = RandomStream(stream_state(seed, STREAM_QUEEN, 0))
         make = partial(LEARNERS[training.learner], training, task.n_states)
-        nests = len(queens_of(world)) if sharing != "independent" else 1
-        tables = [None] * nests if q_values is None else [q_values] * nests
-        if nests > 1 and q_values is not None and q_values.ndim == 3:
-            tables = list(q_values)
-        several = [SHARING[sharing](make, self.slots, table) for table in tables]
-        self.minds = several[0] if nests == 1 else ByNest(several)
-        self._foods = list(task.foods.values())
+        self.castes = list(task.castes.values())
+        groups = len(queens_of(world)) * max(1, len(self.castes))
+        if sharing == "independent" or (groups == 1 and not self.castes):
+            self.minds = SHARING[sharing](make, self.slots, q_values)
+        else:
+            tables = [q_values] * groups
+            if q_values is not None and q_values.ndim > 2:
+                tables = list(q_values.reshape(groups, *q_values.shape[-2:]))
+            several = [self._mind(make, g, table) for g, table in enumerate(tables)]
+            self.minds = ByGroup(several, self.castes)
         self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
         self.episode = -1
         self.records: list[EpisodeRecord] = []
         self._set_up()
 
+    @property
+    def foods(self) -> list[Food]:
+        """The kinds of food of the task; none for the usual food."""
+        return list(self.task.foods.values())
+
+    def _mind(self, make: Callable[..., Learner], group: int, table: Any) -> FrozenTable:
+        """Return the table of a group of ants, frozen if its caste follows a policy."""
+        policy = self.castes[group % len(self.castes)].policy if self.castes else None
+        if policy is None:
+            return SHARING[self.sharing](make, self.slots, table)
+        return FrozenTable(make, self.slots, frozen_policy(policy, self.task.observation))
+
+    def caste_of(self, ant: Ant) -> Caste:
+        """Return the caste of an ant, one without settings if there are no castes."""
+        return self.castes[ant.caste] if self.castes else Caste()
+
+    def take_castes(self) -> None:
+        """Take the numbers of castes from the task."""
+        self.castes = list(self.task.castes.values())
+        self.minds.take(self.castes, self._training.discount)
+        self.world.cues = self._cues()
+
+    def _cues(self) -> list[tuple[str, str]]:
+        """Return the names of the cues by caste."""
+        task = self.task
+        return [
+            (one.outbound_cue or task.outbound_cue, one.homing_cue or task.homing_cue)
+            for one in self.castes or [Caste()]
+        ]
+
     def _set_up(self) -> None:
         """Reset everything that lasts for one episode."""
         self.world = WorldState(
             *(self.start_world, self.pheromone, self.fields),
-            *(self.task.outbound_cue, self.task.homing_cue, self._foods),
+            *(self._cues(), self.foods, self.task.rules),
         )
         self.food_sources = FoodSources(self.start_world)
         self.stores = [0] * len(self.world.queens)
+        self.stimuli = [0.0] * len(self.world.queens)
         self.next_number = self.n_ants
         self.record = EpisodeRecord()
         self.over = False
         self.transitions: list[Transition] = []
         self.ants: dict[int, Ant] = {}
         begin = starts(self.start_world, self.seed, self.n_ants, self.start)
+        nests = [nest_of(self.start_world, number) for number in range(self.n_ants)]
+        self.starting = Counter(nests)
+        left = {
+            nest: castes_at_start(self.castes, nest, self.starting[nest])
+            for nest in (range(len(self.world.queens)) if self.castes else ())
+        }
         for number, (cell, heading) in enumerate(begin):
-            nest, stream = nest_of(self.start_world, number), self.streams[number]
-            self.add(Ant(cell, heading, slot=number, number=number, stream=stream, nest=nest))
+            nest, stream = nests[number], self.streams[number]
+            caste = left[nest].pop(0) if self.castes else 0
+            ant = Ant(cell, heading, slot=number, number=number, stream=stream, nest=nest)
+            ant.caste = caste
+            self.add(ant)
         for ant in self.ants.values():
             self.observe(ant)
 
     def add(self, ant: Ant) -> None:
-        """Put an ant into its slot and onto its cell."""
+        """Put an ant into its slot and onto its cell, idle if it has a threshold."""
+        threshold = self.caste_of(ant).threshold
+        ant.threshold = draw_threshold(threshold, self.seed, ant.number)
+        ant.idle = threshold.distribution != "none"
         self.ants[ant.slot] = ant
         self.world.ants[ant.cell] = ant
 
@@ -159,7 +218,10 @@ class ReferenceColony:
     def q_values(self) -> np.ndarray:
         """A copy of the table, float32 (n_states, 5), or of all tables, (slots, n_states, 5)."""
         tables = np.array([learner.table() for learner in self.minds.tables])
-        return tables if self.sharing == "independent" or len(tables) > 1 else tables[0]
+        if self.sharing == "independent":
+            return tables
+        axes = [n for n in (len(self.world.queens), len(self.castes)) if n > 1]
+        return tables.reshape(*axes, *tables.shape[1:])
 
     def observe(self, ant: Ant) -> None:
         """Update the percept and the state index of an ant, which may misread cells in view."""
@@ -211,7 +273,14 @@ class ReferenceColony:
         traffic = self.task.traffic
         intents = []
         for ant in acting:
-            ant.action = self._draw_action(ant) if ant.chosen is None else ant.chosen
+            if ant.idle:
+                stimulus = self.stimuli[ant.nest]
+                ant.idle = not starts_foraging(ant, stimulus, self.task.labour)
+            if ant.idle:
+                ant.action = -1
+                intents.append(Intent(ant, GIVE, rests=True))
+                continue
+            ant.action = self._draw_action(ant, tick) if ant.chosen is None else ant.chosen
             ant.chosen = None
             action = slipped(ant.action, self.task.noise.slip, ant.stream)
             intents.append(intend(self.world, ant, action, traffic))
@@ -221,13 +290,17 @@ class ReferenceColony:
             if picked is not None and self.world.ground[picked] == EMPTY:  # its last load
                 self.food_sources.taken(picked, tick)
         for trail in (self.world.trail, *self.world.fields.values()):
-            trail.tick()
+            trail.tick(tick)
         self._count(acting)
         self.record.carried += sum(
             was.carried
             for was, ant in zip(before, acting, strict=True)
             if ant.event is Event.DELIVERED
         )
+        for nest in range(len(self.stimuli)):
+            fed = sum(ant.event is Event.DELIVERED and ant.nest == nest for ant in acting)
+            relief = self.task.labour.relief or 0.0
+            self.stimuli[nest] = max(0.0, self.stimuli[nest] - relief * fed)
         if self.task.life.births:
             for ant in acting:
                 self.stores[ant.nest] += ant.event is Event.DELIVERED
@@ -235,35 +308,79 @@ class ReferenceColony:
                 self._births(nest)
         dying = self._deaths(acting)
         life = self.task.life
-        delays = [food.regrowth for food in self._foods] or [life.regrowth]
+        delays = [food.regrowth for food in self.foods] or [life.regrowth]
         self.record.regrown += self.food_sources.regrow(self.world, delays, tick)
         if life.wander is not None and (tick + 1) % life.wander == 0:
             self.food_sources.wander(self.world, self.queen_stream)
+        foraged = [not ant.idle for ant in acting]
+        stopping = set()
+        if self.task.labour.rule == "thresholds":
+            for ant in acting:
+                if not ant.idle and stops_foraging(ant, self.world.queens[ant.nest], self.task):
+                    stopping.add(ant.slot)
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
+        both = [(was, ant) for was, ant, f in zip(before, acting, foraged, strict=True) if f]
+        self._pay(both, tick)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
-        self._learn(before, acting, last or self.over)
+        self._learn([was for was, _ in both], [ant for _, ant in both], stopping, last or self.over)
+        for ant in acting:
+            if ant.slot in stopping:
+                ant.idle, ant.chosen = True, None
+                if self.sharing == "independent":
+                    self.minds.of(ant).begin()
+        if self.task.labour.rule == "thresholds":
+            self.stimuli = [one + (self.task.labour.demand or 0.0) for one in self.stimuli]
         self.record.ticks += 1
 
-    def _draw_action(self, ant: Ant) -> int:
-        choice = self.task.choice
+    def _pay(self, pairs: Sequence[tuple[Ant, Ant]], tick: int) -> None:
+        """Replace the rewards of a tick by those of your own rule, if there is one.
+
+        `pairs` has each ant before and after the tick.
+        """
+        rule = self.task.own_reward
+        if rule is None:
+            return
+        for was, ant in pairs:
+            paid = pay(self.world, was, ant, rule, self.task, tick)
+            self.record.episode_return += paid - ant.reward
+            ant.reward = paid
+
+    def _draw_action(self, ant: Ant, tick: int) -> int:
+        choice = self._choice_of(ant)
+        if choice.own_rule is not None:
+            values = self.minds.of(ant).rows[ant.state] if choice.needs_table else []
+            epsilon = self._epsilon_of(ant)
+            return choose_by_rule(self.world, ant, self.task, values, epsilon, tick)
         if choice.rule == "deneubourg":
             return choose_cell(self.world, ant, choice, self.task.traffic)
         values = self.minds.of(ant).rows[ant.state]
-        return choose_action(values, self.epsilon, ant.stream, choice)
+        return choose_action(values, self._epsilon_of(ant), ant.stream, choice)
+
+    def _choice_of(self, ant: Ant) -> Choice:
+        """Return the rule of choice with the numbers of the ant's caste."""
+        caste = self.caste_of(ant)
+        own = {name: getattr(caste, name) for name in ("temperature", "k", "exponent")}
+        return replace(self.task.choice, **{k: one for k, one in own.items() if one is not None})
+
+    def _epsilon_of(self, ant: Ant) -> float:
+        own = self.caste_of(ant).epsilon
+        return self.epsilon if own is None else own
 
     def _count(self, acting: Sequence[Ant]) -> None:
         """Record what happened in the tick."""
         record, delivered = self.record, sum(ant.event is Event.DELIVERED for ant in acting)
         record.episode_return += sum(ant.reward for ant in acting)
-        record.moves += sum(ant.executed < PICK_UP for ant in acting)
+        record.moves += sum(0 <= ant.executed < PICK_UP for ant in acting)
         record.blocked += sum(
-            ant.executed < PICK_UP and ant.event in (Event.BLOCKED, Event.PUSHED) for ant in acting
+            0 <= ant.executed < PICK_UP and ant.event in (Event.BLOCKED, Event.PUSHED)
+            for ant in acting
         )
         record.deliveries += delivered
         for ant in acting:
             if ant.event is Event.DELIVERED:
                 record.apart[ant.nest, ant.kind] += 1
+                record.by_caste[ant.caste] += 1
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
 
@@ -279,16 +396,18 @@ class ReferenceColony:
                 return
             high, _ = self.queen_stream.draw()
             heading = free[pick(high, len(free))]
-            self.new_ant(around[heading], heading, slot, nest)
+            caste = draw_caste(self.castes, nest, self.starting[nest], self.queen_stream)
+            self.new_ant(around[heading], heading, slot, nest, caste)
             self.stores[nest] -= 1
             self.record.births += 1
 
-    def new_ant(self, cell: Cell, heading: int, slot: int, nest: int = 0) -> None:
+    def new_ant(self, cell: Cell, heading: int, slot: int, nest: int = 0, caste: int = 0) -> None:
         """Add a new ant to a slot and a cell."""
         number = self.next_number
         state = stream_state(self.seed, STREAM_BORN, (self.episode << 32) + number)
         stream = RandomStream(state)
-        self.add(Ant(cell, heading, slot=slot, number=number, stream=stream, nest=nest))
+        ant = Ant(cell, heading, slot=slot, number=number, stream=stream, nest=nest, caste=caste)
+        self.add(ant)
         self.minds.born(slot)
         self.next_number += 1
 
@@ -297,12 +416,10 @@ class ReferenceColony:
 
         A dying ant leaves its food on its cell.
         """
-        lifespan = self.task.life.lifespan
-        if lifespan is None:
-            return []
-        for ant in acting:
-            ant.age += 1
-        dying = [ant for ant in acting if ant.age >= lifespan]
+        spans = [self.caste_of(ant).lifespan or self.task.life.lifespan for ant in acting]
+        for ant, span in zip(acting, spans, strict=True):
+            ant.age += span is not None
+        dying = [a for a, span in zip(acting, spans, strict=True) if span and a.age >= span]
         for ant in dying:
             del self.world.ants[ant.cell]
             if ant.carries:
@@ -311,14 +428,16 @@ class ReferenceColony:
         self.record.deaths += len(dying)
         return dying
 
-    def _learn(self, before: Sequence[Ant], after: Sequence[Ant], last: bool) -> None:
+    def _learn(
+        self, before: Sequence[Ant], after: Sequence[Ant], stopping: set[int], last: bool
+    ) -> None:
         """Draw the next actions if the learner needs them, by the present tables; then learn."""
         self.transitions = []
         for was, ant in zip(before, after, strict=True):
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
             # After a delivery that terminates, the ant chooses at the start of its next tick.
-            if self.minds.draws_next_action and not terminated:
-                ant.chosen = self._draw_action(ant)
+            if self.minds.draws_ahead(ant) and not terminated:
+                ant.chosen = self._draw_action(ant, self.record.ticks + 1)
             self.transitions.append(
                 Transition(
                     slot=ant.slot,
@@ -335,11 +454,21 @@ class ReferenceColony:
                     next_state=ant.state,
                     next_action=ant.chosen,
                     terminated=terminated,
-                    truncated=(last or ant.slot not in self.ants) and not terminated,
+                    truncated=not terminated
+                    and (last or ant.slot not in self.ants or ant.slot in stopping),
                     nest=ant.nest,
+                    caste=ant.caste,
                 )
             )
-        self.minds.learn(self.transitions, [ant.stream for ant in after], self.epsilon)
+        if self.sharing != "independent":
+            self.minds.learn(self.transitions, [ant.stream for ant in after], self.epsilon)
+            return
+        for step, ant in zip(self.transitions, after, strict=True):
+            mind, caste = self.minds.of(ant), self.caste_of(ant)
+            rate, discount = caste.learning_rate, caste.discount
+            mind.learning_rate = np.float32(self.learning_rate if rate is None else rate)
+            mind.discount = np.float32(self._training.discount if discount is None else discount)
+            self.minds.learn([step], [ant.stream], self._epsilon_of(ant))
 
 
 def beginner(

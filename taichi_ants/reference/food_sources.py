@@ -38,8 +38,8 @@ class FoodSources:
         self.food_sources = [FoodSource(cell, kinds[cell]) for cell in sorted(cells)]
         self._piles = _connected(self.food_sources)
 
-    def give(self, cell: Cell) -> None:
-        """Note that an intervention put food on a cell.
+    def give(self, cell: Cell, kind: int = 0) -> None:
+        """Note that an intervention put food of a kind on a cell.
 
         The first waiting food source of the cell gets its food back. If the cell has no food
         source, a new one is appended. It joins the pile of the first adjacent food source, or
@@ -58,6 +58,9 @@ class FoodSources:
                 self._piles.append(list(here))
         if all(source.waiting_since is not None for source in here):
             here[0].waiting_since = None
+        for source in here:
+            if source.waiting_since is None:
+                source.kind = kind
 
     def end(self, cell: Cell) -> None:
         """Note that an intervention removed the food source of a cell."""

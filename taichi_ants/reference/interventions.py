@@ -10,8 +10,15 @@ import numpy as np
 
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_ANT, STREAM_INTERVENTION
 from taichi_ants.reference.ants import start_order
+from taichi_ants.reference.castes import draw_caste
 from taichi_ants.reference.colony import ReferenceColony
-from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, normal_form
+from taichi_ants.reference.geometry import (
+    Cell,
+    distance,
+    existing_cells,
+    listed_cells,
+    normal_form,
+)
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.world_state import Trail
 from taichi_ants.task import Task
@@ -40,7 +47,9 @@ class Interventions:
             self._falls = self._falls and one == colony.task.fields[name]
         world = colony.start_world
         # The content of the cells that are not empty when later episodes start.
-        self._start: dict[Cell, int] = {world.queen: QUEEN}
+        self._queens = list(colony.world.queens)  # when later episodes start
+        self._start: dict[Cell, int] = dict.fromkeys(self._queens, QUEEN)
+        self._kinds = dict(colony.world.kinds)  # of their food
         self._start |= dict.fromkeys(listed_cells(world.foods), FOOD)
         self._start |= dict.fromkeys(listed_cells(world.obstacles), OBSTACLE)
 
@@ -53,25 +62,26 @@ class Interventions:
         for ant in self.colony.ants.values():
             self.colony.observe(ant)
 
-    def put(self, cells: Sequence[Cell], what: int) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD, now and later, except those of ants and the queen.
+    def put(self, cells: Sequence[Cell], what: int, kind: int = 0) -> None:
+        """Make cells EMPTY, OBSTACLE or FOOD, now and later, except those of ants and queens.
 
-        Rock and food first move ants on these cells aside.
+        Rock and food first move ants on these cells aside. Food has all loads of its kind.
         """
-        self._put(cells, what)
+        self._put(cells, what, kind, self.colony.world.full(kind))
         self._observe()
 
-    def _put(self, cells: Sequence[Cell], what: int) -> None:
+    def _put(self, cells: Sequence[Cell], what: int, kind: int = 0, loads: int = 1) -> None:
         world = self.colony.world
         if what != EMPTY:
             self._move_aside(cells)
         for cell in cells:
-            if cell in world.ants or cell == world.queen:
+            if cell in world.ants or cell in world.queens:
                 continue
             world.ground[cell] = self._start[cell] = what
             if what == FOOD:
-                world.put_food(cell, 0, 1)
-                self.colony.food_sources.give(cell)
+                self._kinds[cell] = kind
+                world.put_food(cell, kind, loads)
+                self.colony.food_sources.give(cell, kind)
             else:
                 self.colony.food_sources.end(cell)
         self._new_trail()
@@ -95,24 +105,24 @@ class Interventions:
         if what != EMPTY and world.ground[to] == EMPTY:
             self._move_aside([to])
             if to not in world.ants and what == QUEEN:
-                self._move_queen(to)
+                self._move_queen(to, world.queens.index(cell))
             elif to not in world.ants:
                 self._put([cell], EMPTY)
-                self._put([to], what)
+                self._put([to], what, world.kinds.get(cell, 0), world.loads.get(cell, 1))
         self._observe()
 
-    def move_queen(self, cell: Cell) -> None:
-        """Move the queen to an empty cell, now and later; an ant there moves aside."""
-        self._move_queen(cell)
+    def move_queen(self, cell: Cell, nest: int = 0) -> None:
+        """Move a queen to an empty cell, now and later; an ant there moves aside."""
+        self._move_queen(cell, nest)
         self._observe()
 
-    def _move_queen(self, cell: Cell) -> None:
+    def _move_queen(self, cell: Cell, nest: int) -> None:
         world = self.colony.world
         self._move_aside([cell])
         assert world.content(cell) == EMPTY
         for ground in (world.ground, self._start):
-            ground[world.queen], ground[cell] = EMPTY, QUEEN
-        world.queen = cell
+            ground[world.queens[nest]], ground[cell] = EMPTY, QUEEN
+        world.queens[nest] = self._queens[nest] = cell
         self.colony.food_sources.end(cell)
 
     def _new_trail(self) -> None:
@@ -120,9 +130,10 @@ class Interventions:
         world = self.colony.world
         rocks = [cell for cell, held in world.ground.items() if held == OBSTACLE]
         bare = World(self._first.ranges, world.queen, obstacles=rocks)
-        world.trail = self._copy(world.trail, Trail(bare, world.pheromone))
+        rules = self.colony.task.rules
+        world.trail = self._copy(world.trail, Trail(bare, world.pheromone, rules=rules))
         for name, one in self.colony.fields.items():
-            world.fields[name] = self._copy(world.fields[name], Trail(bare, one))
+            world.fields[name] = self._copy(world.fields[name], Trail(bare, one, rules=rules))
 
     def _copy(self, old: Trail, new: Trail) -> Trail:
         """Return a new trail after setting it to the levels of an old one."""
@@ -131,45 +142,74 @@ class Interventions:
                 new.lay(cell, old.level(cell))
         return new
 
-    def lay_trail(self, cells: Sequence[Cell], level: int) -> None:
-        """Set the trail of cells other than rocks."""
+    def lay_trail(self, cells: Sequence[Cell], level: int, field: str = "trail") -> None:
+        """Set the levels of a pheromone in cells other than rocks."""
         world = self.colony.world
         for cell in cells:
             if world.ground[cell] != OBSTACLE:
-                world.trail.lay(cell, level)
+                world.pheromone_named(field).lay(cell, level)
         self._observe()
 
-    def add_ants(self, cells: Sequence[Cell], heading: int | None = None) -> None:
-        """Put ants on those of the cells that are empty; draw each heading if none is given."""
+    def add_ants(
+        self, cells: Sequence[Cell], heading: int | None = None, nest: int | None = None
+    ) -> None:
+        """Put ants on those of the cells that are empty; draw each heading if none is given.
+
+        Without a nest, each belongs to the nearest queen, the first of several.
+        """
+        queens = self.colony.world.queens
+        nests = [
+            min(range(len(queens)), key=lambda one: distance(cell, queens[one]))
+            if nest is None
+            else nest
+            for cell in cells
+        ]
+        self._add(cells, nests, heading)
+
+    def _add(self, cells: Sequence[Cell], nests: Sequence[int], heading: int | None) -> None:
         colony = self.colony
-        for cell in cells:
-            if colony.world.content(cell) != EMPTY:
-                continue
-            towards = heading
-            if towards is None:
-                high, _ = self._stream.draw()
-                towards = pick(high, N_HEADINGS)
+        pairs = zip(cells, nests, strict=True)
+        free = [(cell, nest) for cell, nest in pairs if colony.world.content(cell) == EMPTY]
+        headings = [heading or 0 for _ in free]
+        if heading is None:
+            headings = [pick(self._stream.draw()[0], N_HEADINGS) for _ in free]
+        castes = [
+            draw_caste(colony.castes, nest, colony.starting[nest], self._stream) for _, nest in free
+        ]
+        for (cell, nest), towards, caste in zip(free, headings, castes, strict=True):
             slot = next(slot for slot in range(colony.slots) if slot not in colony.ants)
-            colony.new_ant(cell, towards, slot)
+            colony.new_ant(cell, towards, slot, nest, caste)
         self._observe()
 
-    def add_some(self, n: int, heading: int | None = None) -> None:
-        """Put n ants on free cells, in the order of `ants.starts`."""
+    def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
+        """Put n ants on free cells, in the order of `ants.starts`; without a nest, by turns."""
         colony, world = self.colony, self.colony.world
-        order = start_order(self._first, world.queen, colony.seed, colony.start)
-        self.add_ants([cell for cell in order if world.content(cell) == EMPTY][:n], heading)
+        wanted = range(len(world.queens)) if nest is None else [nest]
+        orders = {
+            one: start_order(self._first, world.queens[one], colony.seed, colony.start)
+            for one in wanted
+        }
+        cells: list[Cell] = []
+        nests = [wanted[k % len(wanted)] for k in range(n)]
+        for one in nests:
+            free = (cell for cell in orders[one] if world.content(cell) == EMPTY)
+            cells.append(next(cell for cell in free if cell not in cells))
+        self._add(cells, nests, heading)
 
-    def remove_some(self, n: int) -> None:
-        """Remove n random ants: those whose draws are the smallest."""
+    def remove_some(self, n: int, nest: int | None = None) -> None:
+        """Remove n random ants, or of a nest: those whose draws are the smallest."""
         draws = {}
         for ant in sorted(self.colony.ants.values(), key=lambda ant: ant.number):
-            high, low = self._stream.draw()
-            draws[high, low] = ant.cell
+            if nest in (None, ant.nest):
+                high, low = self._stream.draw()
+                draws[high, low] = ant.cell
         self.remove_ants([draws[draw] for draw in sorted(draws)[:n]])
 
     def set_task(self, task: Task) -> None:
         """Change numbers of the task."""
         self.colony.task, self._pheromone = task, task.pheromone
+        self.colony.world.foods = self.colony.foods
+        self.colony.take_castes()
         learns = self.colony.sharing != "frozen"
         self._falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
         self.set_pheromone()
@@ -179,12 +219,12 @@ class Interventions:
         for learner in self.colony.minds.tables:
             learner.rows = [list(row) for row in np.asarray(q_values, np.float32)]
 
-    def remove_ants(self, cells: Sequence[Cell]) -> None:
-        """Remove the ants on these cells, with their food."""
+    def remove_ants(self, cells: Sequence[Cell], nest: int | None = None) -> None:
+        """Remove the ants on these cells, or those of a nest, with their food."""
+        there = self.colony.world.ants
         for cell in cells:
-            ant = self.colony.world.ants.pop(cell, None)
-            if ant is not None:
-                del self.colony.ants[ant.slot]
+            if cell in there and nest in (None, there[cell].nest):
+                del self.colony.ants[there.pop(cell).slot]
         self._observe()
 
     def set_ants(self, n: int) -> None:
@@ -247,6 +287,7 @@ class Interventions:
         trails = [(cell, level) for cell, level in trails if start.get(cell) != OBSTACLE]
         ants = [(tuple(row[:3]), row[3]) for row in first.ants.tolist()]
         ants = [(cell, heading) for cell, heading in ants if start.get(cell, EMPTY) == EMPTY]
-        [queen] = held[QUEEN]
-        colony.begin_episode(World(first.ranges, queen, held[FOOD], held[OBSTACLE], trails, ants))
+        foods = [(cell, self._kinds[cell]) for cell in held[FOOD]]
+        now = World(first.ranges, self._queens, foods, held[OBSTACLE], trails, ants)
+        colony.begin_episode(now)
         self._set_stream()

@@ -87,9 +87,16 @@ def carriers(colony: ReferenceColony) -> float:
     return sum(loads) / len(loads) if loads else NONE
 
 
+def foraging(colony: ReferenceColony) -> float:
+    """Return the share of the living ants that are not idle."""
+    forage = [not ant.idle for ant in colony.ants.values()]
+    return sum(forage) / len(forage) if forage else NONE
+
+
 def mean_distance(colony: ReferenceColony) -> float:
-    """Return the mean distance of the ants to the queen."""
-    far = [distance(ant.cell, colony.world.queen) for ant in colony.ants.values()]
+    """Return the mean distance of the ants to the nearest queen."""
+    queens = colony.world.queens
+    far = [min(distance(ant.cell, one) for one in queens) for ant in colony.ants.values()]
     return sum(far) / len(far) if far else NONE
 
 
@@ -104,6 +111,7 @@ MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
     "activity": activity,
     "living": lambda colony: len(colony.ants),
     "carriers": carriers,
+    "foraging": foraging,
     "distance": mean_distance,
 }
 

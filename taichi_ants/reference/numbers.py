@@ -1,46 +1,7 @@
-"""Functions of real numbers, implemented a second time in Python floats.
+"""Functions of real numbers in Python floats, the second implementation of those of kernels."""
 
-The formulas, and the order of their operations, are those of the docstring of
-`taichi_ants.task.rules.numbers`.
-"""
+from taichi_ants.rules.functions import exp as exponential
+from taichi_ants.rules.functions import log as logarithm
+from taichi_ants.rules.functions import power
 
-from __future__ import annotations
-
-import math
-import struct
-
-
-def exponential(x: float) -> float:
-    """Return e to the power of x; 0 below -708."""
-    if x < -708.0:
-        return 0.0
-    x = min(x, 709.0)
-    n = math.floor(x * 1.4426950408889634 + 0.5)
-    r = (x - n * 0.6931471803691238) - n * 1.9082149292705877e-10
-    p = 1.0 / math.factorial(13)
-    for i in reversed(range(13)):
-        p = p * r + 1.0 / math.factorial(i)
-    return math.ldexp(p, n)
-
-
-def logarithm(x: float) -> float:
-    """Return the natural logarithm of a normal number above 0."""
-    (bits,) = struct.unpack("<Q", struct.pack("<d", x))
-    exponent = (bits >> 52) - 1023
-    m = math.ldexp(x, -exponent)
-    if m > 1.4142135623730951:
-        m, exponent = m / 2, exponent + 1
-    s = (m - 1.0) / (m + 1.0)
-    z = s * s
-    p = 1.0 / 23
-    for i in (21, 19, 17, 15, 13, 11, 9, 7, 5, 3, 1):
-        p = p * z + 1.0 / i
-    e = float(exponent)
-    return e * 0.6931471803691238 + (e * 1.9082149292705877e-10 + (2.0 * s) * p)
-
-
-def power(x: float, y: float) -> float:
-    """Return x to the power of y, for x above 0 and y of at least 0."""
-    if y.is_integer():
-        return math.prod([x] * int(y), start=1.0)
-    return exponential(y * logarithm(x))
+__all__ = ["exponential", "logarithm", "power"]

@@ -53,6 +53,7 @@ class Protocol:
         colony = self._colony
         colony.task, colony.epsilon, learning_rate, tables = self._before
         colony.pheromone, colony.fields = self._pheromones
+        colony.take_castes()
         colony.minds.pace(learning_rate)
         colony.learning_rate = learning_rate
         if colony.sharing == "frozen":
@@ -88,27 +89,29 @@ class Protocol:
         to = self._interventions
         match one:
             case language.RemoveAnts(cells=None):
-                to.remove_some(self._amount(one))
+                to.remove_some(self._amount(one), one.nest)
             case language.RemoveAnts():
-                to.remove_ants(_cells(one))
+                to.remove_ants(_cells(one), one.nest)
             case language.AddAnts(cells=None):
-                to.add_some(self._amount(one), one.heading)
+                to.add_some(self._amount(one), one.heading, one.nest)
             case language.AddAnts():
-                to.add_ants(_cells(one), one.heading)
+                to.add_ants(_cells(one), one.heading, one.nest)
             case language.Ants():
                 to.set_ants(one.number)
             case language.Place(what="queen"):
-                to.move_queen(*_cells(one))
+                to.move_queen(_cells(one)[0], one.nest or 0)
             case language.Place():
-                to.put(_cells(one), _CONTENTS[one.what])
+                names = list(self._colony.task.foods)
+                kind = names.index(one.kind) if one.kind else 0
+                to.put(_cells(one), _CONTENTS[one.what], kind)
             case language.Move():
                 to.move(*_cells(one))
             case language.Clear():
                 to.put(_cells(one), EMPTY)
             case language.Trail(cells=None):
-                to.lay_trail(list(self._colony.world.ground), one.level)
+                to.lay_trail(list(self._colony.world.ground), one.level, one.field)
             case language.Trail():
-                to.lay_trail(_cells(one), one.level)
+                to.lay_trail(_cells(one), one.level, one.field)
             case language.Epsilon():
                 self._colony.epsilon = one.value
             case language.LearningRate():
@@ -127,7 +130,8 @@ class Protocol:
         """Return a number of ants; a share is rounded, halves up."""
         if one.number is not None:
             return one.number
-        return int(one.share * len(self._colony.ants) + 0.5)
+        ants = [ant for ant in self._colony.ants.values() if one.nest in (None, ant.nest)]
+        return int(one.share * len(ants) + 0.5)
 
 
 def _cells(one: Any) -> list[Cell]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from taichi_ants.learners.config import update_weights
 from taichi_ants.reference.ants import Ant, Pair, Transition
 from taichi_ants.reference.learners import DynaQ, Learner
 from taichi_ants.reference.random_stream import RandomStream
+
+if TYPE_CHECKING:
+    from taichi_ants.task import Caste
 
 # Makes a learner from a table (n_states, 5), which it copies; None: the initial value.
 Make = Callable[[np.ndarray | None], Learner]
@@ -34,6 +38,13 @@ class FrozenTable:
     def of(self, ant: Ant) -> Learner:
         """Return the learner of an ant."""
         return self.tables[0]
+
+    def draws_ahead(self, ant: Ant) -> bool:
+        """Return whether an ant draws its next action at the end of a tick."""
+        return self.draws_next_action
+
+    def take(self, castes: Sequence[Caste], discount: float | None) -> None:
+        """Take the numbers of castes."""
 
     def born(self, slot: int) -> None:
         """Note that an ant was born into a slot."""
@@ -138,27 +149,57 @@ class IndependentTables(FrozenTable):
             step.td_error = self.tables[step.slot].learn(step, epsilon, stream)
 
 
-class ByNest(FrozenTable):
-    """A shared or frozen table for each nest, for worlds with several."""
+class ByGroup(FrozenTable):
+    """A shared or frozen table for each nest and caste; groups are castes in turn, nest by nest.
 
-    def __init__(self, nests: Sequence[FrozenTable]) -> None:
-        self._nests = nests
-        self.tables = [table for nest in nests for table in nest.tables]
-        self.draws_next_action = nests[0].draws_next_action
+    `epsilons` and `learning_rates` are those of castes with numbers that do not follow the
+    colony's, else None.
+    """
+
+    def __init__(self, groups: Sequence[FrozenTable], castes: Sequence[Caste]) -> None:
+        self._groups = groups
+        self._n_castes = max(1, len(castes))
+        self.tables = [table for group in groups for table in group.tables]
+        self.take(castes, None)
+
+    def take(self, castes: Sequence[Caste], discount: float | None) -> None:
+        """Take the numbers of castes, and the discount of those without one."""
+        self._epsilons = [caste.epsilon for caste in castes] or [None]
+        self._learning_rates = [caste.learning_rate for caste in castes] or [None]
+        for number, table in enumerate(self.tables):
+            own = castes[number % self._n_castes].discount if castes else None
+            if own is not None or discount is not None:
+                table.discount = np.float32(discount if own is None else own)
+        for group, rate in zip(self._groups, self._by_group(self._learning_rates), strict=True):
+            if rate is not None:
+                group.pace(rate)
+
+    def _by_group(self, numbers: Sequence[float | None]) -> list[float | None]:
+        return [*numbers] * (len(self._groups) // self._n_castes)
+
+    def group(self, ant: Ant | Transition) -> int:
+        """Return the number of the group of an ant."""
+        return ant.nest * self._n_castes + ant.caste
 
     def of(self, ant: Ant) -> Learner:
-        return self.tables[ant.nest]
+        return self.tables[self.group(ant)]
+
+    def draws_ahead(self, ant: Ant) -> bool:
+        return self._groups[self.group(ant)].draws_next_action
 
     def pace(self, learning_rate: float) -> None:
-        for nest in self._nests:
-            nest.pace(learning_rate)
+        own = self._by_group(self._learning_rates)
+        for group, rate in zip(self._groups, own, strict=True):
+            group.pace(learning_rate if rate is None else rate)
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
     ) -> None:
-        for nest, minds in enumerate(self._nests):
-            ours = [i for i, step in enumerate(steps) if step.nest == nest]
-            minds.learn([steps[i] for i in ours], [streams[i] for i in ours], epsilon)
+        epsilons = self._by_group(self._epsilons)
+        for number, (group, own) in enumerate(zip(self._groups, epsilons, strict=True)):
+            ours = [i for i, step in enumerate(steps) if self.group(step) == number]
+            rate = epsilon if own is None else own
+            group.learn([steps[i] for i in ours], [streams[i] for i in ours], rate)
 
 
 SHARING = {"shared": SharedTable, "independent": IndependentTables, "frozen": FrozenTable}

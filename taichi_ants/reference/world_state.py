@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,9 @@ from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from taichi_ants.rules import Parameters, Rule
     from taichi_ants.task import Field, Food, Pheromone
+    from taichi_ants.task.events import Event
     from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
@@ -34,8 +37,14 @@ class Trail:
     they are float32, and every operation rounds.
     """
 
-    def __init__(self, world: World, pheromone: Pheromone, is_empty: bool = False) -> None:
-        self.rule = pheromone
+    def __init__(
+        self,
+        world: World,
+        pheromone: Pheromone,
+        is_empty: bool = False,
+        rules: Mapping[str, Parameters] | None = None,
+    ) -> None:
+        self.rule, self._rules = pheromone, rules or {}
         rocks = set(listed_cells(world.obstacles))
         self._cells = [cell for cell in existing_cells(world.ranges) if cell not in rocks]
         self._place = {cell: place for place, cell in enumerate(self._cells)}
@@ -62,10 +71,18 @@ class Trail:
         """Set the level of a cell other than a rock."""
         self._levels[self._place[cell]] = level
 
-    def deposit(self, cell: Cell, carried: int) -> None:
-        """Deposit the pheromone of an ant that has had its load for `carried` ticks."""
+    def deposit(self, cell: Cell, carried: int, ant: Ant, event: Event, tick: int) -> None:
+        """Deposit the pheromone of an ant that has had its load for `carried` ticks.
+
+        The ant has the load after its action, and the percept before it.
+        """
         place, rule = self._place[cell], self.rule
-        if rule.deposit == "set":
+        if rule.own_deposit is not None:
+            facts = {"carried": carried, "carries": ant.carries, "event": event, "tick": tick}
+            facts |= {"percept": ant.percept}
+            level = self._computed(rule.own_deposit, place, facts)
+            self._levels[place] = level if rule.dense else math.floor(level)
+        elif rule.deposit == "set":
             self._levels[place] = rule.level
         elif rule.deposit == "add":
             self._levels[place] = min(self._levels[place] + rule.level, rule.cap)
@@ -74,9 +91,20 @@ class Trail:
                 self._levels[place], rule.level - int(rule.slope or 0) * carried
             )
 
-    def tick(self) -> None:
+    def _computed(self, rule: Rule, place: int, facts: Mapping[str, float]) -> float:
+        """Return the result of your own rule for a cell."""
+        every = {**facts, "level": self._levels[place]}
+        inputs = {name: float(every[name]) for name in rule.inputs}
+        return rule.result(inputs, vars(self._rules[rule.name]))
+
+    def tick(self, tick: int = 0) -> None:
         """Let trails evaporate, then spread, for one tick."""
-        if self.rule.evaporation == "linear":
+        own = self.rule.own_evaporation
+        if own is not None:
+            every = range(len(self._levels))
+            left = [self._computed(own, place, {"tick": tick}) for place in every]
+            self._levels = np.array(left).astype(np.float32)
+        elif self.rule.evaporation == "linear":
             self._levels = np.maximum(self._levels - 1, 0)
         elif self.rule.evaporation == "exponential":
             self._levels = self._levels * self.rule.decay
@@ -99,8 +127,8 @@ class WorldState:
     """The state of a world in an episode.
 
     `ground` maps each cell to EMPTY, OBSTACLE, FOOD or QUEEN; it is EMPTY under ants. `ants` maps
-    cells to ants. `fields` are further pheromones by name, `outbound` and `homing` the names of the
-    cues.
+    cells to ants. `fields` are further pheromones by name. `cues` are the names of the outbound and
+    the homing cue by caste.
     """
 
     def __init__(
@@ -108,9 +136,9 @@ class WorldState:
         world: World,
         pheromone: Pheromone,
         fields: Mapping[str, Field] | None = None,
-        outbound: str = "trail",
-        homing: str = "compass",
+        cues: Sequence[tuple[str, str]] = (("trail", "compass"),),
         foods: Sequence[Food] = (),
+        rules: Mapping[str, Parameters] | None = None,
     ) -> None:
         self._ranges, self.foods = world.ranges, foods
         self.queens: list[Cell] = queens_of(world)
@@ -124,18 +152,19 @@ class WorldState:
         self.ground.update(dict.fromkeys(listed_cells(world.obstacles), OBSTACLE))
         self.ants: dict[Cell, Ant] = {}
         self.pheromone = pheromone
-        self.trail = Trail(world, pheromone)
-        self.fields = {name: Trail(world, one, True) for name, one in (fields or {}).items()}
-        self.outbound, self.homing = outbound, homing
+        self.trail = Trail(world, pheromone, rules=rules)
+        self.fields = {name: Trail(world, one, True, rules) for name, one in (fields or {}).items()}
+        self.cues = cues
 
     def has_compass(self, ant: Ant) -> bool:
         """Return whether an ant with this load looks for cells nearer to the queen."""
-        return ant.carries and self.homing == "compass"
+        return ant.carries and self.cues[ant.caste][1] == "compass"
 
     def cue(self, ant: Ant) -> Trail:
         """Return the pheromone that an ant follows; with a compass, that of ants without food."""
-        uses_homing = ant.carries and self.homing != "compass"
-        return self.pheromone_named(self.homing if uses_homing else self.outbound)
+        outbound, homing = self.cues[ant.caste]
+        uses_homing = ant.carries and homing != "compass"
+        return self.pheromone_named(homing if uses_homing else outbound)
 
     def pheromone_named(self, name: str) -> Trail:
         """Return the trail, or a further field."""

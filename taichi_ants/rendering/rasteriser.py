@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from types import ModuleType
 
 import numpy as np
@@ -69,9 +70,11 @@ def marks(
     return table
 
 
-def thing(places: npt.ArrayLike, hexagon: float, mark: Mark) -> np.ndarray:
+def thing(
+    places: npt.ArrayLike, hexagon: float, mark: Mark, colour: np.ndarray | None = None
+) -> np.ndarray:
     """Return marks of food or queens; cells have the radius `hexagon`, in pixels."""
-    return marks(places, 0.72 * hexagon, mark, _COLOURS[mark])
+    return marks(places, 0.72 * hexagon, mark, _COLOURS[mark] if colour is None else colour)
 
 
 def cell_colour(letter: str) -> int:
@@ -93,16 +96,17 @@ def ants(
     hexagon: float,
     radius: float | None = None,
     opacity: float = 1.0,
+    colour: int | np.ndarray = colours.ANT,
 ) -> np.ndarray:
     """Return marks (n,) of ants. The default of `radius` suits cells of the radius `hexagon`."""
     if hexagon < _DOTS_BELOW:
-        colour = np.where(carries, _DOT_WITH_FOOD, colours.ANT)
+        colour = np.where(carries, _DOT_WITH_FOOD, colour)
         return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)
     without, with_food = Mark.ANT, Mark.ANT_WITH_FOOD
     if hexagon < _DARTS_BELOW:
         without, with_food = Mark.DART, Mark.DART_WITH_FOOD
     look = np.where(carries, with_food, without)
-    return marks(places, radius or _FILL * hexagon, look, colours.ANT, headings, opacity)
+    return marks(places, radius or _FILL * hexagon, look, colour, headings, opacity)
 
 
 def kernels() -> ModuleType:
@@ -120,6 +124,18 @@ def draw_marks(frame: np.ndarray, *tables: np.ndarray) -> None:
         draw(frame, np.concatenate(tables))
 
 
+def queens_of(snapshot: Snapshot) -> np.ndarray:
+    """Return the flat indices of the queens, in the order of nests if the snapshot has it."""
+    known = len(snapshot.queens) > 0
+    return snapshot.queens if known else np.flatnonzero(snapshot.ground == QUEEN)
+
+
+def kinds_of(snapshot: Snapshot) -> np.ndarray:
+    """Return the kind of the food in each cell, uint8 (grid.size,)."""
+    known = len(snapshot.food_kinds) > 0
+    return snapshot.food_kinds if known else np.zeros(len(snapshot.ground), np.uint8)
+
+
 class Rasteriser:
     """Draws worlds of one grid as pictures of one size, centred and as large as fits.
 
@@ -131,6 +147,7 @@ class Rasteriser:
         width, height, margin: The size of the pictures and the margin on each side, in pixels.
         beyond: Leave space for the cells just outside the border of the world.
         strongest: The trail level of the darkest colour.
+        of_fields: The same for further fields, by name; `strongest` for those that it lacks.
 
     Attributes:
         hexagon: Pixels from the centre of a cell to its corners.
@@ -144,8 +161,9 @@ class Rasteriser:
         margin: float = 0.0,
         beyond: bool = False,
         strongest: int = DEPOSIT_LEVEL,
+        of_fields: Mapping[str, int] | None = None,
     ) -> None:
-        self.grid, self._strongest = grid, strongest
+        self.grid, self._strongest, self._of_fields = grid, strongest, of_fields or {}
         self.width, self.height = width, height
         x_range, y_range, z_range = grid.ranges
         # The lowest and the highest (x, y), relative to cell (0, 0, 0) in hexagon sizes. In
@@ -171,16 +189,19 @@ class Rasteriser:
         """
         hexagon, tables = self.hexagon, []
         frame = self.draw_cells(self.cell_colours(snapshot))
-        queens = self._places(np.flatnonzero(snapshot.ground == QUEEN))
-        foods = self._places(np.flatnonzero(snapshot.ground == FOOD))
+        of_queens, of_foods = queens_of(snapshot), np.flatnonzero(snapshot.ground == FOOD)
+        queens, foods = self._places(of_queens), self._places(of_foods)
+        of_queens = colours.QUEENS[np.arange(len(queens)) % len(colours.QUEENS)]
+        of_foods = colours.FOODS[kinds_of(snapshot)[of_foods] % len(colours.FOODS)]
         if hexagon < _SMALLEST_DRAWING:
             # The ring distinguishes food from trails, some of which are as light as its dot.
             radius = max(_CRUMB * hexagon, _SMALLEST_CRUMB)
             tables.append(marks(foods, radius + _CRUMB_RING, Mark.DOT, colours.FLOOR_FOOD))
-            tables.append(marks(foods, radius, Mark.DOT, colours.CELL_FOOD))
-            tables.append(marks(queens, max(hexagon, _QUEEN), Mark.DOT, colours.CELL_QUEEN))
+            tables.append(marks(foods, radius, Mark.DOT, of_foods))
+            tables.append(marks(queens, max(hexagon, _QUEEN), Mark.DOT, of_queens))
         else:
-            tables += [thing(foods, hexagon, Mark.FOOD), thing(queens, hexagon, Mark.QUEEN)]
+            tables.append(thing(foods, hexagon, Mark.FOOD, of_foods))
+            tables.append(thing(queens, hexagon, Mark.QUEEN, of_queens))
         if in_view is not None:
             places, radius = self._places(in_view), 0.98 * hexagon
             if hexagon < _SMALLEST_OUTLINE:
@@ -191,7 +212,7 @@ class Rasteriser:
         if hexagon < _DOTS_BELOW:
             # Ants would hide the queen's dot, and the dot would hide ants next to her. So ants are
             # drawn over the dot, and an outline around the dot over the ants.
-            tables.append(marks(queens, _QUEEN_OUTLINE, Mark.OUTLINE, colours.CELL_QUEEN))
+            tables.append(marks(queens, _QUEEN_OUTLINE, Mark.OUTLINE, of_queens))
         draw_marks(frame, *tables)
         return frame
 
@@ -223,18 +244,22 @@ class Rasteriser:
         small = self.hexagon < _SMALLEST_DRAWING
         of_ground = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
         of_ground[OBSTACLE] = colours.CELL_OBSTACLE
-        of_ground[FOOD] = colours.FLOOR_FOOD
-        of_ground[QUEEN] = colours.CELL_QUEEN if small else colours.FLOOR_QUEEN
         of_cells = of_ground[snapshot.ground & 15]
-        ramps = [(colours.TRAIL_RAMP, snapshot.trail)]
+        foods, queens = np.flatnonzero(snapshot.ground == FOOD), queens_of(snapshot)
+        floors = colours.floors(colours.FOODS, colours.FLOOR_FOOD)
+        of_cells[foods] = floors[kinds_of(snapshot)[foods] % len(floors)]
+        floors = colours.floors(colours.QUEENS, colours.FLOOR_QUEEN)
+        floors = colours.QUEENS if small else floors
+        of_cells[queens] = floors[np.arange(len(queens)) % len(floors)]
+        ramps = [(colours.TRAIL_RAMP, snapshot.trail, self._strongest)]
         ramps += [
-            (colours.field_ramp(number), levels)
-            for number, levels in enumerate(snapshot.further_fields.values())
+            (colours.field_ramp(number), levels, self._of_fields.get(name, self._strongest))
+            for number, (name, levels) in enumerate(snapshot.further_fields.items())
         ]
-        for ramp, of_field in reversed(ramps):  # the trail covers further fields
+        for ramp, of_field, strongest in reversed(ramps):  # the trail covers further fields
             marked = np.flatnonzero((snapshot.ground == EMPTY) & (of_field >= 1))
             levels = of_field[marked].astype(np.float32)
-            share = np.minimum(levels / np.float32(self._strongest), 1)
+            share = np.minimum(levels / np.float32(strongest), 1)
             of_cells[marked] = ramp[(share * 255 + 0.5).astype(np.int32)]
         of_cells[~self.grid.exists] = colours.PAGE
         return of_cells
@@ -251,4 +276,8 @@ class Rasteriser:
             world = self.grid.count * 1.5 * _SQRT_3 * hexagon**2
             covered = len(places) * math.pi * _DOT**2 / world
             opacity = min(1.0, 0.5 * max(covered, 1e-9) ** -0.6)
-        return ants(places, snapshot.ant_headings, snapshot.ant_carries, hexagon, opacity=opacity)
+        colour: int | np.ndarray = colours.ANT
+        if len(snapshot.ant_nests):
+            colour = colours.ANTS[snapshot.ant_nests % len(colours.ANTS)]
+        look = snapshot.ant_headings, snapshot.ant_carries, hexagon
+        return ants(places, *look, opacity=opacity, colour=colour)

@@ -13,8 +13,9 @@ from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
-from taichi_ants.task import Observation, observations
+from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
+from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.states import REACHABLE_STATES, TASK_NAMES
 
 PAPER = observations.get("paper")
@@ -93,6 +94,8 @@ class Scene:
         overlay: Draw the panel and the marks; False draws the world alone.
         view: Leave space for cells in view outside the border of the world.
         strongest: The trail level, 1 or more, at and above which trails have the darkest colour.
+        task: The task of the ants, from which the legend takes cues, and fields their strongest
+            levels; it replaces `strongest`.
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
@@ -107,8 +110,12 @@ class Scene:
         overlay: bool = True,
         view: bool = False,
         strongest: int = DEPOSIT_LEVEL,
+        task: Task | None = None,
     ) -> None:
         expect("grid", grid, AxialGrid)
+        expect("task", task, Task, type(None))
+        strongest = task.pheromone.darkest if task else strongest
+        of_fields = {name: one.darkest for name, one in task.fields.items()} if task else {}
         width, height = check_size(size)
         expect("title", title, str)
         view = checked_flag("view", view)
@@ -121,7 +128,9 @@ class Scene:
         room = width  # pixels for the world, on the left
         if self._has_panel:
             room -= _PANEL_WIDTH * letters + margin
-        self._rasteriser = Rasteriser(grid, room, height, margin, view and overlay, strongest)
+        self._rasteriser = Rasteriser(
+            grid, room, height, margin, view and overlay, strongest, of_fields
+        )
         if self._has_panel:
             column = width - margin - room
             bottom = height - margin - round(_LEGEND_HEIGHT * letters)
@@ -130,7 +139,8 @@ class Scene:
             self._status_place = room, top, column, letters
             self._legend_top = bottom
             hexagon = self._rasteriser.hexagon
-            draw_legend(self._background, room, bottom, column, letters, hexagon, strongest)
+            cue = task.homing_cue if task else COMPASS
+            draw_legend(self._background, room, bottom, column, letters, hexagon, strongest, cue)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """Return the picture of a snapshot and its panel, uint8 (height, width, 3).
@@ -151,19 +161,29 @@ class Scene:
         if self._has_panel and status is not None:
             _draw_status(frame, status, *self._status_place)
         if self._has_panel:
-            self._draw_field_legend(frame, snapshot)
+            self._draw_more_legend(frame, snapshot)
         return frame
 
-    def _draw_field_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
-        """Draw an entry for each further field above the legend."""
+    def _draw_more_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
+        """Draw an entry for each further field, nest and kind of food above the legend."""
         left, _, _, size = self._status_place
-        for number, name in enumerate(snapshot.further_fields):
-            y = self._legend_top - (len(snapshot.further_fields) - number) * round(1.55 * size)
+        entries = [
+            (f"field {name}", int(colours.field_ramp(number)[-1]))
+            for number, name in enumerate(snapshot.further_fields)
+        ]
+        kinds = 0 if snapshot.world is None else int(snapshot.world.food_kinds.max(initial=0))
+        for word, number, several in (
+            ("nest", len(snapshot.queens), colours.QUEENS),
+            ("food of kind", kinds + 1, colours.FOODS),
+        ):
+            numbers = range(number if number > 1 else 0)
+            entries += [(f"{word} {n}", int(several[n % len(several)])) for n in numbers]
+        for row, (label, colour) in enumerate(entries):
+            y = self._legend_top - (len(entries) - row) * round(1.55 * size)
             centre = left + 0.85 * size, y + 0.75 * size
-            colour = int(colours.field_ramp(number)[-1])
             draw_marks(frame, marks(centre, 0.82 * size, colours.Mark.HEXAGON, colour))
             baseline = round(y + 1.11 * size)
-            text.write(frame, f"field {name}", left + round(2.1 * size), baseline, size)
+            text.write(frame, label, left + round(2.1 * size), baseline, size)
 
     def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
         """Draw the world, with outlines and letters on the cells that ant number 0 sees."""
@@ -225,7 +245,14 @@ def _draw_bars(
 
 
 def draw_legend(
-    frame: np.ndarray, left: int, top: int, width: int, size: int, hexagon: float, strongest: int
+    frame: np.ndarray,
+    left: int,
+    top: int,
+    width: int,
+    size: int,
+    hexagon: float,
+    strongest: int,
+    homing_cue: str = COMPASS,
 ) -> None:
     """Draw the legend of colours, shapes and letters, `_LEGEND_HEIGHT` text sizes high.
 
@@ -239,6 +266,8 @@ def draw_legend(
             tables.append(ants((x, y), 1, np.array([carries]), hexagon, 0.83 * radius))
         draw_marks(frame, *tables)
         baseline = round(y + 0.36 * size)
+        if letter == "S" and homing_cue != COMPASS:
+            label = "trail (S)" if homing_cue == TRAIL else f"field {homing_cue} (S)"
         text.write(frame, letter, x, baseline, size, align="middle")
         text.write(frame, label, left + round(2.1 * size), baseline, size)
     y = top + len(_LEGEND) * pitch + round(1.45 * size)

@@ -30,17 +30,26 @@ def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
     """Return a world with n ants at the start of an episode; raises as `World.start` does."""
     expect("world", world, World)
     cells, headings = world.start(seed, n)
-    nothing = np.zeros(n, dtype=bool)
-    return Snapshot(world.grid, world.ground(), world.trail_levels(), cells, headings, nothing)
+    return _start_of(world, cells, headings)
+
+
+def _start_of(world: World, cells: np.ndarray, headings: np.ndarray) -> Snapshot:
+    """Return a world with ants without food."""
+    nothing, kinds = np.zeros(len(cells), dtype=bool), np.zeros(world.grid.size, np.uint8)
+    kinds[world.grid.index(world.foods[: len(world.food_kinds)])] = world.food_kinds
+    return Snapshot(
+        *(world.grid, world.ground(), world.trail_levels(), cells, headings, nothing),
+        food_kinds=kinds,
+        queens=world.grid.index(world.queens).astype(np.int32),
+        world=world,
+    )
 
 
 def picture(world: World, size: tuple[int, int] = DEFAULT_SIZE) -> np.ndarray:
     """Return a picture of a world and its listed ants, uint8 (height, width, 3)."""
     expect("world", world, World)
     cells, headings = world.grid.index(world.ants[:, :3]), world.ants[:, 3].astype(np.int32)
-    nothing = np.zeros(len(cells), dtype=bool)
-    start = Snapshot(world.grid, world.ground(), world.trail_levels(), cells, headings, nothing)
-    return Scene(world.grid, size).draw(start)
+    return Scene(world.grid, size).draw(_start_of(world, cells, headings))
 
 
 def frames(

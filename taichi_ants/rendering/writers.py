@@ -34,6 +34,7 @@ _KEPT = (
     *(colours.CELL_QUEEN, colours.FLOOR_FOOD, colours.FLOOR_QUEEN, colours.ANT),
     *(colours.INK, colours.FAINT_INK, colours.RULE, colours.CHOSEN, colours.CELL_NEARER),
     *colours.TRAIL_RAMP[::6].tolist(),
+    *(int(one) for each in (colours.QUEENS, colours.FOODS) for one in each[1:4]),
 )
 
 

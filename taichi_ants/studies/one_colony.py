@@ -123,7 +123,6 @@ def live(
     from taichi_ants.rendering import colony_snapshots, frames, save_animation, save_picture
     from taichi_ants.rendering.writers import is_picture
 
-    strongest = colony.task.pheromone.level
     animated = render is not None and not is_picture(render)
     interval = frame_interval if animated else ticks
     least = frame_interval if animated else 1  # a span is a whole number of frames
@@ -133,11 +132,11 @@ def live(
     try:
         if render and animated:
             shown = (one for _ in chain([0], passing) for one in colony_snapshots(colony))
-            save_animation(render, frames(shown, strongest=strongest), FRAMES_PER_SECOND)
+            save_animation(render, frames(shown, task=colony.task), FRAMES_PER_SECOND)
         for _ in passing:
             pass
         if render and not animated:
-            save_picture(render, next(frames(colony_snapshots(colony), strongest=strongest)))
+            save_picture(render, next(frames(colony_snapshots(colony), task=colony.task)))
         if figure:
             who = _who(colony.ants * len(colony.seeds), colony)
             save_figure(spans(totals), who, figure)

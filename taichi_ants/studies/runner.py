@@ -171,11 +171,12 @@ class ColonyPoint:
             means training in `world`.
         sharing: "shared" or "independent" tables during training.
         start, capacity: The arguments of `Colony`.
-        episodes: The number of training episodes; with 0, ants follow `policy` or the table of
-            `after`.
+        episodes: The number of training episodes; with 0, ants follow `policy`, the table of
+            `after`, or a rule that needs no table.
         ticks: The length of each episode of training and evaluation.
         after: The point from whose shared table learning starts; None means the initial values.
-        policy: The policy that ants follow if there is no training.
+        policy: The policy that ants follow if there is no training. A task whose ants choose
+            without action values has neither.
         measures, measure_every: The arguments `measures` and `every` of `Colony.run` for the
             evaluation, without `Measure` objects.
         protocol: Events with interventions, see `taichi_ants.protocol`.
@@ -215,7 +216,14 @@ class ColonyPoint:
                 f"policy is {self.policy.name!r}, but episodes is {self.episodes}; a fixed policy "
                 "does not learn, so set episodes = 0."
             )
-        without_training = self.after or self.policy
+        rule = self.task.choice
+        if not rule.needs_table and (self.episodes or self.policy or self.after):
+            given = "a policy is given" if self.policy else f"episodes is {self.episodes}"
+            raise AntsError(
+                f"`task.choice.rule` is {rule.rule!r}, which needs no action values, but {given}; "
+                "set episodes = 0 and leave out policy."
+            )
+        without_training = self.after or self.policy or not rule.needs_table
         more = "" if without_training else "; 0 requires a policy"
         checked_whole("episodes", self.episodes, 0 if without_training else 1, otherwise=more)
         Recorder(self.measures, self.measure_every)  # raises an error if it cannot read them
@@ -223,11 +231,11 @@ class ColonyPoint:
         checked_whole("rollouts", self.rollouts)
         object.__setattr__(self, "protocol", checked_protocol(self.protocol))
         check_one_of("during", self.during, DURING)
-        grid = (self.world[0] if isinstance(self.world, tuple) else self.world).grid
+        world = self.world[0] if isinstance(self.world, tuple) else self.world
         for event in self.protocol:
             event.times(self.ticks)
             for one in event.interventions:
-                one.check_in(grid, self.task)
+                one.check_in(world, self.task)
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
             raise AntsError(
                 "`after` has no shared table; it must be a point with sharing='shared' and at "
@@ -289,9 +297,14 @@ class ColonyPoint:
         """
         from taichi_ants.engines.colony.colony import Colony
 
-        training = self.training
+        training: TrainingConfig | None = self.training
+        if not self.task.choice.needs_table:
+            training = None
+        elif not learns:
+            training = replace(
+                self.training, epsilon=self.training.least_epsilon, epsilon_decay=1.0
+            )
         if not learns:
-            training = replace(training, epsilon=training.least_epsilon, epsilon_decay=1.0)
             seeds = [seed + EVALUATION_SEEDS for seed in seeds]
         sharing = self.sharing if learns else "frozen"
         options |= {"ants": self.ants, "capacity": self.capacity, "start": self.start}
@@ -766,7 +779,8 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     worlds = list(dict.fromkeys(places))
     numbers = {one: number for several in (points, worlds) for number, one in enumerate(several)}
     rows = [_facts_of(point, lambda name, value: numbers[value]) for point in points]
-    columns = {name: [row.get(name) for row in rows] for row in rows for name in row}
+    names = dict.fromkeys(name for row in rows for name in row)
+    columns = {name: [row.get(name) for row in rows] for name in names}
     return {
         "version": __version__,
         "seeds": list(seeds),

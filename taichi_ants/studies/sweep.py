@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_ants import checks, files, learners, measures, protocol, worlds
-from taichi_ants.analysis import sweeps
+from taichi_ants.analysis import designs, sensitivity, sweeps
 from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.paper import measures as of_runs
@@ -24,8 +24,10 @@ from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_wh
 from taichi_ants.files.results import REPORT, ROWS
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import stops
-from taichi_ants.settings import all_of, declared, flat, named_groups, nested
+from taichi_ants.settings import Setting, all_of, declared, flat, named_groups, nested
+from taichi_ants.studies import design
 from taichi_ants.studies.blocks import Blocks
+from taichi_ants.studies.design import GRID, Axis, Choices, Design, Range
 from taichi_ants.studies.runner import (
     SERIES,
     VALUE,
@@ -40,13 +42,24 @@ from taichi_ants.studies.runner import (
     values_in,
 )
 from taichi_ants.task import Task
+from taichi_ants.task.field import TRAIL
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
-SERIES_FILE = "series.csv"
+SERIES_FILE, SENSITIVITY = "series.csv", "sensitivity.csv"
 _OF_SERIES = ("seed", "episode", "tick", "measure", "value")  # columns of SERIES_FILE
 _BYTES_OF_A_NUMBER = 20  # in a table
-_OF_FILE = ("kind", "seeds", "measures", "measure_every", "margin", "against", "vary")
+_OF_FILE = (
+    "kind",
+    "seeds",
+    "measures",
+    "measure_every",
+    "margin",
+    "against",
+    "vary",
+    "search",
+    *design.KEYS,
+)
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
@@ -91,7 +104,9 @@ def measure_of(kind: str, name: str) -> Measure:
         return known[name]
     registered = set(measures.names()) - {"occupancy"} if kind == "colony" else set()
     if not isinstance(name, str) or name.partition(".")[0] not in registered:
-        check_one_of("measures", name, (*known, *sorted(registered - known.keys())))
+        names = ", ".join([*known, *sorted(registered - known.keys())])
+        more = ", or the name of a measure of a plugin (--plugin FILE)" if registered else ""
+        raise AntsError(f"measures is {shown(name)}; it must be one of {names}{more}.")
     one = measures.get(name)
     words = one.summary or name.replace("_", " ")
     return Measure(f"{words} ({one.unit})" if one.unit else words)
@@ -109,6 +124,8 @@ class Sweep:
         measure_every: Ticks between two rows of `SERIES_FILE`; None without that file.
         against: The setting and its value with which all others are compared.
         margin: The largest difference in the first measure that is too small to matter.
+        design: The design of the points.
+        axes: For each [vary] table, the values or ranges of its settings.
     """
 
     kind: str
@@ -119,12 +136,14 @@ class Sweep:
     measure_every: int | None
     against: tuple[str, Any] | None
     margin: float
+    design: Design = field(default_factory=Design)
+    axes: tuple[Mapping[str, Axis], ...] = ()
 
     def facts(self) -> dict[str, Any]:
         """Return everything that determines the results."""
         own = {"measures": self.measures, "against": self.against, "margin": self.margin}
         own |= {"measure_every": self.measure_every} if self.measure_every else {}
-        return {**self.study.settings(), **own, "vary": self.settings}
+        return {**self.study.settings(), **own, **self.design.facts(), "vary": self.settings}
 
     def measured(self, blocks: Path, progress: Progress, **how: Any) -> dict[str, np.ndarray]:
         """Return each measure, float64 (points, seeds); arguments as of `Study.in_blocks`.
@@ -272,14 +291,44 @@ class Sweep:
             more = ("finding", "difference", "low", "high")
             files.write_csv(folder / FINDINGS, found.values(), [*columns, *more])
         notes = [found.get(p, {}).get("finding", "") for p in range(len(self.settings))]
-        report = sweeps.report(self.settings, values, self.against, notes)
+        if self.design.kind == GRID:
+            report = sweeps.report(self.settings, values, self.against, notes)
+        else:
+            report = designs.first_rows(self.settings, values, f"the design {self.design.kind!r}")
+        indices = self.indices(values)
+        if indices:
+            report = f"{report}\n{sensitivity.report(indices, len(self.study.seeds))}"
+            of_all = [one._asdict() for several in indices.values() for one in several]
+            files.write_csv(folder / SENSITIVITY, of_all, sensitivity.Index._fields)
         files.write_text(folder / REPORT, report)
         if draws:
-            files.check_writable_folder(folder / FIGURES)
-            words = measure_of(self.kind, first).words
-            for number, some in enumerate(self.grids, start=1):
-                path = folder / FIGURES / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
-                sweeps.draw(path, self.settings[some], values[first][some], words)
+            self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
+
+    def indices(self, values: dict[str, np.ndarray]) -> dict[str, list[sensitivity.Index]]:
+        """Return the sensitivity indices by measure, from values that `measured` returned.
+
+        Empty if the file does not want them.
+        """
+        names = list(design.varying(self.axes[0])) if self.design.sensitivity else []
+        measured = values.items() if names else ()
+        return {name: sensitivity.indices(name, names, array) for name, array in measured}
+
+    def _draw(
+        self, values: np.ndarray, indices: Sequence[sensitivity.Index], first: str, folder: Path
+    ) -> None:
+        """Draw the first measure, float64 (points, seeds), in a figure for each [vary] table."""
+        files.check_writable_folder(folder)
+        words = measure_of(self.kind, first).words
+        for number, (some, axes) in enumerate(zip(self.grids, self.axes, strict=True), start=1):
+            path = folder / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
+            if self.design.kind == GRID:
+                sweeps.draw(path, self.settings[some], values[some], words)
+            else:
+                names, logs = list(design.varying(axes)), design.logarithmic(axes)
+                designs.draw(path, self.settings[some], names, logs, values[some], words)
+        if indices:
+            path = folder / f"sensitivity_{first}.png"
+            sensitivity.draw(path, indices, words, values.shape[1])
 
 
 def read_sweep(path: Path, text: str | None = None) -> Sweep:
@@ -288,58 +337,114 @@ def read_sweep(path: Path, text: str | None = None) -> Sweep:
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
+    with contents(path, text) as file:
+        return sweep_of(file)
+
+
+@contextmanager
+def contents(path: Path, text: str | None = None) -> Iterator[Settings]:
+    """Yield the contents of a file (.toml), or of its text; errors in the context name the file.
+
+    Raises:
+        AntsError: The file cannot be read.
+    """
     text = files.read_text(path) if text is None else text
     try:
         file = files.tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise AntsError(f"{str(path)!r} is not valid TOML: {error}; correct it.") from error
     try:
-        return _sweep(file)
+        yield file
     except AntsError as error:
         raise AntsError(f"in {str(path)!r}, {error}") from error
 
 
-def _sweep(file: Settings) -> Sweep:
-    kind: Any = file.get("kind")
-    if kind is None:
-        raise AntsError(f"kind is missing; write one of {', '.join(KINDS)}.")
-    check_one_of("kind", kind, tuple(KINDS))
-    wanted = _listed(file.get("measures", []))
-    if not wanted:
-        raise AntsError(f"measures is missing; name one or more of {', '.join(MEASURES[kind])}.")
-    chosen = [measure_of(kind, name) for name in wanted]
-    _check_once("measures", wanted)
-    for name in protocol.EVENTS:
-        if isinstance(file.get(name), dict):
-            raise AntsError(f"[{name}] is one table; write [[{name}]] in double brackets.")
-    numbered = {
-        name: {str(n): event for n, event in enumerate(events, start=1)}
-        for name, events in file.items()
-        if name in protocol.EVENTS and _are_tables(events)
-    }
-    if numbered and kind != "colony":
-        raise AntsError(f"[[{next(iter(numbered))}]] is for kind 'colony'; leave it out.")
-    file = {**file, **numbered}  # so that [vary] can name the settings of an event: at.1.tick
-    reading = _reading(kind, wanted, file.get("measure_every"))
-    fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
-    grids = [_grid(grid, fixed) for grid in _listed(file.get("vary", []))]
-    if not grids:
+class Base(NamedTuple):
+    """The part of a file that does not depend on how its points are chosen.
+
+    Attributes:
+        fixed: The fixed settings by their full names.
+        reading: The arguments of points that are not settings.
+    """
+
+    kind: str
+    measures: tuple[str, ...]
+    seeds: tuple[int, ...]
+    fixed: Settings
+    reading: dict[str, Any]
+
+    @classmethod
+    def of(cls, file: Settings) -> Base:
+        """Return the part of a file; AntsError if a key or value is not allowed."""
+        kind: Any = file.get("kind")
+        if kind is None:
+            raise AntsError(f"kind is missing; write one of {', '.join(KINDS)}.")
+        check_one_of("kind", kind, tuple(KINDS))
+        wanted = _listed(file.get("measures", []))
+        if not wanted:
+            raise AntsError(
+                f"measures is missing; name one or more of {', '.join(MEASURES[kind])}."
+            )
+        for name in wanted:
+            measure_of(kind, name)
+        _check_once("measures", wanted)
+        for name in protocol.EVENTS:
+            if isinstance(file.get(name), dict):
+                raise AntsError(f"[{name}] is one table; write [[{name}]] in double brackets.")
+        numbered = {
+            name: {str(n): event for n, event in enumerate(events, start=1)}
+            for name, events in file.items()
+            if name in protocol.EVENTS and _are_tables(events)
+        }
+        if numbered and kind != "colony":
+            raise AntsError(f"[[{next(iter(numbered))}]] is for kind 'colony'; leave it out.")
+        file = {**file, **numbered}  # so that [vary] can name the settings of an event: at.1.tick
+        reading = _reading(kind, wanted, file.get("measure_every"))
+        fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
+        seeds = file.get("seeds", 10)
+        if not isinstance(seeds, list):
+            seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
+        return cls(kind, tuple(wanted), checks.checked_seeds(seeds), fixed, reading)
+
+    def point(self, row: Settings, built: dict[str, Any]) -> Point:
+        """Return the point of the fixed settings and a row of others.
+
+        Reuses the worlds in `built`, and adds new ones. Raises AntsError if a setting is not
+        allowed, or there are too few episodes for a measure.
+        """
+        point = _point(self.kind, {**self.fixed, **row}, self.seeds, built, self.reading)
+        for name in self.measures:
+            least = measure_of(self.kind, name).episodes
+            if point.episodes < least:
+                raise AntsError(
+                    f"{name} needs {least} episodes; use more or choose another measure."
+                )
+            whole, _, part = name.partition(".")
+            if whole == "entropy" and part and part not in (TRAIL, *point.task.fields):
+                allowed = ", ".join(f"{whole}.{one}" for one in (TRAIL, *point.task.fields))
+                raise AntsError(f"{name!r} is not a part of {whole}; choose one of {allowed}.")
+        return point
+
+
+def sweep_of(file: Settings) -> Sweep:
+    """Return the sweep of the contents of a file; AntsError if a setting is not allowed."""
+    base, drawn = Base.of(file), Design.of(file)
+    axes = tuple(axes_of(base.kind, table, base.fixed) for table in _listed(file.get("vary", [])))
+    _check_entries(file, {name for one in axes for name in one})
+    if not axes:
         raise AntsError("[vary] is missing; add it with lists of values of the settings that vary.")
-    seeds = file.get("seeds", 10)
-    if not isinstance(seeds, list):
-        seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
-    seeds = checks.checked_seeds(seeds)
+    if drawn.sensitivity and len(axes) > 1:
+        raise AntsError(f"sensitivity is for one [vary] table, but there are {len(axes)}.")
+    grids = [drawn.rows(one) for one in axes]
     rows, built = tuple(itertools.chain(*grids)), dict[str, Any]()
-    points = tuple(_point(kind, {**fixed, **row}, seeds, built, reading) for row in rows)
-    for name, measure in zip(wanted, chosen, strict=True):
-        least = measure.episodes
-        if any(point.episodes < least for point in points):
-            raise AntsError(f"{name} needs {least} episodes; use more or choose another measure.")
+    points = tuple(base.point(row, built) for row in rows)
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
     against = None
     if "against" in file:
+        if drawn.kind != GRID:
+            raise AntsError(f"against is for a grid, but design is {drawn.kind!r}; leave it out.")
         given = file["against"]
         pairs = list(flat(given).items()) if isinstance(given, dict) else []
         if len(pairs) != 1 or not any(pairs[0] in row.items() for row in rows):
@@ -351,9 +456,11 @@ def _sweep(file: Settings) -> Sweep:
     elif "margin" in file:
         raise AntsError("margin requires against; add against, or leave margin out.")
     ends = list(itertools.accumulate(map(len, grids), initial=0))
-    parts = tuple(map(slice, ends, ends[1:]))
-    every = reading.get("measure_every")
-    return Sweep(kind, Study(points, seeds), rows, parts, tuple(wanted), every, against, margin)
+    parts, every = tuple(map(slice, ends, ends[1:])), base.reading.get("measure_every")
+    study: Study[Any] = Study(points, base.seeds)
+    return Sweep(
+        *(base.kind, study, rows, parts, base.measures, every, against, margin, drawn, axes)
+    )
 
 
 def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
@@ -429,12 +536,22 @@ def _check_once(name: str, values: list) -> None:
             raise AntsError(f"{name} has {shown(value)} more than once; remove one of them.")
 
 
-def _grid(grid: Any, fixed: Settings) -> list[Settings]:
-    if not isinstance(grid, dict) or not grid:
+def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
+    """Return the values or ranges of the settings in a [vary] table, by their full names.
+
+    Raises:
+        AntsError: A value or a range is not allowed, or a setting is in `fixed`, too.
+    """
+    if not isinstance(table, dict) or not table:
         raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
-    values = {name: _listed(value) for name, value in flat(grid).items()}
-    for name, several in values.items():
-        if not several:
+    given: dict[str, Any] = {}
+    for name, values in design.axes_of(table):
+        if name in given:
+            raise AntsError(f"{name} is in [vary] twice; remove one of them.")
+        given[name] = values
+    axes: dict[str, Axis] = {}
+    for name, values in given.items():
+        if not values:
             raise AntsError(f"{name} is an empty list; give at least one value.")
         for one in fixed:  # a group and one of its settings exclude each other, too
             if f"{one}.".startswith(f"{name}.") or f"{name}.".startswith(f"{one}."):
@@ -443,13 +560,53 @@ def _grid(grid: Any, fixed: Settings) -> list[Settings]:
                 )
         if name in _OF_FILE:
             raise AntsError(f"{name} cannot vary; move it from [vary] to the top of the file.")
-        if name == "world.ranges" and not all(isinstance(one, list) for one in several):
-            raise AntsError(
-                f"{name} in [vary] is {shown(several)}, but must be a list of ranges; write "
-                f"{shown([several])}."
-            )
-        _check_once(name, several)
-    return [dict(zip(values, row, strict=True)) for row in itertools.product(*values.values())]
+        declaration = _declaration(kind, name, fixed)
+        if isinstance(values, dict):
+            whole = declaration.kind is int if declaration else name in _whole_numbers(kind)
+            axes[name] = axis = Range.of(name, values, whole)
+            values = [axis.low, axis.high]
+        else:
+            if name == "world.ranges" and not all(isinstance(one, list) for one in values):
+                raise AntsError(
+                    f"{name} in [vary] is {shown(values)}, but must be a list of ranges; write "
+                    f"{shown([values])}."
+                )
+            _check_once(name, values)
+            axes[name] = Choices(tuple(values))
+        if declaration:
+            for one in values:
+                declaration.checked(one)
+    return axes
+
+
+def _declaration(kind: str, name: str, fixed: Settings) -> Setting | None:
+    """Return the declaration of a setting; None if it is not in the task, training or world."""
+    preset = fixed.get("world.preset", "paper")
+    of_world = worlds.settings_of(preset) if preset in worlds.names() else ()
+    known = (*all_of(Task), *declared(TrainingConfig), *of_world)
+    return next((one for one in known if one.path == name), None)
+
+
+def _whole_numbers(kind: str) -> set[str]:
+    """Return the settings of points that are whole numbers."""
+    return {one.name for one in fields(KINDS[kind]) if str(one.type) in ("int", "int | None")}
+
+
+def _check_entries(file: Settings, varied: Iterable[str]) -> None:
+    """Raise AntsError if [vary] names a field or a kind of food for which the file has no table."""
+    for group in named_groups(Task):
+        one: Any = file
+        for key in group.path.split("."):
+            one = one.get(key, {}) if isinstance(one, dict) else {}
+        listed = list(one) if isinstance(one, dict) else []
+        for name in sorted(varied):
+            entry = name.removeprefix(f"{group.path}.").partition(".")[0]
+            if name.startswith(f"{group.path}.") and entry not in listed:
+                path, near = f"{group.path}.{entry}", difflib.get_close_matches(entry, listed, 3)
+                choose = f"choose {', '.join(near or listed)}, or " if listed else ""
+                raise AntsError(
+                    f"`{path}` is in [vary], but the file has no table [{path}]; {choose}add it."
+                )
 
 
 def _point(
@@ -482,6 +639,7 @@ def _point(
     rules = Task.from_dict(task)
     if kind == "colony" and "policy" in tree:
         tree["policy"] = FixedPolicy.named(tree["policy"], rules)
+    if kind == "colony" and ("policy" in tree or not rules.choice.needs_table):
         training = {**_WITHOUT_LEARNING, **training}
     for name in _OF_LEARNERS[:5]:  # the others have defaults
         if name not in training:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, get_args
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
 
+from taichi_ants.rules.registry import BUILT_IN, Rule, own, words
 from taichi_ants.settings import Is, Settings, Share
 
 if TYPE_CHECKING:
     import numpy as np
 
-ChoiceRule = Literal["greedy", "softmax", "deneubourg"]
-CHOICE_RULES: tuple[str, ...] = get_args(ChoiceRule)
+CHOICE_RULES = BUILT_IN["choice"]
 
 
 @dataclass(frozen=True)
@@ -23,12 +24,16 @@ class Choice(Settings, path="task.choice"):
     - "softmax" takes action a with a probability proportional to exp(Q(s, a) / temperature).
     - "deneubourg" needs no action values. The ant gives at the queen, picks up food in view, and
       otherwise enters an open cell ahead with a probability proportional to (k + level)^exponent,
-      after Deneubourg et al. (1990). See `docs/colony.md`. Only colonies support it.
+      after Deneubourg et al. (1990). See `docs/colony.md`. Only colonies support it. Levels are
+      those of the outbound cue or, for ants with food, of the pheromone `carriers_follow`.
+    - Other names are those of your rules, see `taichi_ants.rules`. Only colonies support them.
 
     With "greedy" and "softmax", ants also explore: with probability epsilon, any action is taken.
     """
 
-    rule: Annotated[ChoiceRule, Is("rule by which ants choose actions")] = "greedy"
+    rule: Annotated[
+        str, Is("rule by which ants choose actions", choices=partial(words, "choice"))
+    ] = "greedy"
     temperature: Annotated[
         float | None,
         Is("difference of action values that makes an action e times as likely"),
@@ -44,15 +49,27 @@ class Choice(Settings, path="task.choice"):
         Is("exponent of the attraction of a cell; larger values follow stronger trails more"),
         Is(least=0, most=20, usual=2.0, only=("rule", "deneubourg")),
     ] = None
+    carriers_follow: Annotated[
+        str | None,
+        Is("pheromone whose levels ants with food compare; none: the outbound cue"),
+        Is(only=("rule", "deneubourg")),
+    ] = None
 
     @classmethod
     def named(cls) -> Mapping[str, Choice]:
-        """Return the named values: "greedy", "softmax" and "deneubourg"."""
-        return {rule: cls(rule) for rule in CHOICE_RULES}  # type: ignore[arg-type]
+        """Return the named values: "greedy", "softmax", "deneubourg", and your rules."""
+        return {rule: cls(rule) for rule in words("choice")}
+
+    @property
+    def own_rule(self) -> Rule | None:
+        """Your rule, if it is one."""
+        return own("choice", self.rule)
 
     @property
     def needs_table(self) -> bool:
         """Whether ants choose by action values."""
+        if self.own_rule is not None:
+            return "values" in self.own_rule.inputs
         return self.rule != "deneubourg"
 
     def numbers(self) -> np.ndarray:

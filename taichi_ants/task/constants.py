@@ -18,6 +18,7 @@ QUEEN = SEES_OBSTACLE | SEES_GOAL << 2
 # The number of a nest is in three bits of an ant's mark, of which 0 means no ant.
 MAX_NESTS = 7
 MAX_FOOD_KINDS = 8
+MAX_CASTES = 16
 
 # Actions. The first three are moves, relative to the heading.
 LEFT, FORWARD, RIGHT, PICK_UP, GIVE = 0, 1, 2, 3, 4

@@ -64,7 +64,9 @@ class Field(Pheromone, path="task.fields.NAME"):
     def counts_without_food(self) -> bool:
         """Whether deposits depend on the time for which an ant has been without food."""
         without = ~_WITH_FOOD & OCCASIONS[self.laid]
-        return self.deposit == "fading" and bool(without)
+        rule = self.own_deposit
+        reads = self.deposit == "fading" if rule is None else "carried" in rule.inputs
+        return reads and bool(without)
 
     @property
     def numbers(self) -> dict[str, int | float]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Literal, TypeVar, get_args
 
+from taichi_ants.rules.registry import BUILT_IN, Rule, own, words
 from taichi_ants.settings import Is, Settings
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 
@@ -12,11 +14,8 @@ if TYPE_CHECKING:
     import numpy as np
 
 Own = TypeVar("Own", bound="Pheromone")
-Evaporation = Literal["linear", "exponential", "none"]
-Deposit = Literal["set", "add", "fading", "none"]
 View = Literal["half", "strongest", "strongest_under_carriers"]
-EVAPORATIONS: tuple[str, ...] = get_args(Evaporation)
-DEPOSITS: tuple[str, ...] = get_args(Deposit)
+EVAPORATIONS, DEPOSITS = BUILT_IN["evaporation"], BUILT_IN["deposit"]
 VIEWS: tuple[str, ...] = get_args(View)
 MAX_DEPOSIT = 1_000_000
 LINEAR = -1.0  # marks linear evaporation in place of a decay factor
@@ -35,13 +34,16 @@ class Pheromone(Settings, path="task.pheromone"):
     - By `deposit`, an ant with food changes the trail of its cell. "set" sets it to `level`. "add"
       adds `level`, up to `cap`. "fading" raises it to `level` minus `slope` for each tick for which
       the ant has carried food; such trails rise towards food if `slope` exceeds the evaporation.
+    - Other names of `evaporation` and `deposit` are those of your rules, see `taichi_ants.rules`.
     - By `view`, an ant without food sees trails of at least 1 on empty cells as T. "half" requires
       at least half the level of the strongest in view, "strongest" the same level.
       "strongest_under_carriers" also compares with trails under ants with food.
     """
 
     evaporation: Annotated[
-        Evaporation, Is("decrease of trails per tick: by 1 (linear) or by a factor (exponential)")
+        str,
+        Is("decrease of trails per tick: by 1 (linear) or by a factor (exponential)"),
+        Is(choices=partial(words, "evaporation")),
     ] = "linear"
     half_life: Annotated[
         float | None,
@@ -52,11 +54,12 @@ class Pheromone(Settings, path="task.pheromone"):
         float, Is("share of a trail that spreads to the six neighbours per tick", least=0, most=1)
     ] = 0.0
     deposit: Annotated[
-        Deposit,
+        str,
         Is(
             "level that an ant lays on a cell: the cell's level becomes level (set), grows by "
             "level (add), or rises to level minus slope per tick since the ant's load changed "
-            "(fading)"
+            "(fading)",
+            choices=partial(words, "deposit"),
         ),
     ] = "set"
     level: Annotated[
@@ -84,7 +87,22 @@ class Pheromone(Settings, path="task.pheromone"):
     @property
     def dense(self) -> bool:
         """Whether levels are float32 that change in every cell each tick, rather than integers."""
-        return self.evaporation == "exponential" or self.diffusion > 0
+        return self.evaporation not in ("linear", "none") or self.diffusion > 0
+
+    @property
+    def own_deposit(self) -> Rule | None:
+        """Your rule of deposits, if it is one."""
+        return own("deposit", self.deposit)
+
+    @property
+    def own_evaporation(self) -> Rule | None:
+        """Your rule of evaporation, if it is one."""
+        return own("evaporation", self.evaporation)
+
+    @property
+    def darkest(self) -> int:
+        """The level that pictures show in the darkest colour: a deposit, or ten if they add up."""
+        return min(self.cap or 0, 10 * self.level) if self.deposit == "add" else self.level
 
     @property
     def fades_after(self) -> int:
@@ -108,7 +126,7 @@ class Pheromone(Settings, path="task.pheromone"):
         """The settings as numbers for kernels, by name."""
         level = float if self.dense else int
         return {
-            "deposits": DEPOSITS.index(self.deposit),
+            "deposits": (*DEPOSITS, self.deposit).index(self.deposit),  # the last is your rule
             "deposit_level": level(self.level),
             "cap": level(self.cap or 0),
             "slope": level(self.slope or 0),

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.rules.registry import Parameters, Rule, own, words
 from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
+from taichi_ants.task.caste import Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
-from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_STEPS
+from taichi_ants.task.constants import MAX_CASTES, MAX_FOOD_KINDS, MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.food import Food
+from taichi_ants.task.labour import Labour
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
@@ -144,12 +149,28 @@ class Task(Settings, path="task"):
     foods: Annotated[
         Named[Food], Is("kinds of food, in the order of their numbers in worlds; colonies only")
     ] = field(default_factory=Named)
+    castes: Annotated[
+        Named[Caste], Is("castes of ants, in the order of their numbers; colonies only")
+    ] = field(default_factory=Named)
+    labour: Annotated[Labour, Is("rule by which ants start and stop foraging")] = field(
+        default_factory=Labour
+    )
+    reward: Annotated[
+        str,
+        Is("rule of rewards: by_event (task.rewards), or the name of your rule; colonies only"),
+        Is(choices=partial(words, "reward")),
+    ] = "by_event"
+    rules: Annotated[Named[Parameters], Is("parameters of the rules that you wrote, by name")] = (
+        field(default_factory=Named)
+    )
 
     def __post_init__(self) -> None:
         self.check()
         self._check_choice()
         self._check_fields()
         self._check_foods()
+        self._check_castes()
+        self._check_rules()
 
     def _check_foods(self) -> None:
         if len(self.foods) > MAX_FOOD_KINDS:
@@ -168,6 +189,53 @@ class Task(Settings, path="task"):
             )
 
     @property
+    def own_reward(self) -> Rule | None:
+        """Your rule of rewards, if the task has one."""
+        return own("reward", self.reward)
+
+    @property
+    def own_rules(self) -> tuple[Rule, ...]:
+        """Your rules that the task uses, each once."""
+        pheromones = (self.pheromone, *self.fields.values())
+        of_fields = [rule for one in pheromones for rule in (one.own_deposit, one.own_evaporation)]
+        every = (self.choice.own_rule, self.own_reward, *of_fields)
+        return tuple(dict.fromkeys(rule for rule in every if rule is not None))
+
+    def _check_rules(self) -> None:
+        rules = {rule.name: rule for rule in self.own_rules}
+        for name in self.rules.keys() - rules.keys():
+            raise AntsError(
+                f"`task.rules` has parameters of {name!r}, a rule that the task does not use; "
+                "leave them out, or name the rule, for example in `task.choice.rule`."
+            )
+        used = {name: self.rules.get(name) or rule.settings() for name, rule in rules.items()}
+        object.__setattr__(self, "rules", Named(used))
+        for name, rule in rules.items():
+            for read in rule.fields:
+                if read not in (TRAIL, *self.fields):
+                    raise AntsError(
+                        f"the rule {name!r} reads the field {read!r}; add `task.fields.{read}`."
+                    )
+        if self.choice.own_rule and self.noise.misread and self.observation != "paper":
+            raise AntsError(
+                f"`task.noise.misread` is {self.noise.misread}; with your rule of choice "
+                f"{self.choice.rule!r}, it requires the observation 'paper'."
+            )
+
+    def _changed(self, changes: Mapping[str, Any]) -> Task:
+        # Rules that are no longer used lose their parameters.
+        if not self.rules and "rules" not in changes:
+            return super()._changed(changes)
+        bare = copy.copy(self)
+        object.__setattr__(bare, "rules", Named())
+        others = {name: value for name, value in changes.items() if name != "rules"}
+        task = super(Task, bare)._changed(others)
+        kept = {name: self.rules.get(name, usual) for name, usual in task.rules.items()}
+        return super(Task, replace(task, rules=Named(kept)))._changed(
+            {"rules": changes["rules"]} if "rules" in changes else {}
+        )
+
+    @property
     def has_loads(self) -> bool:
         """Whether a cell can have more than one load of food."""
         return any(food.loads > 1 for food in self.foods.values())
@@ -178,16 +246,98 @@ class Task(Settings, path="task"):
         grows = any(food.regrowth is not None for food in self.foods.values())
         return self.life.regrowth is not None or self.life.wander is not None or grows
 
+    def _check_castes(self) -> None:
+        if len(self.castes) > MAX_CASTES:
+            raise AntsError(
+                f"`task.castes` has {len(self.castes)} castes; at most {MAX_CASTES} are allowed."
+            )
+        for name, caste in self.castes.items():
+            self._check_caste(f"`task.castes.{name}", caste)
+        nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
+        for nest in (nests or {0}) if self.castes else ():
+            shares_in(self.castes, nest)
+        has_threshold = any(caste.threshold.exists for caste in self.castes.values())
+        if self.labour.divides and not has_threshold:
+            raise AntsError(
+                f"`task.labour.rule` is {self.labour.rule!r}, but ants have no thresholds; add a "
+                "caste with a `threshold` to `task.castes`."
+            )
+
+    def _check_caste(self, path: str, caste: Caste) -> None:
+        """Raise an AntsError that names `path` if a caste does not fit the other settings."""
+        if caste.threshold.exists and not self.labour.divides:
+            raise AntsError(
+                f"{path}.threshold` is {caste.threshold.distribution!r}; leave it out unless "
+                "`task.labour.rule` is 'thresholds'."
+            )
+        rules = {
+            "greedy": ("policy", "epsilon", "learning_rate", "discount"),
+            "softmax": ("policy", "epsilon", "learning_rate", "discount", "temperature"),
+            "deneubourg": ("k", "exponent"),
+        }
+        for name in {one for several in rules.values() for one in several}:
+            value = getattr(caste, name)
+            if value is not None and name not in rules[self.choice.rule]:
+                raise AntsError(
+                    f"{path}.{name}` is {shown(value)}; leave it out, because `task.choice.rule` "
+                    f"is {self.choice.rule!r}."
+                )
+        pheromones = (TRAIL, *self.fields)
+        for name in caste.laid(pheromones):
+            if name not in pheromones:
+                raise AntsError(
+                    f"{path}.lays` is {shown(caste.lays)}; it must be all, none, or names of "
+                    f"{', '.join(pheromones)}, separated by commas."
+                )
+        for setting, cues in self._cues().items():
+            cue = getattr(caste, setting)
+            if cue is not None and cue not in cues:
+                raise AntsError(
+                    f"{path}.{setting}` is {shown(cue)}; it must be one of {', '.join(cues)}, or "
+                    "the name of a field that you add to `task.fields`."
+                )
+
+    def cues_of(self, caste: Caste | None) -> tuple[int, int]:
+        """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
+        names = [
+            getattr(caste, setting, None) or getattr(self, setting) for setting in self._cues()
+        ]
+        return self.number_of(names[0]), self.number_of(names[1])
+
+    def with_policies(self, policy: str) -> Task:
+        """Return the task with another policy for the castes that have one."""
+        follow = [name for name, caste in self.castes.items() if caste.policy is not None]
+        return self.but(castes={name: {"policy": policy} for name in follow})
+
+    @property
+    def all_cues(self) -> tuple[tuple[int, int], ...]:
+        """The numbers of the outbound and homing cues of all castes, without repetitions."""
+        if not self.castes:
+            return (self.cues_of(None),)
+        return tuple(sorted({self.cues_of(caste) for caste in self.castes.values()}))
+
     @classmethod
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "foraging" and "queueing"."""
         return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
 
     def _check_choice(self) -> None:
-        if not self.choice.needs_table and self.observation != "paper":
+        if self.choice.rule == "deneubourg" and self.observation != "paper":
             raise AntsError(
                 f"`task.observation` is {self.observation!r}; it must be 'paper' if "
                 f"`task.choice.rule` is {self.choice.rule!r}, which chooses without states."
+            )
+        followed, pheromones = self.choice.carriers_follow, (TRAIL, *self.fields)
+        if followed is not None and followed not in pheromones:
+            raise AntsError(
+                f"`task.choice.carriers_follow` is {shown(followed)}; it must be one of "
+                f"{', '.join(pheromones)}, or the name of a field that you add to `task.fields`."
+            )
+        if followed is not None and self.homing_cue != COMPASS:
+            raise AntsError(
+                f"`task.choice.carriers_follow` is {shown(followed)}, but `task.homing_cue` is "
+                f"{shown(self.homing_cue)}, which ants with food follow already; leave one of them "
+                "out."
             )
 
     def _check_fields(self) -> None:
@@ -198,10 +348,7 @@ class Task(Settings, path="task"):
                     "name."
                 )
         pheromones = (TRAIL, *self.fields)
-        for setting, cues in (
-            ("outbound_cue", pheromones),
-            ("homing_cue", (COMPASS, *pheromones)),
-        ):
+        for setting, cues in self._cues().items():
             cue = getattr(self, setting)
             if cue not in cues:
                 raise AntsError(
@@ -214,6 +361,11 @@ class Task(Settings, path="task"):
                     f"`task.observation` is {self.observation!r}, which reads the field {name!r}; "
                     f"add `task.fields.{name}`."
                 )
+
+    def _cues(self) -> dict[str, tuple[str, ...]]:
+        """Return the names of the cues that each setting allows."""
+        pheromones = (TRAIL, *self.fields)
+        return {"outbound_cue": pheromones, "homing_cue": (COMPASS, *pheromones)}
 
     def __repr__(self) -> str:
         """Return the settings that differ from the paper's."""

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.checks import check_one_nest, check_progress
+from taichi_ants.checks import check_one_nest, check_progress, check_rewards, refuse_castes
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, count, expect
@@ -90,6 +90,8 @@ class Recorder:
         expect("colony", colony, Colony)
         expect("title", title, str)
         check_one_nest(colony, "the viewer")
+        refuse_castes(colony.task, "the viewer")
+        check_rewards(colony.task, "the viewer")
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         start = colony.snapshot(world)
         self.grid = start.grid
@@ -121,7 +123,7 @@ class Recorder:
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
-            "strongest": int(task.pheromone.level),
+            "strongest": task.pheromone.darkest,
             "n_states": self._n_states,
             "names": self.names(),
             "view": list(task.sees.cells),

@@ -184,6 +184,25 @@ def test_figures_are_drawn(series, trained, tmp_path):
     assert [len(axes.lines) for axes in trained.plot().axes] == [2, 2]
 
 
+def test_names_of_measures_are_those_of_run(series, tmp_path):
+    """A measure with parts stands for all of them in figures, and for its only one elsewhere."""
+    whole, part = series.plot("entropy"), series.plot("entropy.trail")
+    assert [axes.get_ylabel() for axes in whole.axes] == [axes.get_ylabel() for axes in part.axes]
+    assert "too few for these: use 10" in " ".join(text.get_text() for text in whole.texts)
+    found = compare(series, run(ants=3, measures=ASKED), "entropy")
+    assert (
+        found.differences
+        == compare(series, run(ants=3, measures=ASKED), "entropy.trail").differences
+    )
+
+
+def test_results_without_numbers_are_refused():
+    arrays = run(measures=["occupancy"])
+    for attempt in (arrays.summary, arrays.plot, lambda: arrays.plot("occupancy")):
+        with pytest.raises(AntsError, match=r"numbers?; run the colony with"):
+            attempt()
+
+
 @pytest.mark.parametrize(
     ("attempt", "message"),
     [

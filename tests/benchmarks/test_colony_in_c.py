@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from shutil import which
+
 import colony_in_c
 import numpy as np
 import pytest
@@ -14,7 +16,10 @@ pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compil
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
-    return colony_in_c.load(compiler(), tmp_path_factory.mktemp("c"))
+    try:
+        return colony_in_c.load(compiler(), tmp_path_factory.mktemp("c"), 2)
+    except AntsError:  # without OpenMP
+        return colony_in_c.load(compiler(), tmp_path_factory.mktemp("c"), 1)
 
 
 @pytest.mark.parametrize("rules", colony_in_c.TASKS)
@@ -58,6 +63,25 @@ def test_the_command_and_its_guard(library, capsys, monkeypatch):
     code, said = run(few, capsys)
     assert code != 0
     assert "returns other results" in said.err
+
+
+@pytest.mark.parametrize("command", [one for name in ("gcc", "clang") if (one := which(name))])
+def test_each_compiler_gives_the_same(command, tmp_path):
+    library = colony_in_c.load(command, tmp_path, 1)
+    for task in colony_in_c.TASKS.values():
+        colony_in_c.check_same(library, colony_in_c.scattered(task, 200), 300, 1)
+
+
+@pytest.mark.parametrize(
+    ("threads", "advice"), [(1, "; set CC to"), (2, "; install its OpenMP, use `--threads 1`, or")]
+)
+def test_a_compiler_that_fails_is_named(threads, advice, tmp_path):
+    broken = tmp_path / "broken"
+    broken.write_text("#!/bin/sh\necho here >&2\necho 'error: no omp.h' >&2\nexit 1\n")
+    broken.chmod(0o755)
+    with pytest.raises(AntsError) as error:
+        colony_in_c.load(str(broken), tmp_path, threads)
+    assert f"{broken} cannot compile colony.c: error: no omp.h{advice}" in str(error.value)
 
 
 def test_without_a_compiler(capsys, monkeypatch):

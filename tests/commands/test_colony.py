@@ -322,6 +322,10 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
             ["live", "--sharing", "frozen"],
             "--sharing frozen requires a policy; add --policy FILE",
         ),
+        (
+            ["live", "--task.choice.rule", "deneubourg", "--training.discount", 0.5],
+            "--task.choice.rule is deneubourg, by which ants choose without learning",
+        ),
         (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
         (
             ["live", "--policy", "x", "--task.observation", "paper"],
@@ -348,6 +352,15 @@ def test_mistakes_end_in_one_sentence(arguments, expected, capsys, tmp_path, mon
     assert_one_sentence(err)
     assert expected in err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ants_that_choose_without_a_table_need_no_policy(capsys, tmp_path):
+    rule = ["--task.choice.rule", "deneubourg", "--ants", 9]
+    file = tmp_path / "c.npz"
+    status, _, err = call("colony", ["live", *rule, "--ticks", 7, "--save", file], capsys)
+    assert (status, err) == (0, "")
+    colony = Colony.load(file)
+    assert (colony.ticks, colony.learns, colony.task.choice.rule) == (7, False, "deneubourg")
 
 
 def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch):

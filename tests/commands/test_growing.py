@@ -58,10 +58,19 @@ epsilon_decay = 0.9
 [vary]
 task.rewards.shaping = [1, 0]
 """
-SWEEPS = {"runs": RUNS, "colony": COLONY}
+DRAWN = (
+    RUNS.split("[vary]")[0].replace("kind =", 'design = "sobol"\nsamples = 8\nkind =')
+    + """
+[vary]
+training.learning_rate = {from = 0.01, to = 0.2, scale = "log"}
+task.rewards.shaping = [1, 0]
+"""
+)
+SWEEPS = {"runs": RUNS, "colony": COLONY, "drawn": DRAWN}
 FEWER = {
     "runs": RUNS.replace("[7, 2, 5, 1]", "[5, 7]").replace("[0.01, 0.1, 0.2]", "[0.2, 0.01]"),
     "colony": COLONY.replace("seeds = 4", "seeds = 2").replace("[1, 0]", "[0]"),
+    "drawn": DRAWN.replace("samples = 8", "samples = 4"),
 }
 # What depends on when, where and how a command ran.
 OF_THE_RUN = ("command", "finished", "seconds", "checksum")
@@ -95,7 +104,7 @@ def assert_same(one, other):
 def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypatch):
     assert sweep(SWEEPS[kind], "plain")[0] == 0
     assert sweep(FEWER[kind], "grown")[0] == 0
-    owner = {"runs": runner.RunPoint, "colony": runner.ColonyPoint}[kind]
+    owner = runner.ColonyPoint if kind == "colony" else runner.RunPoint
     done, real = [], owner.do
 
     def do(points, seeds, *more):
@@ -104,7 +113,7 @@ def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypa
 
     monkeypatch.setattr(owner, "do", staticmethod(do))
     assert sweep(SWEEPS[kind], "grown")[::2] == (0, "")
-    assert len(done) == len(set(done)) == {"runs": 24 - 8, "colony": 8 - 2}[kind]
+    assert len(done) == len(set(done)) == {"runs": 24 - 8, "colony": 8 - 2, "drawn": 32 - 16}[kind]
     assert_same("plain", "grown")
 
 

@@ -385,6 +385,7 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
     of_guides = (
         "measures.png",
         "home_trail.png",
+        "division_of_labour.png",
     )  # examples of docs/measures.md and docs/models.md
     drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *of_benchmarks, *of_guides)
     figures = {f"docs/figures/{name}" for name in drawn}

@@ -30,6 +30,7 @@ policy = "trail_follower"
 [vary]
 task.pheromone.level = [20, 250]
 """
+BY_TRAIL = FILE.replace('policy = "trail_follower"', 'task.choice.rule = "deneubourg"')
 FROZEN = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
 
@@ -57,6 +58,44 @@ def run(level=250, table=None, **asked):
     rules = {"sharing": "frozen", "q_values": table}
     task = Task(pheromone=Pheromone(level=level))
     return Colony(worlds.paper(), task, FROZEN, seeds, 6, **rules).run(2, 60, **asked)
+
+
+def test_ants_that_choose_without_a_table_need_no_policy(sweep):
+    status, _, err = sweep(BY_TRAIL, "--no-figures")
+    assert (status, err) == (0, "")
+    seeds = [EVALUATION_SEEDS + seed for seed in range(3)]
+    for level in (20, 250):
+        rules = Task(pheromone=Pheromone(level=level), choice="deneubourg")
+        colony = Colony(worlds.paper(), rules, None, seeds, 6, sharing="frozen")
+        known = [s.mean() for s in colony.run(2, 60).deliveries.T * (1000 / 60)]
+        rows = [row for row in read_csv("runs.csv") if row["task.pheromone.level"] == str(level)]
+        assert [float(row["deliveries"]) for row in rows] == pytest.approx(known)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (BY_TRAIL.replace("episodes = 0", ""), "but episodes is 50; set episodes = 0 and leave"),
+        (
+            FILE.replace('"entropy"', '"entrop"'),
+            "or the name of a measure of a plugin (--plugin FI",
+        ),
+        (
+            FILE.replace('"entropy"', '"entropy.hom"'),
+            "'entropy.hom' is not a part of entropy; choose one of",
+        ),
+        (
+            FILE.replace("[vary]", "[task.fields.home]\n[vary]\ntask.fields.hom.level = [1, 2]"),
+            "`task.fields.hom` is in [vary], but the file has no table [task.fields.hom]; choose h",
+        ),
+    ],
+)
+def test_mistakes_in_models_end_in_one_sentence(text, expected, sweep):
+    status, out, err = sweep(text)
+    assert (status, out) == (2, "")
+    assert "in 'my.toml', " in err
+    assert expected in err
+    assert_one_sentence(err)
 
 
 def test_the_series_is_that_of_the_library(sweep):

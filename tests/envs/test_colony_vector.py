@@ -332,3 +332,16 @@ def test_memory_does_not_grow_with_environments_that_are_closed():
 
     first = loop(60)
     assert loop(200) - first < 4000  # kibibytes
+
+
+def test_worlds_with_several_nests_and_kinds_of_food():
+    """Both kinds of food are picked up and delivered, with their own rewards."""
+    kinds = {"seed": {"deliver": 7}, "nectar": {"pick_up": 5, "deliver": 9}}
+    world = worlds.World(
+        (8, 8, 8), queen=[(0, 7, 7), (7, 0, 0)], foods=[((3, 0, 0), 0), ((0, 3, 0), 1)]
+    )
+    env = ants_of(1, task=GOES_ON.but(foods=kinds), world=world, max_steps=3000, start="spread")
+    env.reset(seed=1)
+    made = env.rollout("trail_follower", 3000, epsilon=0.1)
+    paid = made.rewards[made.events == Event.PICKED_UP], made.rewards[made.events == 5]
+    assert [sorted(one) for one in paid] == [[3, 5], [7, 9]]

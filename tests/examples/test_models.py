@@ -7,6 +7,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_lines import ROOT, run
 
@@ -35,19 +36,20 @@ def test_home_trail(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_colonies_on_a_double_bridge_choose_one_branch_and_keep_it(
+def test_colonies_on_a_double_bridge_choose_the_short_branch_and_keep_a_long_one(
     kernels: Path, tmp_path: Path
 ) -> None:
     done = run("models/double_bridge", ["--seeds", 16, "--out", tmp_path], kernels, tmp_path)
     assert done.returncode == 0, done.stderr
-    lasting, evaporating = (
-        [line.split() for line in done.stdout.splitlines() if line.startswith(start)]
-        for start in ("no evaporation", "half-life 300")
-    )
-    for equal, _, late in (lasting, evaporating):
-        assert int(equal[-1]) >= 50  # of colonies, on one of two equal branches
-        assert int(late[-5]) == 0  # of colonies, on a short branch that opens late
-    assert len(files.read_csv(tmp_path / "double_bridge.csv")) == 6 * 16
+    shares: dict[tuple[str, str], list[float]] = {}
+    for row in files.read_csv(tmp_path / "double_bridge.csv"):
+        shares.setdefault((row["marks"], row["bridge"]), []).append(row["short_share"])
+    assert [len(several) for several in shares.values()] == [16] * 6
+    for marks in ("both ways", "on the return"):
+        equal, late = (np.array(shares[marks, bridge]) for bridge in ("equal", "short late"))
+        assert (abs(equal - 0.5) >= 0.3).mean() >= 0.75  # of colonies, on one of two branches
+        assert (late > 0.5).mean() <= 0.2
+    assert (np.array(shares["both ways", "short at once"]) > 0.5).mean() >= 0.65
     assert (tmp_path / "double_bridge.png").stat().st_size > 10_000
 
 
@@ -62,3 +64,14 @@ def test_ants_that_misread_cells(kernels: Path, tmp_path: Path) -> None:
     mean = {rate: sum(r["with trails"] for r in rows if r["misread"] == rate) for rate in (0, 0.4)}
     assert mean[0] > 4 * mean[0.4]
     assert (tmp_path / "misreading.png").stat().st_size > 10_000
+
+
+def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
+    done = run("models/no_entry", ["--seeds", 2, "--out", tmp_path], kernels, tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = files.read_csv(tmp_path / "no_entry.csv")
+    assert len(rows) == 2 * 2 * 30
+    last = [row["delivered"] for row in rows if row["tick"] == 3000]
+    assert min(last) > 0
+    assert len(set(last)) > 1
+    assert (tmp_path / "no_entry.png").stat().st_size > 10_000

@@ -12,7 +12,7 @@ from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.commands import watch
 from taichi_ants.live.choices import TASKS, Choices, fields
 from taichi_ants.settings import Named, all_of
-from taichi_ants.task import Task
+from taichi_ants.task import Labour, Task
 from taichi_ants.worlds import double_bridge
 
 
@@ -31,6 +31,7 @@ def test_the_form_has_every_setting_with_its_bounds():
         "training.learner",
         "task.outbound_cue",
         "task.homing_cue",
+        *(one.path for one in all_of(Labour)),  # without castes, ants have no thresholds
     }
     assert paths < offered.keys()
     half_life = offered["task.pheromone.half_life"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -112,6 +114,7 @@ def test_wrong_requests_are_refused(asked, message):
     [
         (lambda s: "much", "returned 'much'; it must return a number"),
         (lambda s: {"a": "much"}, "returned 'much'"),
+        (lambda s: -math.inf, "returned -inf; it must return a finite number, or nan"),
         (lambda s: s.nothing, "failed with AttributeError"),
         (lambda s: np.zeros(s.counts["ticks"] + 1), "arrays of different shapes"),
     ],

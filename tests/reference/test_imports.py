@@ -16,6 +16,10 @@ ALLOWED = {
     "taichi_ants.task.constants",
     "taichi_ants.task.events",
     "taichi_ants.errors",
+    # Your own rules, and the form of their inputs.
+    "taichi_ants.rules",
+    "taichi_ants.rules.functions",
+    "taichi_ants.rules.inputs",
     "taichi_ants.learners.config",
     "taichi_ants.worlds.world",
     # Records of settings, and the hand-written policies as tables.
@@ -35,7 +39,10 @@ OUTSIDE = {
     "struct",
     "typing",
 }
-RULES = {"Choice", "Field", "Food", "Life", "Pheromone", "Rewards", "Task", "Traffic"}
+RULES = {
+    *("Caste", "Choice", "Field", "Food", "Labour", "Life"),
+    *("Pheromone", "Rewards", "Task", "Threshold", "Traffic"),
+}
 
 
 FILES = sorted(FOLDER.rglob("*.py"))

@@ -95,6 +95,16 @@ def test_things_stay_apart(deficiency) -> None:
         assert apart > least[name], (name, apart)
 
 
+@pytest.mark.parametrize("several", [colours.QUEENS, colours.ANTS, colours.FOODS])
+def test_nests_and_kinds_of_food_stay_apart(several) -> None:
+    """Two at least for people with colour deficiencies, and all for others."""
+    for one, other in itertools.combinations(several.tolist(), 2):
+        assert np.linalg.norm(lab(one) - lab(other)) > 12, (hex(one), hex(other))
+    for deficiency in DEFICIENCIES:
+        apart = lab(int(several[0]), deficiency) - lab(int(several[1]), deficiency)
+        assert np.linalg.norm(apart) > 12, deficiency
+
+
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)
 def test_lines_of_the_figures_stay_apart(deficiency) -> None:
     """Of the comparison and of the colony; with more lines, markers tell them apart, too."""

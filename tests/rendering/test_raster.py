@@ -16,6 +16,7 @@ from taichi_ants import runtime
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import Scene, Snapshot, at_start, colours
 from taichi_ants.rendering.rasteriser import Rasteriser
+from taichi_ants.task import Field, Task
 from taichi_ants.worlds import World, paper
 
 GOLDEN = Path(__file__).parent / "golden" / "world.png"
@@ -218,6 +219,49 @@ def test_food_is_a_dot_with_a_ring_where_cells_are_small() -> None:
     frame = scene.draw(at_start(world, n=1))[y - 6 : y + 7, x - 6 : x + 7]
     for colour in (colours.CELL_FOOD, colours.FLOOR_FOOD):
         assert (frame == colours.channels(colour)).all(axis=2).sum() >= 4
+
+
+@pytest.mark.parametrize("hexagon", ["small", "large"])
+def test_nests_and_kinds_of_food_have_colours(hexagon) -> None:
+    ranges = (60, 60, 60) if hexagon == "small" else (6, 6, 6)
+    foods = [((0, 3, 0), 0), ((0, 0, 3), 1)]
+    world = World(ranges, queen=[(0, 0, 0), (3, 0, 0)], foods=foods)
+    scene = Rasteriser(world.grid, 600, 600)
+    assert (scene.hexagon < 6) == (hexagon == "small")
+    start = at_start(world, n=2)
+    ants = dataclasses.replace(start, ant_nests=np.int32([0, 1]))
+    frame = scene.draw(ants)
+    for several in (colours.QUEENS, colours.FOODS, colours.ANTS):
+        for colour in several[:2]:
+            assert (frame == colours.channels(colour)).all(axis=2).sum() >= 2, hex(colour)
+    plain = scene.draw(start)
+    assert not (plain == colours.channels(colours.ANTS[1])).all(axis=2).any()
+
+
+def test_fields_have_scales_of_their_own() -> None:
+    """A level that is the strongest of its field has the darkest colour, whatever the trail's."""
+    world = World((4, 4, 4), (0, 0, 0))
+    level = np.zeros(world.grid.size, np.int32)
+    level[world.grid.index((2, 0, 0))] = 1000
+    task = Task(fields={"home": Field(level=1000), "sum": Field(deposit="add", level=50)})
+    levels = {"trail": 0 * level, "home": level, "sum": 0 * level}
+    start = dataclasses.replace(at_start(world), fields=levels)
+    weak = dataclasses.replace(start, fields={**levels, "home": level // 2})
+    most = {name: field.darkest for name, field in task.fields.items()}
+    assert most == {"home": 1000, "sum": 500}
+    frames = [Scene(world.grid, task=task).draw(one) for one in (start, weak)]
+    darkest = colours.channels(int(colours.field_ramp(0)[-1]))
+    dark = [(frame[:, :700] == darkest).all(axis=2).sum() for frame in frames]
+    assert dark[0] > 100 > dark[1]
+
+
+def test_the_legend_names_the_homing_cue() -> None:
+    grid = World((4, 4, 4), (0, 0, 0)).grid
+    tasks = [Task(), Task(fields={"home": Field()}, homing_cue="home"), Task(homing_cue="trail")]
+    world = at_start(World((4, 4, 4), (0, 0, 0)))
+    legends = [Scene(grid, task=task).draw(world).tobytes() for task in tasks]
+    assert len(set(legends)) == 3
+    assert legends[0] == Scene(grid).draw(world).tobytes()
 
 
 def test_a_crowd_is_a_shade_that_grows_with_it() -> None:

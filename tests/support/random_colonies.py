@@ -58,7 +58,8 @@ def random_colony(
     not; all else about them is random, except the views of `cues`, outbound and homing.
 
     `choice` is the rule, with random numbers, and `noise` names its kinds. Ants that choose by
-    "deneubourg" have no training, so their `sharing` must be "frozen".
+    "deneubourg" have no training, so their `sharing` must be "frozen". With a compass, those with
+    food follow the last field, if there is one.
     """
     rng = np.random.default_rng([seed, 2])
     world = random_world(seed, largest_range)
@@ -68,6 +69,8 @@ def random_colony(
     training, delivery = _training(rng, learner)
     given = sharing == "frozen" or rng.random() < 0.6
     chooses = random_choice(seed, choice)
+    if fields and choice == "deneubourg" and cues[1] == "compass":
+        chooses = chooses.but(carriers_follow=fields[-1])
     if not chooses.needs_table:
         training, given = None, False
     return RandomColony(

@@ -66,6 +66,10 @@ def _intervention(
         most = 1.0 if name == "remove_ants" else 0.3
         amounts = [int(rng.integers(0, 4)), float(rng.uniform(0, most)), {"cells": some}]
         amount = amounts[int(rng.integers(3))]
+        if world.n_nests > 1 and rng.random() < 0.5:
+            short = "share" if isinstance(amount, float) else "number"
+            amount = dict(amount) if isinstance(amount, dict) else {short: amount}
+            amount["nest"] = int(rng.integers(world.n_nests))
         if name == "add_ants" and isinstance(amount, dict) and rng.random() < 0.5:
             amount["heading"] = int(rng.integers(6))
         return amount
@@ -75,10 +79,19 @@ def _intervention(
         return [full[rng.integers(len(full))], free[rng.integers(len(free))]]
     if name == "place":
         what = str(rng.choice(["rock", "food", "food", "queen"]))
-        return {"what": what, "cells": [free[rng.integers(len(free))]] if what == "queen" else some}
+        placed: dict[str, Any] = {"what": what, "cells": some}
+        if what == "queen":
+            placed["cells"] = [free[rng.integers(len(free))]]
+        if what == "queen" and world.n_nests > 1:
+            placed["nest"] = int(rng.integers(world.n_nests))
+        if what == "food" and task.foods:
+            placed["kind"] = str(rng.choice(list(task.foods)))
+        return placed
     if name == "trail":
         level = int(rng.choice([0, 1, 20, 250]))
-        return level if rng.random() < 0.3 else {"level": level, "cells": some}
+        if rng.random() < 0.3:
+            return level
+        return {"level": level, "cells": some, "field": str(rng.choice(["trail", *task.fields]))}
     if name == "task":
         return _change(rng, task)
     if name == "policy":
@@ -115,6 +128,15 @@ def _change(rng: np.random.Generator, task: Task) -> dict[str, Any]:
             able.append((f"fields.{name}.level", int(rng.integers(1, 100))))
         if one.half_life:
             able.append((f"fields.{name}.half_life", float(rng.uniform(0.5, 20))))
+    for name in task.foods:
+        able.append((f"foods.{name}.deliver", int(rng.integers(-2, 30))))
+    for name, caste in task.castes.items():
+        able.append((f"castes.{name}.epsilon", float(rng.random())))
+        able.append((f"castes.{name}.lays", str(rng.choice(["all", "none", "trail"]))))
+        if caste.threshold.value is not None:
+            able.append((f"castes.{name}.threshold.value", float(rng.uniform(3, 9))))
+    if task.labour.divides:
+        able.append(("labour.demand", float(rng.uniform(0, 4))))
     if life.wander:
         able += [("life.wander", int(rng.integers(1, 9))), ("life.regrowth", 2)]
     return dict([able[int(rng.integers(len(able)))]])

@@ -18,6 +18,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     (slots,) = np.nonzero(colony.living[world])
     assert slots.tolist() == sorted(plain.ants)
     cells, states = grid.cells(colony.cells[world, slots]).tolist(), colony.states[world]
+    rewards = colony.rewards[world]
     ants = {name: arrays[name][of_world] for name in colony.columns()}
     for slot, cell in zip(slots.tolist(), cells, strict=True):
         ant = plain.ants[slot]
@@ -30,12 +31,16 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
         assert (mine["percept"], states[slot]) == (ant.percept, ant.state)
         assert int(mine["streams"]) == ant.stream.state
         assert mine["action"] == ant.action
+        if ant.idle:
+            assert mine["event"] == ant.event
         if ant.action >= 0:
             assert colony.executed[world, slot] == ant.executed
             assert mine["event"] == ant.event
-            if not colony.task.foods:  # their rewards are in the sum of returns
-                assert arrays["rewards"][ant.event] == ant.reward
+            assert rewards[slot] == ant.reward
         assert colony.nests[world, slot] == ant.nest
+        assert colony.castes[world, slot] == ant.caste
+        assert colony.idle[world, slot] == ant.idle
+        assert colony.thresholds[world, slot] == ant.threshold
         if colony.n_kinds > 1 and ant.carries:
             assert mine["kind"] == ant.kind
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
@@ -75,6 +80,9 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert stores.tolist() == plain.stores
     apart = outcome.deliveries_apart[0, world]
     assert {(int(n), int(k)): int(apart[n, k]) for n, k in np.argwhere(apart)} == record.apart
+    by_caste = dict(enumerate(outcome.caste_deliveries[0, world].tolist()))
+    assert {caste: n for caste, n in by_caste.items() if n} == record.by_caste
+    assert colony.stimuli[world].tolist() == plain.stimuli
     first = world * colony.n_food_sources
     food_sources = colony.arrays["food_sources"][:, first : first + row[WorldRow.FOOD_SOURCES]]
     theirs = plain.food_sources.food_sources[: food_sources.shape[1]]

@@ -16,7 +16,7 @@ from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.offline import record_colony
 from taichi_ants.reference.choice import weighted
 from taichi_ants.reference.numbers import power
-from taichi_ants.task import Choice, Noise
+from taichi_ants.task import Choice, Field, Noise, Pheromone
 from taichi_ants.task.constants import LEFT, N_ACTIONS, RIGHT
 
 N, GRID = 40_000, AxialGrid((10, 10, 2))
@@ -75,6 +75,27 @@ def test_frequencies_of_deneubourgs_rule(k, exponent):
     chosen, *_ = first_actions(rules, world, training=None)
     weights = (k + np.array([0, 20, 60])) ** exponent
     assert_counts(chosen, weights / weights.sum())
+
+
+@pytest.mark.parametrize(("followed", "levels"), [(None, [0, 20, 60]), ("calm", [0, 0, 0])])
+def test_ants_with_food_follow_another_pheromone(followed, levels):
+    """An ant picks up food, turns around, and sees the trail, or a field that no ant lays."""
+    here = GRID.index((5, 5, 0))
+    forward, *rooms = (tuple(c) for c in GRID.cells(here + GRID.offsets[[0, 2, 3, 4]]).tolist())
+    (queen,) = GRID.cells([here + 2 * GRID.offsets[0]]).tolist()
+    trails = [(rooms[1], 20), (rooms[2], 60)]
+    world = World((10, 10, 2), queen, [forward], trails=trails, ants=[((5, 5, 0), 0)])
+    rules = Task(
+        pheromone=Pheromone(evaporation="none"),
+        fields={"calm": Field(laid="never")},
+        choice=Choice("deneubourg", k=20, exponent=2, carriers_follow=followed),
+    )
+    colony = Colony(world, rules, None, range(N), sharing="frozen")
+    colony.begin_episode()
+    colony.tick(2)
+    assert colony.carrying.all()
+    weights = (20.0 + np.array(levels)) ** 2
+    assert_counts(colony.actions[:, 0], weights / weights.sum())
 
 
 @pytest.mark.parametrize(
@@ -183,6 +204,15 @@ REFUSED = [
     (lambda: Choice("deneubourg", exponent=-1), "`task.choice.exponent` is -1; it must be"),
     (lambda: Task(choice="boltzmann"), "`task.choice` is 'boltzmann'; it must be a Choice, or one"),
     (lambda: Noise(slip=1.5), "`task.noise.slip` is 1.5; it must be between 0 and 1."),
+    (lambda: Choice(carriers_follow="trail"), "`task.choice.carriers_follow` is 'trail'; leave it"),
+    (
+        lambda: Task(choice=Choice("deneubourg", carriers_follow="home")),
+        "`task.choice.carriers_follow` is 'home'; it must be one of trail, or the name of a field",
+    ),
+    (
+        lambda: Task(choice=Choice("deneubourg", carriers_follow="trail"), homing_cue="trail"),
+        "but `task.homing_cue` is 'trail', which ants with food follow already",
+    ),
     (lambda: Task("ants", choice="deneubourg"), "`task.observation` is 'ants'; it must be 'paper'"),
     (
         lambda: Colony(worlds.paper(), CELLS, PLAIN),
@@ -222,7 +252,7 @@ REFUSED = [
     (lambda: EpisodeBounds(worlds.paper(), Task(noise=Noise(slip=0.1))), "a task without noise"),
     (
         lambda: record_colony(Colony(worlds.paper(), CELLS, None, sharing="frozen")),
-        "which has no action values",
+        "probabilities of actions do not follow",
     ),
 ]
 

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
-from taichi_ants.checks import checked_world
+from taichi_ants.checks import checked_world, refuse_castes
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
@@ -55,6 +55,7 @@ def limits_of(world: World, task: Task | None = None) -> Limits:
             f"`task.foods` is {', '.join(task.foods)}; the bounds hold for one kind of food, so "
             "leave it out."
         )
+    refuse_castes(task, "a bound on deliveries")
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = world.walkable(around)[around]
     ticks = 2 if task.traffic.shared or task.turns_at_queen else 3

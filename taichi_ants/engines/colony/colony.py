@@ -131,6 +131,12 @@ class Colony(ColonyState):
 
     def check_same_kernels(self, task: Task) -> None:
         """Raise an AntsError if a task needs other kernels than the present one."""
+        castes = {name: one.fixed for name, one in self.task.castes.items()}
+        if castes != {name: one.fixed for name, one in task.castes.items()}:
+            raise AntsError(
+                "the task cannot change the share, ants, nest or policy of a caste in an episode, "
+                "or whether it has thresholds; change its other numbers."
+            )
         other = copy.copy(self)
         other.take_task(task)
         present, needed = features_of(self), features_of(other)

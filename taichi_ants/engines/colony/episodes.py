@@ -17,9 +17,10 @@ class ColonyEpisodes(Record, Tidy):
 
     `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
     with food of all delivered loads, `living` ants at the end. `deliveries_apart` has deliveries by
-    nest and kind of food, (episodes, worlds, nests, kinds). Returns, moves, blocked and carried are
-    int64, all others int32. `seeds` has the seed of each world. `series` has the values of the
-    measures that you asked `Colony.run` for, else None.
+    nest and kind of food, (episodes, worlds, nests, kinds), and `caste_deliveries` by caste,
+    (episodes, worlds, castes), with one column for all ants if there are no castes. Returns, moves,
+    blocked and carried are int64, all others int32. `seeds` has the seed of each world. `series`
+    has the values of the measures that you asked `Colony.run` for, else None.
     """
 
     returns: np.ndarray
@@ -34,6 +35,7 @@ class ColonyEpisodes(Record, Tidy):
     regrown: np.ndarray
     living: np.ndarray
     deliveries_apart: np.ndarray
+    caste_deliveries: np.ndarray
     seeds: tuple[int, ...] = ()
     series: Series | None = field(default=None, repr=False)
 

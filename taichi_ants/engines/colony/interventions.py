@@ -11,8 +11,10 @@ are tried by distance, then by cube coordinates. If none is empty, the ant and i
 change.
 
 Random numbers come from the stream of (seed, STREAM_INTERVENTION, episode) of each world, in the
-order of the changes. Adding n ants draws n headings. Removing n of m living ants draws m words of
+order of the changes. Adding n ants draws n headings and, with several castes, n castes, by the
+probabilities for newborn ants. Removing n of m living ants draws m words of
 64 bits, one for each ant in the order of numbers, and removes the ants with the n smallest words.
+With a nest given, m counts the ants of that nest.
 """
 
 from __future__ import annotations
@@ -27,14 +29,15 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import (
-    ANT_GROUND,
+    ANT_STANDS,
+    FoodRow,
     FoodSourceRow,
     NestRow,
     Stage,
     WorldRow,
     array_of,
 )
-from taichi_ants.errors import AntsError, count, entries_of, shown
+from taichi_ants.errors import AntsError, checked_whole, count, entries_of, shown
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_BORN,
@@ -46,6 +49,7 @@ from taichi_ants.grid.randomness import Stream, choose, stream_state
 from taichi_ants.interventions import indices
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
+from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
@@ -59,6 +63,9 @@ _CELLS = _GRID.cells(np.flatnonzero(_GRID.exists))
 _ORDER = np.lexsort((*_CELLS.T[::-1], _CELLS.max(axis=1)))
 # The offsets of 1 to `REACH` cells, in the order in which they are tried, axial (n, 2).
 _STEPS = axial(_CELLS[_ORDER[1:]])
+# The ground at the start of later episodes has the kind of a food, or the nest of a queen, above
+# the bits of the content.
+_CONTENT, _NUMBER = 15, 4
 
 
 class Interventions:
@@ -80,23 +87,17 @@ class Interventions:
         length: The `length` of episodes that an intervention begins.
 
     Raises:
-        AntsError: The colony does not have one of the worlds, or has several nests or kinds of
-            food.
+        AntsError: The colony does not have one of the worlds.
     """
 
     def __init__(
         self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
-        if colony.n_nests > 1 or colony.task.foods:
-            raise AntsError(
-                "the colony has several nests or kinds of food, which interventions do not "
-                "support yet; use one of each."
-            )
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None
         self.worlds = self._checked_worlds(worlds)
         self._first = colony.worlds
-        self._starts = [world.ground() for world in colony.worlds] if lasting else []
+        self._starts = [_start_of(world) for world in colony.worlds] if lasting else []
         self._streams: dict[int, tuple[int, Stream]] = {}  # by world: the episode and its stream
         self._changed = False  # whether the start of the next episode differs from the present one
 
@@ -132,24 +133,25 @@ class Interventions:
         """Return the flat indices of all cells."""
         return np.flatnonzero(self.colony.grid.exists)
 
-    def put(self, cells: np.ndarray, what: int) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD, except those of the queen and of ants that stay.
+    def put(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
+        """Make cells EMPTY, OBSTACLE or FOOD, except those of queens and of ants that stay.
 
-        Rock and food move ants aside, and rocks remove trails. Each new food item gets a food
-        source: it grows back, and wanders with adjacent food. AntsError if later episodes would
-        have no room for the ants, or no food to learn from.
+        Rock and food move ants aside, and rocks remove trails. Food of a kind fills its cell with
+        all loads. Each new food item gets a food source: it grows back, and wanders with adjacent
+        food. AntsError if later episodes would have no room for the ants, or no food to learn from.
         """
         for one in self._each():
-            one.put(cells, what)
+            one.put(cells, what, kind)
         self.colony.observe(self.worlds)
 
-    def move_queen(self, cell: int) -> None:
-        """Move the queen to a cell without rock or food; an ant there moves aside.
+    def move_queen(self, cell: int, nest: int = 0) -> None:
+        """Move the queen of a nest to a cell without rock or food; an ant there moves aside.
 
-        AntsError if the cell is not free, or later episodes would lack food.
+        AntsError if the cell is not free, or there is no such nest.
         """
+        self._check_nest(nest)
         for one in self._each():
-            one.move_queen(cell)
+            one.move_queen(cell, nest)
         self.colony.observe(self.worlds)
 
     def move(self, cell: int, to: int) -> None:
@@ -161,40 +163,60 @@ class Interventions:
             one.move(cell, to)
         self.colony.observe(self.worlds)
 
-    def lay_trail(self, cells: np.ndarray, level: int) -> None:
-        """Set the trail of cells other than rocks."""
+    def lay_trail(self, cells: np.ndarray, level: int, field: str = TRAIL) -> None:
+        """Set the trail, or a further field, of cells other than rocks."""
+        number = [TRAIL, *self.colony.fields].index(field)
         for one in self._each():
-            one.lay(cells[one.view("walls")[cells] == 0], level)
+            one.lay(cells[one.view("walls")[cells] == 0], level, number)
         self.colony.observe(self.worlds)
 
-    def add_ants(self, cells: np.ndarray, heading: int | None = None) -> None:
+    def add_ants(
+        self, cells: np.ndarray, heading: int | None = None, nest: int | None = None
+    ) -> None:
         """Put newborn ants on those of the cells that are empty, with random headings by default.
 
-        AntsError if the capacity of the colony is too small.
+        By default, each belongs to the nest of the nearest queen. AntsError if the capacity of the
+        colony is too small, or there is no such nest.
         """
+        self._check_nest(nest)
         for one in self._each():
-            one.add(cells, heading)
+            nests = one.nearest_nests(cells) if nest is None else np.full(len(cells), nest)
+            one.add(cells, nests, heading)
         self.colony.observe(self.worlds)
 
-    def add_some(self, number: int | None, share: float | None, heading: int | None = None) -> None:
+    def add_some(
+        self,
+        number: int | None,
+        share: float | None,
+        heading: int | None = None,
+        nest: int | None = None,
+    ) -> None:
         """Put a number of newborn ants, or a share of the living ones, on free start cells.
 
-        AntsError if there is too little room.
+        With a nest, they belong to it, and the share is that of its ants. Else nests take turns.
+        AntsError if there is too little room, or no such nest.
         """
+        self._check_nest(nest)
         for one in self._each():
-            one.add_some(one.amount(number, share), heading)
+            one.add_some(one.amount(number, share, nest), heading, nest)
         self.colony.observe(self.worlds)
 
-    def remove_ants(self, cells: np.ndarray) -> None:
-        """Remove the ants on these cells, with the food that they carry."""
+    def remove_ants(self, cells: np.ndarray, nest: int | None = None) -> None:
+        """Remove the ants on these cells, or those of a nest, with the food that they carry."""
+        self._check_nest(nest)
         for one in self._each():
-            one.remove(one.living_slots()[np.isin(one.cells[one.living_slots()], cells)])
+            slots = one.living_slots(nest)
+            one.remove(slots[np.isin(one.cells[slots], cells)])
         self.colony.observe(self.worlds)
 
-    def remove_some(self, number: int | None, share: float | None) -> None:
-        """Remove a number of random ants, or a share; all ants if there are fewer."""
+    def remove_some(self, number: int | None, share: float | None, nest: int | None = None) -> None:
+        """Remove a number of random ants, or a share; all ants if there are fewer.
+
+        With a nest, remove only its ants.
+        """
+        self._check_nest(nest)
         for one in self._each():
-            one.remove_some(one.amount(number, share))
+            one.remove_some(one.amount(number, share, nest), nest)
         self.colony.observe(self.worlds)
 
     def set_ants(self, n: int) -> None:
@@ -291,13 +313,15 @@ class Interventions:
         """Return the world in which later episodes of world number `w` start."""
         first, grid, start = self._first[w], self.colony.grid, self._starts[w]
         trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
+        foods, queens = (np.flatnonzero(start & _CONTENT == what) for what in (FOOD, QUEEN))
         return World(
             first.ranges,
-            grid.cells(int(np.argmax(start == QUEEN))).tolist(),
-            grid.cells(np.flatnonzero(start == FOOD)),
+            grid.cells(queens[np.argsort(start[queens])]).tolist(),
+            grid.cells(foods),
             grid.cells(np.flatnonzero((start == OBSTACLE) & grid.exists)),
             first.trails[start[trails] != OBSTACLE],
             first.ants[start[ants] == EMPTY],
+            food_kinds=start[foods] >> _NUMBER,
         )
 
     def begin_episode(self) -> None:
@@ -311,7 +335,7 @@ class Interventions:
         self._changed = False
 
     def begin_with(self, w: int, start: np.ndarray) -> None:
-        """Set the ground at the start of a world's later episodes; AntsError if not allowed."""
+        """Set the start of a world's later episodes, see `start`; AntsError if not allowed."""
         if not self.lasting:
             return
         ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
@@ -320,7 +344,7 @@ class Interventions:
                 f"{count(ants, 'ant')} start each episode, but this change would leave "
                 f"{count(int(room), 'free cell')}; leave more cells free."
             )
-        if self.colony.learns and not (start == FOOD).any():
+        if self.colony.learns and not (start & _CONTENT == FOOD).any():
             raise AntsError(
                 "this change would remove the last food item, but ants that learn need at least 1; "
                 "leave one."
@@ -328,7 +352,7 @@ class Interventions:
         self._starts[w], self._changed = start, True
 
     def start(self, w: int) -> np.ndarray:
-        """Return a copy of the ground at the start of a world's later episodes."""
+        """Return a copy of the ground at the start of a world's later episodes, see `_start_of`."""
         return self._starts[w].copy() if self.lasting else np.zeros(self.colony.grid.size, np.uint8)
 
     def _check_all(self, what: str) -> None:
@@ -338,6 +362,10 @@ class Interventions:
                 f"the worlds of a colony share {what}, so it cannot change in some of them; change "
                 "all worlds, or make a colony with a single seed."
             )
+
+    def _check_nest(self, nest: int | None) -> None:
+        if nest is not None:
+            checked_whole("nest", nest, least=0, most=self.colony.n_nests - 1)
 
     def _each(self) -> Iterator[_World]:
         return (_World(self, w) for w in self.worlds)
@@ -364,9 +392,10 @@ class _World:
         return self.view("cell")
 
     @property
-    def queen_cell(self) -> np.ndarray:
-        """A view of the queen's cell, (1,)."""
-        return self.colony.arrays["nests"][NestRow.QUEEN_CELL, self.w : self.w + 1]
+    def queen_cells(self) -> np.ndarray:
+        """A view of the cell of each nest's queen, (nests,)."""
+        n = self.colony.n_nests
+        return self.colony.arrays["nests"][NestRow.QUEEN_CELL, self.w * n : (self.w + 1) * n]
 
     def stored(self, number: int = 0) -> np.ndarray:
         """Return a view of a pheromone as kernels store it; see `ColonyState.stored_trail`."""
@@ -376,19 +405,29 @@ class _World:
         """Return the clock of a pheromone."""
         return self.colony.trail_clock(self.w, number)
 
-    def living_slots(self) -> np.ndarray:
-        """Return the slots of the living ants, in the order of their numbers."""
-        slots = np.flatnonzero(self.colony.living[self.w])
+    def living_slots(self, nest: int | None = None) -> np.ndarray:
+        """Return the slots of the living ants, or those of a nest, in the order of numbers."""
+        living = self.colony.living[self.w]
+        if nest is not None:
+            living = living & (self.colony.nests[self.w] == nest)
+        slots = np.flatnonzero(living)
         return slots[np.argsort(self.view("number")[slots])]
 
-    def amount(self, number: int | None, share: float | None) -> int:
+    def amount(self, number: int | None, share: float | None, nest: int | None = None) -> int:
         """Return a number of ants, or the number of a share of the living ones, rounded."""
         if share is None:
             assert number is not None
             return number
-        return int(share * int(self.rows[WorldRow.LIVING]) + 0.5)
+        living = self.rows[WorldRow.LIVING] if nest is None else len(self.living_slots(nest))
+        return int(share * int(living) + 0.5)
 
-    def put(self, cells: np.ndarray, what: int) -> None:
+    def nearest_nests(self, cells: np.ndarray) -> np.ndarray:
+        """Return the nest of the queen that is nearest to each cell; of the first of several."""
+        grid = self.colony.grid
+        queens = [tuple(cell) for cell in grid.cells(self.queen_cells).tolist()]
+        return np.argmin([grid.distances(queen)[cells] for queen in queens], axis=0)
+
+    def put(self, cells: np.ndarray, what: int, kind: int = 0, loads: int | None = None) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD; see `Interventions.put`."""
         ground = self.view("ground")
         held = ground[cells]
@@ -396,7 +435,7 @@ class _World:
         at = self.cells[ants]
         cells = cells[((held >> 4 == 0) | np.isin(cells, at)) & (held != QUEEN)]  # see `layout`
         start = self.all.start(self.w)
-        start[cells] = what
+        start[cells] = what | kind << _NUMBER
         self.all.begin_with(self.w, start)
         self._step_aside(ants, to)
         ground[cells] = what
@@ -405,7 +444,18 @@ class _World:
         if what == OBSTACLE:
             for number in range(len(self.colony.pheromones)):
                 self.lay(cells, 0, number)
-        self._change_food_sources(cells, what)
+        if what == FOOD:
+            self._fill(cells, kind, loads)
+        self._change_food_sources(cells, what, kind)
+
+    def _fill(self, cells: np.ndarray, kind: int, loads: int | None) -> None:
+        """Set the kind of the food in cells, and its loads, by default as many as fit."""
+        colony = self.colony
+        if colony.n_kinds > 1:
+            self.view("kind_of")[cells] = kind
+        if colony.task.has_loads:
+            full = colony.arrays["food_numbers"][FoodRow.LOADS, kind]
+            self.view("loads")[cells] = full if loads is None else loads
 
     def _aside(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the slots of the ants on cells that can move aside, and their new cells."""
@@ -441,33 +491,37 @@ class _World:
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
             return
         if what == QUEEN:
-            self.move_queen(to)
-        else:
-            self._step_aside(*self._aside(np.array([to])))
-            self.put(np.array([cell]), EMPTY)
-            self.put(np.array([to]), what)
+            self.move_queen(to, int(np.argmax(self.queen_cells == cell)))
+            return
+        food, task = what == FOOD, self.colony.task
+        kind = int(self.view("kind_of")[cell]) if food and self.colony.n_kinds > 1 else 0
+        loads = int(self.view("loads")[cell]) if food and task.has_loads else None
+        self._step_aside(*self._aside(np.array([to])))
+        self.put(np.array([cell]), EMPTY)
+        self.put(np.array([to]), what, kind, loads)
 
     def _can_be_free(self, cell: int) -> bool:
         """Return whether a cell is empty, except for an ant that can move aside."""
         slots, _ = self._aside(np.array([cell]))
         return bool(self.view("ground")[cell] == EMPTY) or len(slots) > 0
 
-    def move_queen(self, cell: int) -> None:
-        """Move the queen; see `Interventions.move_queen`."""
+    def move_queen(self, cell: int, nest: int) -> None:
+        """Move a queen; see `Interventions.move_queen`."""
         grid, ground = self.colony.grid, self.view("ground")
         if not self._can_be_free(cell):
             raise AntsError(
                 f"the queen cannot move to cell {tuple(grid.cells(cell).tolist())}, because it is "
                 "not empty; choose an empty cell."
             )
-        old = int(self.queen_cell[0])
+        old = int(self.queen_cells[nest])
         start = self.all.start(self.w)
-        start[old], start[cell] = EMPTY, QUEEN
+        start[old], start[cell] = EMPTY, QUEEN | nest << _NUMBER
         self.all.begin_with(self.w, start)
         self._step_aside(*self._aside(np.array([cell])))
         ground[old], ground[cell] = EMPTY, QUEEN
-        self.queen_cell[:] = cell
-        self.view("closer")[:] = World(grid.ranges, grid.cells(cell).tolist()).closer()
+        self.queen_cells[nest] = cell
+        closer = World(grid.ranges, grid.cells(cell).tolist()).closer()
+        self.view("closer").reshape(self.colony.n_nests, -1)[nest] = closer
         self.colony.changed[self.w] = True
         self._change_food_sources(np.array([cell]), QUEEN)
 
@@ -476,10 +530,11 @@ class _World:
         stored = self.stored(number)
         stored[cells] = level + self.clock(number) if level else 0
 
-    def add(self, cells: np.ndarray, heading: int | None = None) -> None:
-        """Put newborn ants on cells; see `Interventions.add_ants`."""
+    def add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None = None) -> None:
+        """Put newborn ants of some nests on cells; see `Interventions.add_ants`."""
         colony, ground, rows = self.colony, self.view("ground"), self.rows
-        cells = cells[ground[cells] == EMPTY]
+        free = ground[cells] == EMPTY
+        cells, nests = cells[free], nests[free]
         n, living = len(cells), int(rows[WorldRow.LIVING])
         if living + n > colony.capacity:
             raise AntsError(
@@ -490,25 +545,32 @@ class _World:
         numbers = rows[WorldRow.NEXT_NUMBER] + np.arange(n)
         words = self.all.stream(self.w).bits(n) if heading is None else np.zeros(0, np.uint64)
         headings = choose(words >> np.uint64(32), N_HEADINGS) if heading is None else heading
+        castes: Any = 0
+        if len(colony.task.castes) > 1:
+            drawn = (self.all.stream(self.w).bits(n) >> np.uint64(32)) / 2.0**32
+            bounds = self.view("caste_chances").reshape(colony.n_nests, -1)[nests, :-1]
+            castes = np.count_nonzero(bounds <= drawn[:, None], axis=1)
         episode = int(colony.arrays["episodes"][self.w])
         born = (episode << 32) + numbers.astype(np.int64)
         newborn = {
             "cell": cells,
             "heading": headings,
             "number": numbers,
+            "nest": nests,
             "action": -1,
             "executed": -1,
             "next_action": -1,
+            "caste": castes,
             "stage": Stage.NEWBORN,
             "streams": stream_state(colony.seeds[self.w], STREAM_BORN, born),
         }
         for name in colony.columns():
             self.view(name)[slots] = newborn.get(name, 0)
-        ground[cells] = ANT_GROUND
+        ground[cells] = OBSTACLE | (ANT_STANDS - nests) << 4
         rows[WorldRow.NEXT_NUMBER] += n
         self._count_ants()
 
-    def add_some(self, n: int, heading: int | None = None) -> None:
+    def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
         """Put newborn ants on free cells in the order in which ants would start there."""
         colony, grid = self.colony, self.colony.grid
         free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
@@ -517,16 +579,19 @@ class _World:
                 f"{count(n, 'ant')} cannot join, because there are {count(len(free), 'free cell')};"
                 " add fewer ants."
             )
-        seed = colony.seeds[self.w]
-        words = stream_state(seed, STREAM_START_CELL, grid.number(grid.cells(free)))
-        queen = grid.cells(int(self.queen_cell[0]))
-        far = grid.distances(tuple(queen.tolist()))[free]
-        order = np.lexsort((words, far * (colony.start == "nest")))
-        self.add(free[order[:n]], heading)
+        words = stream_state(colony.seeds[self.w], STREAM_START_CELL, grid.number(grid.cells(free)))
+        queens = [tuple(cell) for cell in grid.cells(self.queen_cells).tolist()]
+        wanted = range(len(queens)) if nest is None else [nest]
+        near = colony.start == "nest"
+        orders = [
+            free[np.lexsort((words, grid.distances(queens[one])[free] * near))] for one in wanted
+        ]
+        nests = np.resize(wanted, n)
+        self.add(_in_turn(orders, n), nests, heading)
 
-    def remove_some(self, n: int) -> None:
+    def remove_some(self, n: int, nest: int | None = None) -> None:
         """Remove n random ants."""
-        slots = self.living_slots()
+        slots = self.living_slots(nest)
         words = self.all.stream(self.w).bits(len(slots))
         self.remove(slots[np.argsort(words, kind="stable")[:n]])
 
@@ -563,20 +628,20 @@ class _World:
         elif n < len(slots):
             self.remove(slots[n:])
 
-    def _change_food_sources(self, cells: np.ndarray, what: int) -> None:
+    def _change_food_sources(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
         """Add food sources for FOOD on cells, or remove the sources of cells with anything else.
 
         A waiting source of a cell gets its food back. A new source joins the pile of the first
-        adjacent source, or forms a new pile.
+        adjacent source, or forms a new pile. The source of the food takes its kind.
         """
         colony, arrays = self.colony, self.colony.arrays
         if not colony.food_changes:
             return
         several = [self._sources(w) for w in range(len(colony.worlds))]
-        known = several[self.w][:3]
+        known = several[self.w]
         if what != FOOD:
             known = known[:, ~np.isin(known[0], cells)]
-        at, taken, pile = known.tolist()
+        at, taken, pile, kinds = known.tolist()
         on: dict[int, list[int]] = {}
         for source, cell in enumerate(at):
             on.setdefault(cell, []).append(source)
@@ -588,11 +653,14 @@ class _World:
                 here.append(len(at))
                 at.append(cell)
                 taken.append(0)
+                kinds.append(kind)
                 pile.append(max(pile, default=-1) + 1 if first is None else pile[first])
             if all(taken[source] >= 0 for source in here):
                 taken[here[0]] = -1
+            (full,) = [source for source in here if taken[source] < 0]
+            kinds[full] = kind
         _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
-        several[self.w] = np.array([at, taken, pile, [0] * len(at)], int).reshape(4, -1)
+        several[self.w] = np.array([at, taken, pile, kinds], int).reshape(4, -1)
         colony.make_food_sources_fit(len(at))
         arrays |= food_sources.arrays(
             several, arrays["worlds"], colony.n_food_sources, colony.grid.size
@@ -605,3 +673,21 @@ class _World:
         of = FoodSourceRow
         rows = [of.CELL, of.TAKEN, of.PILE, of.KIND]
         return arrays["food_sources"][rows, w * room : w * room + n]
+
+
+def _start_of(world: World) -> np.ndarray:
+    """Return the ground of a world, with the numbers of nests and kinds of food, uint8 (size,)."""
+    start = world.ground()
+    start[world.grid.index(world.queens)] |= (np.arange(world.n_nests) << _NUMBER).astype(np.uint8)
+    return start | world.kinds_by_cell() << _NUMBER
+
+
+def _in_turn(orders: Sequence[np.ndarray], n: int) -> np.ndarray:
+    """Return the first n cells, of which each order in turn takes its first that is not taken."""
+    if len(orders) == 1:
+        return orders[0][:n]
+    taken: dict[int, None] = {}
+    turns = [(cell for cell in order.tolist() if cell not in taken) for order in orders]
+    for k in range(n):
+        taken[next(turns[k % len(turns)])] = None
+    return np.fromiter(taken, np.int64, n)

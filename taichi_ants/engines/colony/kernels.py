@@ -8,18 +8,20 @@ variants do the same phases in the same order and give the same numbers. The ord
 """
 
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, partial
 from itertools import chain, groupby
 from typing import Any, NamedTuple
 
 import taichi as ti
 
 from taichi_ants.engines import views
-from taichi_ants.engines.colony import learning, life, steps, trail
+from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
+from taichi_ants.engines.colony.own_rules import own_rule
 from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import guarded, read_rates
+from taichi_ants.rules import Rule
 from taichi_ants.task import Traffic
 from taichi_ants.task.constants import ROW
 from taichi_ants.task.observations import Observation
@@ -32,8 +34,8 @@ class Phase(NamedTuple):
     """A part of a tick that all ants, cells or worlds (`of`: ANTS, CELLS, WORLD) finish together.
 
     It must not read values that another chunk writes in the same phase. `do` is a `ti.func` with
-    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place) for CELLS, (c, v, w, tick) for
-    WORLD.
+    arguments (c, v, w, chunk, ant, tick) for ANTS, (c, v, place, tick) for CELLS, (c, v, w, tick)
+    for WORLD.
     """
 
     of: str
@@ -45,9 +47,9 @@ class Features(NamedTuple):
 
     With `own_tables` there is a table for each slot, not one for each world; for the others, see
     `ColonyState` and `Pheromone`. `dense` and `views` have an entry for each pheromone, the trail
-    first. The cues and `reads` are numbers of pheromones; -1 is the compass. A model does not pay
-    for features that it does not use: kernels without births, deaths or food that changes are
-    faster, and compile much faster.
+    first. The cues, `carriers_follow` and `reads` are numbers of pheromones. -1 is the compass, or
+    means that ants with food follow their cue. A model does not pay for features that it does not
+    use: kernels without births, deaths or food that changes are faster, and compile much faster.
     """
 
     learner: Learner | None
@@ -58,6 +60,7 @@ class Features(NamedTuple):
     views: tuple[str, ...]
     outbound: int
     homing: int
+    carriers_follow: int
     reads: tuple[int, ...]  # of the observation
     traffic: Traffic
     ants_change: bool
@@ -69,6 +72,38 @@ class Features(NamedTuple):
     choice: str = "greedy"
     slips: bool = False
     misreads: bool = False
+    n_castes: int = 0  # 0: ants have no castes
+    cues: tuple[tuple[int, int], ...] = ()  # of all castes, outbound and homing, if they differ
+    has_labour: bool = False
+    rules: tuple[Rule, ...] = ()  # your own rules, in the order of their parameters
+    reward: str = "by_event"
+    deposits: tuple[str, ...] = ()  # the rules of each pheromone, if any is your own
+    evaporations: tuple[str, ...] = ()
+    fields: tuple[str, ...] = ()  # the names of all pheromones, if a rule of your own reads them
+
+
+class Cues(NamedTuple):
+    """The cues of some ants while kernels compile: numbers of pheromones, and their views.
+
+    Ants with food follow the pheromone `followed`, see `steps.cue_level`.
+    """
+
+    outbound: int
+    homing: int
+    followed: int
+    has_compass: bool
+    half: bool
+    homing_view: str
+
+
+def cues_of(features: Features, outbound: int, homing: int) -> Cues:
+    """Return the cues with these numbers; -1 is the compass."""
+    half, followed, view = features.views[outbound] == "half", homing, ""
+    if homing < 0:
+        followed = features.carriers_follow if features.carriers_follow >= 0 else outbound
+    else:
+        view = features.views[homing]
+    return Cues(outbound, homing, followed, homing < 0, half, view)
 
 
 class Variant:
@@ -79,21 +114,29 @@ class Variant:
         self.own_tables, self.dense = features.own_tables, any(features.dense)
         self.is_given_actions = features.is_given_actions
         self.pheromones = tuple(zip(features.dense, features.views, strict=True))
-        self.outbound, self.homing = features.outbound, features.homing
-        self.has_compass = self.homing < 0
-        cues = {self.outbound} | ({self.homing} - {-1})
-        self.half = features.views[self.outbound] == "half"
-        self.homing_view = "" if self.has_compass else features.views[self.homing]
+        pairs = features.cues or ((features.outbound, features.homing),)
+        self.cues = tuple(cues_of(features, *pair) for pair in pairs)
+        cues = {number for one in self.cues for number in (one.outbound, one.followed)}
         self.reads = features.reads
         self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
         self.n_nests, self.n_kinds = features.n_nests, features.n_kinds
+        self.n_castes, self.has_labour = features.n_castes, features.has_labour
+        self.n_groups = self.n_nests * max(1, self.n_castes)  # in a world: nests by castes
         self.has_foods, self.has_loads = features.has_foods, features.has_loads
         # Whether deliveries are counted by nest and kind.
         self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
+        own, none = partial(own_rule, features.rules), ("",) * len(features.dense)
+        self.own_choice = own_inputs.choice(own(features.choice))
+        self.own_reward = own_inputs.reward(own(features.reward))
+        self.has_own_choice = self.own_choice is not None
+        self.has_own_reward = self.own_reward is not None
+        self.own_deposits = tuple(map(own, features.deposits or none))
+        self.own_evaporations = tuple(map(own, features.evaporations or none))
+        self.field_numbers = {name: number for number, name in enumerate(features.fields)}
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
@@ -107,7 +150,7 @@ class Variant:
             self.td_error = guarded(learner.td_error)
         self.observation = observation
         self.n_numbers = observation.n_states * ROW  # of a table: state-action pairs, and unused
-        self.n_pairs = self.n_numbers * self.n_nests  # of all tables that ants of a world share
+        self.n_pairs = self.n_numbers * self.n_groups  # of all tables that ants of a world share
         self.is_papers = observation.name == "paper"
         # The percept is the state index, unless ants misread cells.
         self.sees_percept = self.is_papers and not self.misreads
@@ -123,7 +166,8 @@ class Variant:
 
     def field(self, c: Any, number: int) -> trail.Pheromone:
         """Return the arrays and numbers of a pheromone; 0 is the trail."""
-        return trail.pheromone_of(c, number, *self.pheromones[number])
+        own = self.own_deposits[number], self.own_evaporations[number]
+        return trail.pheromone_of(c, number, *self.pheromones[number], *own)
 
     def dense_fields(self, c: Any) -> list[trail.Pheromone]:
         """Return the arrays and numbers of the dense pheromones."""
@@ -195,12 +239,12 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
         first, last = share_of(c, chunk, c.n_slots)
         last = ti.min(last, c.worlds[WorldRow.TOP, w]) * running
         for ant in range(w * c.n_slots + first, w * c.n_slots + last):
-            if steps.trait(c.stage, ant) != Stage.VACANT:
+            if columns.trait(c.stage, ant) != Stage.VACANT:
                 phase.do(c, v, w, chunk, ant, tick)
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
         for place in range(w * c.size + first, w * c.size + last * running):
-            phase.do(c, v, place)
+            phase.do(c, v, place, tick)
     elif running == 1:
         phase.do(c, v, w, tick)
 

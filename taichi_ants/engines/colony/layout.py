@@ -15,6 +15,7 @@ INTEGER_COLUMNS = (
     "want",  # the cell to enter or to take food from, else its own; later its previous cell
     "state",  # the state index, unless it is the percept (it is not if ants misread cells)
     "age",  # in ticks, if ants are born or die
+    "reward",  # of the last action, if rewards are by your own rule
 )
 BYTE_COLUMNS = (
     "heading",
@@ -27,7 +28,10 @@ BYTE_COLUMNS = (
     "next_action",  # the next action if it is drawn already, else -1; for learners that draw ahead
     "nest",  # the number of its nest, with several nests
     "kind",  # the kind of the last food that it picked up, with several kinds
+    "caste",  # the number of its caste, with castes
+    "idle",  # 1 if it does not forage, with `Labour`
 )
+FLOAT_COLUMNS = ("threshold",)  # the response threshold of its ant, with `Labour`
 
 
 class Stage(IntEnum):
@@ -104,6 +108,25 @@ class Barrier(IntEnum):
 
 
 GAVE_UP = -(2**40)  # added to OPENED when the first part gives up, which keeps the number
+
+
+class CasteRow(IntEnum):
+    """Rows of `castes`, one column for each caste; see `Caste`."""
+
+    EPSILON = 0  # -1 if it has that of the colony
+    LEARNING_RATE = auto()  # -1 if it has that of the colony
+    DISCOUNT = auto()
+    TEMPERATURE = auto()
+    K = auto()
+    EXPONENT = auto()
+    LEARNS = auto()  # 0 if it follows a policy
+    LAYS = auto()  # a bit for each pheromone
+    CUES = auto()  # the number of its cues in `Task.all_cues`
+    LIFESPAN = auto()  # -1 if it does not die
+    QUIT = auto()  # 0 without a threshold
+    DISTRIBUTION = auto()  # of thresholds, a number in `DISTRIBUTIONS`
+    VALUE = auto()
+    SPREAD = auto()
 
 
 class FoodRow(IntEnum):

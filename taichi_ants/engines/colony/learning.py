@@ -8,11 +8,12 @@ would move it. Each chunk of ants has its own sums, without atomic operations.
 
 import taichi as ti
 
-from taichi_ants.engines.colony import steps
-from taichi_ants.engines.colony.layout import Stage, SumRow
+from taichi_ants.engines.colony import columns, labour, steps
+from taichi_ants.engines.colony.layout import CasteRow, Stage, SumRow, Tally
 from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
 from taichi_ants.task.constants import N_ACTIONS, ROW
+from taichi_ants.task.events import Event
 from taichi_ants.task.rules.delivery import step_end, terminates
 from taichi_ants.task.rules.random_bits import advance, draw_below
 
@@ -29,7 +30,7 @@ def see_anew(c: ti.template(), v: ti.template(), w, ant, tick):
 @ti.func
 def note_seen(c: ti.template(), v: ti.template(), ant, percept, state):
     """Store the percept and the state index of an ant."""
-    steps.put(c.percept, ant, percept)
+    columns.put(c.percept, ant, percept)
     if ti.static(not v.sees_percept):
         c.state[ant] = state
 
@@ -45,48 +46,111 @@ def begin(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         else:
             see_anew(c, v, w, ant, 0)
         begin_to_learn(c, v, ant)
+        if ti.static(v.has_labour):
+            labour.begin(c, v, w, ant)
 
 
 @ti.func
 def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Let an ant observe after interventions; an ant that was just added becomes living."""
-    if steps.trait(c.stage, ant) == Stage.NEWBORN:
-        steps.put(c.stage, ant, Stage.LIVING)
+    if columns.trait(c.stage, ant) == Stage.NEWBORN:
+        columns.put(c.stage, ant, Stage.LIVING)
         if ti.static(v.alone):
             forget(c, v, ant)
+        if ti.static(v.has_labour):
+            labour.begin(c, v, w, ant)
     see_anew(c, v, w, ant, tick)
 
 
 @ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action if the learner needs it, and learn."""
+    lives, marked = columns.trait(c.stage, ant) != Stage.NEWBORN, w * c.size + c.want[ant]
+    acts, stops = lives, False
+    if ti.static(v.has_labour):
+        acts = acts & (columns.trait(c.idle, ant) == 0)
+        if acts:
+            stops = labour.stops(c, v, w, ant)
     percept, state = steps.observe(c, v, w, ant, tick + 1)
     next_action = -1
-    if steps.trait(c.stage, ant) != Stage.NEWBORN:
-        c.wants[w * c.size + c.want[ant]] = 0
+    if ti.static(v.has_own_reward):
+        c.reward[ant] = 0
+        if acts:
+            c.reward[ant] = steps.own_reward(c, v, w, ant, percept, tick)
+            steps.tally(c, Tally.RETURNS, chunk, c.reward[ant])
+    if acts & learns(c, v, ant):
         if ti.static(v.draws_next_action):
-            if terminates(steps.trait(c.event, ant), c.delivery_terminates) == 0:
+            if terminates(columns.trait(c.event, ant), c.delivery_terminates) == 0:
                 c.streams[ant] = advance(c.streams[ant])
-                next_action = steps.draw_action(c, v, w, ant, state, c.streams[ant])
+                next_action = steps.draw_action(
+                    c, v, w, ant, state, percept, tick + 1, c.streams[ant]
+                )
         if ti.static(v.alone):
-            learn_alone(c, v, ant, state, next_action, tick)
+            learn_alone(c, v, ant, state, next_action, tick, stops)
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, state, next_action)
+    if lives:
+        c.wants[marked] = 0
     note_seen(c, v, ant, percept, state)
+    if ti.static(v.has_labour):
+        next_action = ti.select(stops, -1, next_action)
+        rest(c, v, ant, acts, stops)
     if ti.static(v.draws_next_action):
-        steps.put(c.next_action, ant, next_action)
+        columns.put(c.next_action, ant, next_action)
+
+
+@ti.func
+def learns(c: ti.template(), v: ti.template(), ant):
+    """Return whether an ant learns; without castes, always, while a kernel compiles."""
+    does = True
+    if ti.static(v.n_castes > 0):
+        does = columns.of_caste(c, ant, CasteRow.LEARNS) == 1.0
+    return does
+
+
+@ti.func
+def rest(c: ti.template(), v: ti.template(), ant, acts, stops):
+    """Make a forager idle if it `stops`; an ant without an action has the last action -1."""
+    if not acts:
+        columns.put(c.action, ant, -1)
+        if ti.static(v.slips):
+            columns.put(c.executed, ant, -1)
+    if stops:
+        columns.put(c.idle, ant, 1)
+        begin_to_learn(c, v, ant)
 
 
 @ti.func
 def memory_of(c: ti.template(), v: ti.template(), owner):
-    """Return the start of the tables and of the memory of a slot, or of a world and nest."""
+    """Return the start of the tables and of the memory of a slot, or of a world and group."""
     return At(steps.table_of(c, v, owner), owner * c.floats_by_8 * 8, owner * c.integers_by_8 * 8)
 
 
 @ti.func
-def rates_of(c: ti.template(), v: ti.template()):
+def rates_of(c: ti.template(), v: ti.template(), caste):
     """Return learning rate, discount, epsilon and the hyperparameters of the learner."""
-    return v.read_rates(c.weights[1], c.discount, c.epsilon, c.hyperparameters, 0)
+    learning_rate, discount, epsilon = c.weights[1], c.discount, c.epsilon
+    if ti.static(v.n_castes > 0):
+        learning_rate = own_number(c, caste, ti.static(CasteRow.LEARNING_RATE), learning_rate)
+        discount = own_number(c, caste, ti.static(CasteRow.DISCOUNT), discount)
+        epsilon = own_number(c, caste, ti.static(CasteRow.EPSILON), epsilon)
+    return v.read_rates(learning_rate, discount, epsilon, c.hyperparameters, 0)
+
+
+@ti.func
+def own_number(c: ti.template(), caste, row: ti.template(), usual):
+    """Return a number of a caste as f32, or `usual` if it has none."""
+    own = c.castes[row, caste]
+    return ti.select(own >= 0.0, ti.cast(own, ti.f32), usual)
+
+
+@ti.func
+def caste_of(c: ti.template(), v: ti.template(), ant):
+    """Return the caste of an ant, 0 without castes."""
+    caste = 0
+    if ti.static(v.n_castes > 0):
+        caste = columns.trait(c.caste, ant)
+    return caste
 
 
 @ti.func
@@ -111,15 +175,16 @@ def forget(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick):
-    """Update the ant's own table, as if it were alone."""
+def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick, stops):
+    """Update the ant's own table, as if it were alone; its episode ends if it `stops`."""
     memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
-    event = steps.trait(c.event, ant)
-    last = ti.cast((steps.trait(c.stage, ant) == Stage.DYING) | (tick + 1 == c.length), ti.i32)
+    event = columns.trait(c.event, ant)
+    dies = columns.trait(c.stage, ant) == Stage.DYING
+    last = ti.cast(dies | (tick + 1 == c.length) | stops, ti.i32)
     terminated, truncated = step_end(event, c.delivery_terminates, c.ends_at_delivery, last)
     step = Transition(
         state=steps.state_index_of(c, v, ant),
-        action=steps.trait(c.action, ant),
+        action=columns.trait(c.action, ant),
         reward=ti.cast(steps.reward_of(c, v, ant), ti.f32),
         next_state=seen,
         next_action=next_action,
@@ -127,7 +192,7 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
         truncated=truncated,
     )
     _, c.streams[ant] = v.learner.learn(
-        memory, memory_of(c, v, ant), step, rates_of(c, v), c.streams[ant]
+        memory, memory_of(c, v, ant), step, rates_of(c, v, caste_of(c, v, ant)), c.streams[ant]
     )
 
 
@@ -135,16 +200,16 @@ def learn_alone(c: ti.template(), v: ti.template(), ant, seen, next_action, tick
 def error_of(
     c: ti.template(), v: ti.template(), w, pair, reward, terminated, seen, next_action
 ):  # fmt: skip
-    """Return the TD error of a pair by the table of its nest; see `place_in_tables`."""
-    table = steps.table_of(c, v, w * v.n_nests + nest_of_pair(v, pair))
-    value = place_in_tables(c, v, w, pair)
+    """Return the TD error of a pair by the table of its group; see `place_in_tables`."""
+    table = steps.table_of(c, v, w * v.n_groups + group_of_pair(v, pair))
+    value, rates = place_in_tables(c, v, w, pair), rates_of(c, v, caste_of_pair(v, pair))
     error = v.td_error(
         c.q[value],
         reward,
-        discount_of(rates_of(c, v), terminated),
+        discount_of(rates, terminated),
         values_of(c.q, table, seen),
         next_action,
-        c.epsilon,
+        rates.epsilon,
     )
     if not ti.abs(error) < c.largest_error:
         c.q[value] = ti.math.nan  # a fixed-point sum would hide such an error
@@ -152,29 +217,35 @@ def error_of(
 
 
 @ti.func
-def nest_of_pair(v: ti.template(), pair):
-    """Return the nest of a pair, whose number is its place in the tables of all nests in turn."""
-    nest = 0
-    if ti.static(v.n_nests > 1):
-        nest = pair // v.n_numbers
-    return nest
+def group_of_pair(v: ti.template(), pair):
+    """Return the group of a pair, whose number is its place in the tables of all groups in turn."""
+    group = 0
+    if ti.static(v.n_groups > 1):
+        group = pair // v.n_numbers
+    return group
+
+
+@ti.func
+def caste_of_pair(v: ti.template(), pair):
+    """Return the caste of the ants that learn about a pair, 0 without castes."""
+    return group_of_pair(v, pair) % ti.static(max(1, v.n_castes))
 
 
 @ti.func
 def place_in_tables(c: ti.template(), v: ti.template(), w, pair):
     """Return the index in `q` of the value of a pair of a world."""
-    nest = nest_of_pair(v, pair)
-    return steps.table_of(c, v, w * v.n_nests + nest) + pair - nest * v.n_numbers
+    group = group_of_pair(v, pair)
+    return steps.table_of(c, v, w * v.n_groups + group) + pair - group * v.n_numbers
 
 
 @ti.func
 def share_error(c: ti.template(), v: ti.template(), w, chunk, ant, seen, next_action):
     """Add the TD error and the transition of an ant to the sums of its chunk."""
-    event = steps.trait(c.event, ant)
+    event = columns.trait(c.event, ant)
     reward = ti.cast(steps.reward_of(c, v, ant), ti.f32)
     terminated = terminates(event, c.delivery_terminates)
-    pair = steps.state_index_of(c, v, ant) * ROW + steps.trait(c.action, ant)
-    pair += steps.nest_of(c, v, ant) * v.n_numbers
+    pair = steps.state_index_of(c, v, ant) * ROW + columns.trait(c.action, ant)
+    pair += columns.group_of(c, v, ant) * v.n_numbers
     error = error_of(c, v, w, pair, reward, terminated, seen, next_action)
     add_to_sums(c, v, chunk, pair, error, fixed(error), 1)
     if ti.static(v.learner.plans):
@@ -198,14 +269,17 @@ def list_of(v: ti.template(), chunk):
 def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, count):
     """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
     place, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
-    known = c.sums_of[SumRow.COUNT, place]
-    if known == 0:
-        c.touched[listed] = c.touched[listed] + 1
-        c.touched[listed + c.touched[listed]] = pair
-        c.sums[place] = 0
-        c.sums_of[SumRow.LATEST, place] = -1
+    known, n = c.sums_of[SumRow.COUNT, place], c.touched[listed]
+    summed = c.sums[place]
+    # Without a branch: a new pair stays in the list, others leave their place to the next one.
+    # There is room, because a table has pairs that do not exist, see `ROW`.
+    c.touched[listed + 1 + n] = pair
+    c.touched[listed] = n + ti.cast(known == 0, ti.i32)
+    if ti.static(v.learner.plans):
+        if known == 0:
+            c.sums_of[SumRow.LATEST, place] = -1
     c.sums_of[SumRow.COUNT, place] = known + count
-    c.sums[place] = c.sums[place] + total
+    c.sums[place] = summed + total
     c.errors[place] = error
 
 
@@ -237,12 +311,13 @@ def join_sums(c: ti.template(), v: ti.template(), w):
             place = v.n_pairs * chunk + pair
             count = c.sums_of[SumRow.COUNT, place]
             add_to_sums(c, v, first, pair, c.errors[place], c.sums[place], count)
-            latest, transition = (
-                c.sums_of[SumRow.LATEST, place],
-                c.sums_of[SumRow.TRANSITION, place],
-            )
-            note_transition(c, v.n_pairs * first + pair, latest, transition)
-            c.sums_of[SumRow.COUNT, place] = 0
+            if ti.static(v.learner.plans):
+                latest, transition = (
+                    c.sums_of[SumRow.LATEST, place],
+                    c.sums_of[SumRow.TRANSITION, place],
+                )
+                note_transition(c, v.n_pairs * first + pair, latest, transition)
+            c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
         c.touched[listed] = 0
 
 
@@ -263,9 +338,9 @@ def remember_shared(c: ti.template(), v: ti.template(), w):
     for i in range(1, n + 1):
         pair = c.touched[listed + i]
         transition = c.sums_of[SumRow.TRANSITION, v.n_pairs * chunk + pair]
-        nest = nest_of_pair(v, pair)
-        at = memory_of(c, v, w * v.n_nests + nest)
-        model.remember(memory, at, pair - nest * v.n_numbers, transition)
+        group = group_of_pair(v, pair)
+        at = memory_of(c, v, w * v.n_groups + group)
+        model.remember(memory, at, pair - group * v.n_numbers, transition)
 
 
 @ti.func
@@ -278,24 +353,37 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
         place = v.n_pairs * chunk + pair
         count = c.sums_of[SumRow.COUNT, place]
         error, value = c.errors[place], place_in_tables(c, v, w, pair)
-        rate = c.weights[ti.min(count, c.weights.shape[0] - 1)]  # the last is for more errors
-        if count > 1:
-            mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
-            error = ti.cast(mean, ti.f32)
+        rate = weight_of(c, v, pair, count)
+        mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
+        error = ti.select(count > 1, ti.cast(mean, ti.f32), error)
         c.q[value] = c.q[value] + rate * error
-        c.sums_of[SumRow.COUNT, place] = 0
+        c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
     c.touched[listed] = 0
+
+
+@ti.func
+def weight_of(c: ti.template(), v: ti.template(), pair, count):
+    """Return the weight of the mean of some errors in an update of a pair; see `update_weights`."""
+    weight = c.weights[ti.min(count, c.weights.shape[0] - 1)]  # the last is for more errors
+    if ti.static(v.n_castes > 0):
+        caste = caste_of_pair(v, pair)
+        if c.castes[CasteRow.LEARNING_RATE, caste] >= 0.0:
+            weight = c.caste_weights[caste, ti.min(count, c.caste_weights.shape[1] - 1)]
+    return weight
 
 
 @ti.func
 def draw_pair(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Draw a visited pair for a planning update of an ant."""
-    if steps.trait(c.stage, ant) != Stage.NEWBORN:
+    acted = columns.trait(c.stage, ant) != Stage.NEWBORN
+    if ti.static(v.has_labour):
+        acted = acted & (columns.trait(c.event, ant) != Event.NONE)
+    if acted & learns(c, v, ant):
         memory = ti.static(LearnerArrays(c.q, c.floats, c.integers, v.observation.n_states))
         at = memory_of(c, v, steps.owner_of(c, v, w, ant))
         drawn, c.streams[ant] = draw_below(c.streams[ant], model.visited(memory, at))
         pair, transition = model.recall(memory, at, drawn)
-        pair += steps.nest_of(c, v, ant) * v.n_numbers
+        pair += columns.group_of(c, v, ant) * v.n_numbers
         add_to_sums(c, v, chunk, pair, 0.0, ti.cast(0, ti.i64), 1)
         note_transition(c, v.n_pairs * chunk + pair, 0, transition)
 

@@ -7,12 +7,15 @@ serially, because they have little to do in a tick.
 import taichi as ti
 from taichi.math import popcnt
 
+from taichi_ants.engines.colony import labour
+from taichi_ants.engines.colony.columns import of_caste, put, trait
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
     NESTS_BY_KINDS,
     TALLY_WIDTH,
     TOTALS,
+    CasteRow,
     FoodRow,
     FoodSourceRow,
     NestRow,
@@ -21,19 +24,11 @@ from taichi_ants.engines.colony.layout import (
     WorldRow,
 )
 from taichi_ants.engines.colony.learning import forget
-from taichi_ants.engines.colony.steps import put, tally, trait
+from taichi_ants.engines.colony.steps import tally
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN
 from taichi_ants.task.rules.policy import bit_number
-from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
-
-
-@ti.func
-def stream_of(seed, purpose, number):
-    """Return the first state of a random stream, see `randomness.stream_state`."""
-    h = bits_of(advance(seed))
-    h = bits_of(advance(h ^ ti.cast(purpose, ti.u64)))
-    return bits_of(advance(h ^ number))
+from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below, high_word, stream_of
 
 
 @ti.func
@@ -55,6 +50,10 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         count_by_nest(c, v, w)
     else:
         c.nests[NestRow.STORE, w] += gives * c.births
+        if ti.static(v.has_labour):
+            labour.relieve(c, w, gives)
+    if ti.static(v.n_castes > 0):
+        count_by_caste(c, v, w)
     if gives > 0 and c.worlds[WorldRow.FIRST_DELIVERY, w] < 0:
         c.worlds[WorldRow.FIRST_DELIVERY, w] = tick + 1
 
@@ -69,6 +68,17 @@ def count_by_nest(c: ti.template(), v: ti.template(), w):
             c.delivered[chunk * NESTS_BY_KINDS + i] = 0
         c.deliveries_apart[w * (v.n_nests * v.n_kinds) + i] += n
         c.nests[NestRow.STORE, w * v.n_nests + ti.static(i // v.n_kinds)] += n * c.births
+        if ti.static(v.has_labour):
+            labour.relieve(c, w * v.n_nests + ti.static(i // v.n_kinds), n)
+
+
+@ti.func
+def count_by_caste(c: ti.template(), v: ti.template(), w):
+    """Add the deliveries of all chunks by caste to those of a world, and reset them."""
+    for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
+        for i in range(v.n_castes):
+            c.caste_deliveries[w * v.n_castes + i] += c.delivered_by_caste[chunk * MAX_CASTES + i]
+            c.delivered_by_caste[chunk * MAX_CASTES + i] = 0
 
 
 @ti.func
@@ -106,11 +116,26 @@ def give_birth_in(c: ti.template(), v: ti.template(), w, nest):
             slot += 1
         c.worlds[WorldRow.FIRST_VACANT, w] = slot + 1
         c.worlds[WorldRow.TOP, w] = ti.max(c.worlds[WorldRow.TOP, w], slot + 1)
+        if ti.static(v.n_castes > 0):
+            put(c.caste, w * c.n_slots + slot, draw_caste(c, v, w, nest))
         place_newborn(c, v, w, nest, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
         if ti.static(v.alone):
             forget(c, v, w * c.n_slots + slot)
         c.nests[NestRow.STORE, column] -= 1
         free = free_around(c, base, queen)
+
+
+@ti.func
+def draw_caste(c: ti.template(), v: ti.template(), w, nest):
+    """Return the caste of a newborn ant of a nest, drawn from the queen's stream if needed."""
+    caste = 0
+    if ti.static(v.n_castes > 1):
+        c.queen_streams[w] = advance(c.queen_streams[w])
+        word = ti.cast(high_word(bits_of(c.queen_streams[w])), ti.f64) / 4294967296.0
+        for i in ti.static(range(v.n_castes - 1)):
+            bound = c.caste_chances[(w * v.n_nests + nest) * v.n_castes + i]
+            caste += ti.cast(bound <= word, ti.i32)
+    return caste
 
 
 @ti.func
@@ -133,6 +158,8 @@ def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, headin
     if ti.static(v.n_nests > 1):
         put(c.nest, ant, nest)
         ground = OBSTACLE | (ANT_STANDS - nest) << 4
+    if ti.static(v.has_labour):
+        labour.begin(c, v, w, ant)
     c.ground[w * c.size + cell] = ti.cast(ground, ti.u8)
     c.worlds[WorldRow.NEXT_NUMBER, w] = number + 1
     c.worlds[WorldRow.LIVING, w] += 1
@@ -142,9 +169,12 @@ def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, headin
 @ti.func
 def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Age an ant by one tick; if it reaches its lifespan, empty its cell, or leave its food."""
-    if c.lifespan > 0 and trait(c.stage, ant) == Stage.LIVING:
+    lifespan = c.lifespan
+    if ti.static(v.n_castes > 0):
+        lifespan = ti.cast(of_caste(c, ant, CasteRow.LIFESPAN), ti.i32)
+    if lifespan > 0 and trait(c.stage, ant) == Stage.LIVING:
         c.age[ant] = c.age[ant] + 1
-        if c.age[ant] >= c.lifespan:
+        if c.age[ant] >= lifespan:
             put(c.stage, ant, Stage.DYING)
             tally(c, Tally.DEATHS, chunk, 1)
             left_behind = ti.select(trait(c.carries, ant) == 1, FOOD, EMPTY)
@@ -271,6 +301,8 @@ def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def end_tick(c: ti.template(), v: ti.template(), w, tick):
     """Count the tick, and end the episode of a world at a delivery if `c.ends_at_delivery`."""
+    if ti.static(v.has_labour):
+        labour.demand(c, v, w)
     c.worlds[WorldRow.TICKS, w] = tick + 1
     if c.ends_at_delivery == 1 and c.worlds[WorldRow.DELIVERIES, w] > 0:
         c.worlds[WorldRow.RUNNING, w] = 0

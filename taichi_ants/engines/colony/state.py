@@ -17,10 +17,12 @@ from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     BYTE_COLUMNS,
+    FLOAT_COLUMNS,
     INTEGER_COLUMNS,
     NESTS_BY_KINDS,
     TALLY_WIDTH,
     TOTALS,
+    CasteRow,
     FoodRow,
     NestRow,
     Order,
@@ -48,7 +50,8 @@ from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.task import Pheromone, Task
-from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, ROW
+from taichi_ants.task.caste import chances_in, numbers_in
+from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import Start, World
@@ -66,7 +69,7 @@ _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
 _UNKNOWN = ("number", "action", "executed", "next_action")  # columns that are -1 at first
 
-_KIND = Kind("colony", 12, "Colony.save")
+_KIND = Kind("colony", 13, "Colony.save")
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
@@ -94,6 +97,7 @@ class ColonyState:
         food_changes: Whether food grows back or wanders.
         n_nests: The number of nests in each world.
         n_kinds: The number of kinds of food in the task, at least 1.
+        n_groups: The number of groups of ants with a shared table: nests, by castes if there are.
         memory: The size of the learner's memory for each table.
         pheromone: The pheromone of the task, with or without evaporation.
         fields: The further pheromones of the task by name, with or without evaporation.
@@ -139,7 +143,8 @@ class ColonyState:
                 'sharing="frozen" and without q_values.'
             )
         (self.training,) = checks.checked_configs(training)
-        if not self.learns and q_values is None and self.has_training:
+        follows = bool(self.task.castes) and all(one.policy for one in self.task.castes.values())
+        if not self.learns and q_values is None and self.has_training and not follows:
             raise AntsError(
                 "sharing is 'frozen', but q_values is None; give the action values that the ants "
                 "follow, because they do not learn."
@@ -147,6 +152,7 @@ class ColonyState:
         if self.learner:
             checks.check_sharing(self.learner, sharing)
             checks.check_choice(self.learner, self.task)
+        checks.check_castes(self.task, sharing, self.is_given_actions)
         table = None if q_values is None else checks.checked_q_values(q_values, self.task)
         self.seeds = checks.checked_seeds(seeds)
         running = runtime.start(threads, arch)
@@ -160,9 +166,11 @@ class ColonyState:
             not self.learns
             and table is not None
             and table.ndim == 4
+            and not self.task.castes
             and (worlds[0].n_nests == 1 or table.shape[1] != worlds[0].n_nests)
         )
         self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(self.task.foods))
+        self.n_groups = self.n_nests * max(1, len(self.task.castes))
         self.take_task(self.task)
         self.memory = Memory()
         if self.learner and (self.one_a_slot or self.plans_together):
@@ -180,7 +188,8 @@ class ColonyState:
         life = task.life
         self.task, self.pheromone = task, task.pheromone_while(self.learns)
         self.fields = task.fields_while(self.learns)
-        self.ants_change = life.births or life.lifespan is not None
+        spans = [life.lifespan, *(caste.lifespan for caste in task.castes.values())]
+        self.ants_change = life.births or any(span is not None for span in spans)
         self.food_changes = task.food_changes
 
     @property
@@ -276,18 +285,25 @@ class ColonyState:
     def q_values(self) -> np.ndarray:
         """The action values, float32 (W, n_states, 5); a copy.
 
-        With a table for each slot (W, slots, n_states, 5), and with several nests that share tables
-        (W, nests, n_states, 5).
+        With a table for each slot (W, slots, n_states, 5). If several nests or castes share tables,
+        they have axes after W: (W, nests, castes, n_states, 5).
         """
-        n = self.owners
-        tables = self.arrays["q"].reshape(len(self.seeds), n, -1, self.task.n_states, ROW)
-        tables = tables[:, :, 0, :, :N_ACTIONS]
-        return (tables if self.one_a_slot or n > 1 else tables[:, 0]).copy()
+        tables = self.arrays["q"].reshape(
+            len(self.seeds), self.owners, -1, self.task.n_states, ROW
+        )[:, :, 0, :, :N_ACTIONS]
+        shape = len(self.seeds), *self._owner_axes, self.task.n_states, N_ACTIONS
+        return tables.reshape(shape).copy()
+
+    @property
+    def _owner_axes(self) -> tuple[int, ...]:
+        """The axes of the tables of a world: of slots, or of several nests and castes."""
+        axes = (self.n_nests, self.n_groups // self.n_nests)
+        return (self.capacity,) if self.one_a_slot else tuple(n for n in axes if n > 1)
 
     @property
     def owners(self) -> int:
-        """The number of tables in each world: one for each slot, or for each nest."""
-        return self.capacity if self.one_a_slot else self.n_nests
+        """The number of tables in each world: one for each slot, or for each nest and caste."""
+        return self.capacity if self.one_a_slot else self.n_groups
 
     @property
     def nests(self) -> np.ndarray:
@@ -297,8 +313,38 @@ class ColonyState:
         return self.arrays["nest"].reshape(len(self.seeds), -1).astype(np.int32)
 
     @property
+    def castes(self) -> np.ndarray:
+        """The caste of the last ant in each slot, int32 (W, capacity); 0 without castes."""
+        return self._column_or_zeros("caste", np.int32)
+
+    @property
+    def idle(self) -> np.ndarray:
+        """Whether the last ant in each slot is idle, see `Labour`, bool (W, capacity)."""
+        return self._column_or_zeros("idle", bool)
+
+    @property
+    def thresholds(self) -> np.ndarray:
+        """The response threshold of the last ant in each slot, float32 (W, capacity); or 0."""
+        return self._column_or_zeros("threshold", np.float32)
+
+    @property
+    def stimuli(self) -> np.ndarray:
+        """The present stimulus of each nest, float64 (W, nests); 0 unless labour is divided."""
+        stimuli = self.arrays.get("stimulus", np.zeros(len(self.seeds) * self.n_nests))
+        return stimuli.reshape(len(self.seeds), -1).copy()
+
+    def _column_or_zeros(self, name: str, dtype: Any) -> np.ndarray:
+        """Return a copy of a column (W, capacity), of zeros if this colony does not need it."""
+        shape = len(self.seeds), self.capacity
+        if name not in self.arrays:
+            return np.zeros(shape, dtype)
+        return self.arrays[name].reshape(shape).astype(dtype)
+
+    @property
     def rewards(self) -> np.ndarray:
         """The reward of the last action of the ant in each slot, int32 (W, capacity)."""
+        if "reward" in self.arrays:
+            return self.arrays["reward"].reshape(self.events.shape).copy()
         rewards = self.task.rewards.by_event()[self.events]
         if self.task.foods:
             kinds = self.arrays["kind"].reshape(rewards.shape) if self.n_kinds > 1 else 0
@@ -315,7 +361,12 @@ class ColonyState:
         else:
             apart = self.arrays["deliveries_apart"]
         apart = apart.reshape(-1, self.n_nests, self.n_kinds)
-        every = {**self._counts(), "deliveries_apart": apart}
+        by_caste = self.arrays.get("caste_deliveries", self.deliveries.astype(np.int32))
+        every = {
+            **self._counts(),
+            "deliveries_apart": apart,
+            "caste_deliveries": by_caste.reshape(len(self.seeds), -1),
+        }
         counts: dict[str, Any] = {name: one[None].copy() for name, one in every.items()}
         return ColonyEpisodes(**counts, seeds=self.seeds)
 
@@ -337,6 +388,11 @@ class ColonyState:
         carries = self.carrying[world, living]
         carried = self.arrays["carried"].reshape(self.cells.shape)[world, living]
         fields = {name: self._levels(world, name) for name in (TRAIL, *self.fields)}
+        of_ants, of_cells = np.zeros(len(ant_cells), np.int32), np.zeros(self.grid.size, np.uint8)
+        if self.n_kinds > 1:
+            of_ants = self.arrays["kind"].reshape(self.cells.shape)[world, living].astype(np.int32)
+            of_cells = np.where(ground == FOOD, self.arrays["kind_of"][cells], np.uint8(0))
+        queens = self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)[world]
         return Snapshot(
             self.grid,
             ground,
@@ -348,6 +404,13 @@ class ColonyState:
             ant_numbers=self.numbers[world, living],
             ant_actions=self.actions[world, living].astype(np.int32),
             ant_events=self.events[world, living].astype(np.int32),
+            ant_nests=self.nests[world, living],
+            ant_foods=np.where(carries, of_ants, np.int32(-1)),
+            food_kinds=of_cells,
+            queens=queens.astype(np.int32),
+            ant_castes=self.castes[world, living],
+            ant_idle=self.idle[world, living],
+            ant_thresholds=self.thresholds[world, living],
             fields=fields,
             counts={name: int(array[world]) for name, array in self._counts().items()},
             world=self.worlds[world],
@@ -443,6 +506,10 @@ class ColonyState:
         self.take_task(task)
         self.arrays["rewards"][:] = task.rewards.by_event()
         self.arrays["choice"][:] = task.choice.numbers()
+        self.arrays["food_numbers"][:] = _food_numbers(task)
+        self.arrays |= self._caste_constants()
+        for name, numbers in _rule_numbers(task).items():
+            self.arrays[name][:] = numbers
 
     def reseed(self, which: np.ndarray, seeds: Sequence[int]) -> None:
         """Set new seeds for some worlds, bool (W,), as if they had had no episodes."""
@@ -493,7 +560,7 @@ class ColonyState:
 
     def columns(self) -> tuple[str, ...]:
         """Return the names of the arrays with one entry for each slot."""
-        of_ants = (*INTEGER_COLUMNS, *BYTE_COLUMNS)
+        of_ants = (*INTEGER_COLUMNS, *BYTE_COLUMNS, *FLOAT_COLUMNS)
         return (*(name for name in of_ants if name in self.arrays), "streams")
 
     # Arrays
@@ -523,6 +590,7 @@ class ColonyState:
             # The start cells and headings of ants, by world and number.
             "start_cells": cells,
             "start_headings": np.array([headings for _, headings in starts], np.int8),
+            "start_castes": self._castes_at_start(nests).astype(np.int8),
             "start_nests": nests[:, : n * (self.n_nests > 1)].astype(np.int8),
             # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
@@ -538,6 +606,7 @@ class ColonyState:
             "worlds": rows,
             "nests": of_nests,
             **self._foods_at_start(ground),
+            **self._groups_at_start(),
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, self.n_food_sources, self.grid.size),
@@ -558,6 +627,27 @@ class ColonyState:
             "deliveries_apart": np.zeros(apart, np.int32),
         }
 
+    def _castes_at_start(self, nests: np.ndarray) -> np.ndarray:
+        """Return the castes of ants by number (W, ants), from their nests; empty without castes."""
+        if not self.task.castes:
+            return nests[:, :0]
+        castes = np.zeros_like(nests)
+        for w, nest in np.ndindex(len(nests), self.n_nests):
+            ours = nests[w] == nest
+            numbers = numbers_in(self.task.castes, nest, int(ours.sum()))
+            castes[w, ours] = np.repeat(np.arange(len(numbers)), numbers)
+        return castes
+
+    def _groups_at_start(self) -> Arrays:
+        """Return the deliveries by caste and the stimulus of each nest, if the task needs them."""
+        n_worlds = len(self.worlds)
+        arrays: Arrays = {}
+        if self.task.castes:
+            arrays["caste_deliveries"] = np.zeros(n_worlds * len(self.task.castes), np.int32)
+        if self.task.labour.divides:
+            arrays["stimulus"] = np.zeros(n_worlds * self.n_nests)
+        return arrays
+
     def _of_episode(self) -> Arrays:
         """Return the arrays that change in an episode, at its start."""
         n_worlds, dense = len(self.worlds), self.pheromone.dense
@@ -574,6 +664,12 @@ class ColonyState:
             unused.add("nest")
         if self.n_kinds == 1:
             unused.add("kind")
+        if not self.task.castes:
+            unused.add("caste")
+        if not self.task.labour.divides:
+            unused |= {"idle", "threshold"}
+        if self.task.reward == "by_event":
+            unused.add("reward")
         made = {
             **{name: array.copy() for name, array in self._at_start().items()},
             "trail": np.zeros(1 if dense else cells, np.int32),
@@ -585,7 +681,10 @@ class ColonyState:
                 for number, field in enumerate(self.fields.values(), start=1)
             },
         }
-        for names, dtype in ((INTEGER_COLUMNS, np.int32), (BYTE_COLUMNS, np.int8)):
+        kinds: tuple[tuple[tuple[str, ...], type], ...] = (
+            *((INTEGER_COLUMNS, np.int32), (BYTE_COLUMNS, np.int8), (FLOAT_COLUMNS, np.float32)),
+        )
+        for names, dtype in kinds:
             used = [name for name in names if name not in unused]
             # One allocation, because columns at equal offsets in pages slow each other down.
             made |= zip(used, np.zeros((len(used), slots), dtype), strict=True)
@@ -602,7 +701,7 @@ class ColonyState:
         shape = len(self.worlds), self.capacity
         column = {
             name: arrays[name].reshape(shape)
-            for name in (*INTEGER_COLUMNS, *BYTE_COLUMNS)
+            for name in (*INTEGER_COLUMNS, *BYTE_COLUMNS, *FLOAT_COLUMNS)
             if name in arrays
         }
         for name, array in column.items():
@@ -612,6 +711,8 @@ class ColonyState:
         column["heading"][which, :n] = self.at_start["start_headings"][which]
         if "nest" in column:
             column["nest"][which, :n] = self.at_start["start_nests"][which]
+        if "caste" in column:
+            column["caste"][which, :n] = self.at_start["start_castes"][which]
         column["number"][which, :n] = np.arange(n)
         column["stage"][which, :n] = Stage.LIVING
 
@@ -655,20 +756,25 @@ class ColonyState:
         q[..., :N_ACTIONS] = self.training.initial_q
         if q_values is not None:
             leading, form = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}"
-            if leading not in ((), (n_worlds,)) and not (own and leading == (n_worlds, slots)):
+            axes = (n_worlds, *self._owner_axes)
+            if leading not in ((), (n_worlds,)) and not (own and leading == axes):
                 raise AntsError(
                     f"q_values has shape {q_values.shape}; give ({form}), ({n_worlds}, {form}) for "
-                    f"one table per world, or ({n_worlds}, {slots}, {form}) for one table per slot "
-                    "or nest."
+                    f"one table per world, or ({', '.join(map(str, axes))}, {form}) for one table "
+                    "per slot, or per nest and caste."
                 )
-            given = q_values.reshape(*leading, *[1] * (2 - len(leading)), 1, n_states, N_ACTIONS)
+            n_given = [] if not leading else [n_worlds, slots if leading == axes and own else 1]
+            given = q_values.reshape(*n_given, 1, n_states, N_ACTIONS)
             q[..., :N_ACTIONS] = given
+        for number, table in checks.caste_policies(self.task).items():
+            of_groups = q.reshape(n_worlds, self.n_nests, -1, *q.shape[2:])
+            of_groups[:, :, number, 0, :, :N_ACTIONS] = table
         return q.reshape(-1)
 
     def _constants(self) -> Arrays:
         """Return constants of worlds and settings, and scratch arrays of a tick."""
         chunks = len(self.seeds) * self.chunks
-        tables = self.n_nests if self.sharing == "shared" else 0
+        tables = self.n_groups if self.sharing == "shared" else 0
         pairs = self.task.n_states * ROW * tables
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
@@ -678,6 +784,8 @@ class ColonyState:
             "rewards": self.task.rewards.by_event(),
             "choice": self.task.choice.numbers(),
             "food_numbers": _food_numbers(self.task),
+            **self._caste_constants(),
+            **_rule_numbers(self.task),
             "hyperparameters": np.array([*dict(self.training.hyperparameters).values(), 0.0]),
             # By n: the weight of the mean of n errors in an update; see `set_learning_rate`.
             "weights": np.zeros(2, np.float32),
@@ -699,6 +807,34 @@ class ColonyState:
             "sums_of": np.zeros((len(SumRow), sums), np.int32),
             # By chunk: the number of pairs with updates, then these pairs.
             "touched": np.zeros(chunks * (pairs + 1), np.int32),
+        }
+
+    def _caste_constants(self) -> Arrays:
+        """Return the numbers of castes and of labour; nothing without castes."""
+        task = self.task
+        arrays: Arrays = {}
+        if task.labour.divides:
+            arrays["labour"] = np.array(task.labour.numbers)
+        if not task.castes:
+            return arrays
+        most = self.capacity if self.sharing == "shared" else 1
+        weights = [update_weights(one.learning_rate or 0.0, most) for one in task.castes.values()]
+        longest = max(map(len, weights))
+        nests = self.at_start["start_nests"] if self.n_nests > 1 else None
+        chances = []
+        for w, nest in np.ndindex(len(self.seeds), self.n_nests):
+            n = self.ants if nests is None else int(np.count_nonzero(nests[w] == nest))
+            chances.append(np.cumsum(chances_in(task.castes, nest, n)))
+        return {
+            **arrays,
+            "castes": _caste_numbers(task, self.training.discount),
+            # By caste and n, see `update_weights`; unused without an own learning rate.
+            "caste_weights": np.stack(
+                [np.pad(one, (0, longest - len(one)), mode="edge") for one in weights]
+            ),
+            # By world, nest and caste: cumulative probabilities of the castes of newborn ants.
+            "caste_chances": np.concatenate(chances),
+            "delivered_by_caste": np.zeros(len(self.seeds) * self.chunks * MAX_CASTES, np.int32),
         }
 
     def _ground_constants(self) -> Arrays:
@@ -775,7 +911,10 @@ class ColonyState:
                 # Tables of the right shape, which the arrays of the file replace.
                 leading = (len(facts["seeds"]), facts["capacity"]) if facts["one_a_slot"] else ()
                 options["q_values"] = np.zeros((*leading, task.n_states, N_ACTIONS), np.float32)
-            colony = cls([worlds[w] for w in facts["world_of"]], task, training, **options)
+            # Policies of castes are in the arrays of the file; theirs may no longer exist.
+            known = task.with_policies("random")
+            colony = cls([worlds[w] for w in facts["world_of"]], known, training, **options)
+            colony.take_task(task)
             colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
             colony.set_learning_rate(checks.checked_share("learning_rate", facts["learning_rate"]))
             colony.length = checked_whole("length", facts["length"], least=0)
@@ -814,6 +953,36 @@ def _food_numbers(task: Task) -> np.ndarray:
     for k, food in enumerate(kinds):
         grows = -1 if food.regrowth is None else food.regrowth
         numbers[:, k] = food.pick_up, food.deliver, food.loads, grows
+    return numbers
+
+
+def _rule_numbers(task: Task) -> Arrays:
+    """Return the parameters of your own rules, float64 (parameters,); nothing without rules."""
+    numbers = [value for one in task.rules.values() for value in vars(one).values()]
+    return {"rule_numbers": np.array([*numbers, 0.0], np.float64)} if task.rules else {}
+
+
+def _caste_numbers(task: Task, discount: float) -> np.ndarray:
+    """Return the numbers of the castes, float64 (CasteRow, castes)."""
+    choice, life, labour = task.choice, task.life, task.labour
+    pheromones, cues = (TRAIL, *task.fields), task.all_cues
+    numbers = np.zeros((len(CasteRow), len(task.castes)))
+    for k, one in enumerate(task.castes.values()):
+        lifespan = life.lifespan if one.lifespan is None else one.lifespan
+        usual = choice.numbers()
+        own = (one.temperature, one.k, one.exponent)
+        numbers[:, k] = (
+            -1.0 if one.epsilon is None else one.epsilon,
+            -1.0 if one.learning_rate is None else one.learning_rate,
+            discount if one.discount is None else one.discount,
+            *(usual[i] if own[i] is None else own[i] for i in range(3)),
+            one.policy is None,
+            sum(1 << pheromones.index(name) for name in set(one.laid(pheromones))),
+            cues.index(task.cues_of(one)),
+            -1 if lifespan is None else lifespan,
+            (labour.quit or 0.0) * one.threshold.exists,
+            *one.threshold.numbers,
+        )
     return numbers
 
 

@@ -1,8 +1,9 @@
 """Observations and actions of the ants of a colony in a tick, phase by phase; see `rules`.
 
-In a tick, an ant draws from its random stream in this order, and only what applies: its action,
-unless that was drawn in the last tick or is given; whether the action slips; the choice among
-several food items. Then, when it observes: whether it misreads each cell in view, in the order of
+In a tick, an ant draws from its random stream in this order, and only what applies: if it is idle,
+whether it starts foraging; its action, unless that was drawn in the last tick or is given; whether
+the action slips; the choice among several food items. Then whether it becomes idle, see `labour`.
+Then, when it observes: whether it misreads each cell in view, in the order of
 the observation's cells. Then its next action, if its learner draws ahead; and draws of the learner.
 
 Each ant writes a mark of what it wants into `wants` at its own cell, see `rules.conflicts`. The
@@ -16,11 +17,14 @@ from typing import Any
 import taichi as ti
 from taichi.math import popcnt
 
+from taichi_ants.engines.colony import labour
+from taichi_ants.engines.colony.columns import group_of, nest_of, of_caste, put, trait
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
     NESTS_BY_KINDS,
     TALLY_WIDTH,
+    CasteRow,
     FoodRow,
     FoodSourceRow,
     NestRow,
@@ -41,7 +45,9 @@ from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import (
     EMPTY,
     FORWARD,
+    GIVE,
     LEFT,
+    MAX_CASTES,
     OBSTACLE,
     PICK_UP,
     QUEEN,
@@ -69,17 +75,7 @@ from taichi_ants.task.rules.policy import (
 )
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 
-
-@ti.func
-def trait(column: ti.template(), ant):
-    """Return a value of an ant from a byte column, as i32."""
-    return ti.cast(column[ant], ti.i32)
-
-
-@ti.func
-def put(column: ti.template(), ant, value):
-    """Set a value of an ant in a byte column."""
-    column[ant] = ti.cast(value, ti.i8)
+MOVES = 1 << LEFT | 1 << FORWARD | 1 << RIGHT  # a bit for each action that moves an ant
 
 
 @ti.func
@@ -95,24 +91,43 @@ def state_index_of(c: ti.template(), v: ti.template(), ant):
 def observe(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the percept and the state index of an ant, which may misread cells."""
     percept, state = 0, 0
-    if ti.static(v.is_papers):
-        percept = see(c, v, w, ant, tick)
-        state = percept
-        if ti.static(v.misreads):
-            state, c.streams[ant] = noise.misread_percept(percept, c.streams[ant], c.misread_below)
+    if ti.static(len(v.cues) == 1):
+        percept, state = observe_by(c, v, ti.static(v.cues[0]), w, ant, tick)
     else:
-        view = view_around(c, v, w, ant, tick)
-        percept = view.percept
-        if ti.static(v.misreads):
-            c.streams[ant] = noise.misread_view(
-                view, v.observation, c.streams[ant], c.misread_below
-            )
-        state = v.encode(view)
+        for i in ti.static(range(len(v.cues))):
+            if of_caste(c, ant, CasteRow.CUES) == i:
+                percept, state = observe_by(c, v, ti.static(v.cues[i]), w, ant, tick)
     return percept, state
 
 
 @ti.func
-def see(c: ti.template(), v: ti.template(), w, ant, tick):
+def observe_by(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
+    """Return the percept and the state index of an ant that follows some cues."""
+    percept, state = 0, 0
+    if ti.static(v.is_papers):
+        percept = see(c, v, cues, w, ant, tick)
+        state = percept
+        if ti.static(v.misreads):
+            state, c.streams[ant] = noise.misread_percept(percept, c.streams[ant], c.misread_below)
+    elif trait(c.carries, ant) == 1:  # compiled twice, each time without what the other load needs
+        percept, state = observe_with(c, v, cues, w, ant, 1, tick)
+    else:
+        percept, state = observe_with(c, v, cues, w, ant, 0, tick)
+    return percept, state
+
+
+@ti.func
+def observe_with(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, carries, tick):
+    """Return the percept and the state index of an ant with food (`carries` is 1) or without."""
+    view = view_around(c, v, cues, w, ant, carries, tick)
+    percept = view.percept  # the true one
+    if ti.static(v.misreads):
+        c.streams[ant] = noise.misread_view(view, v.observation, c.streams[ant], c.misread_below)
+    return percept, v.encode(view)
+
+
+@ti.func
+def see(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
     """Return the percept, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     left = here + step_towards(c.compass, heading, LEFT)
@@ -123,11 +138,11 @@ def see(c: ti.template(), v: ti.template(), w, ant, tick):
     ground_right = looks_of(c, v, right, queen)
     percept = 0
     if trait(c.carries, ant) == 1:
-        if ti.static(v.has_compass):
+        if ti.static(cues.has_compass):
             nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
             percept = vision.percept_carrying(ground_left, ground_forward, ground_right, nearer)
         else:
-            homing = ti.static(v.field(c, v.homing))
+            homing = ti.static(v.field(c, cues.homing))
             percept = vision.percept_homing(
                 homing.half,
                 ground_left,
@@ -139,9 +154,9 @@ def see(c: ti.template(), v: ti.template(), w, ant, tick):
                 strongest_of(c, homing, left, forward, right, tick),
             )
     else:
-        outbound = ti.static(v.field(c, v.outbound))
+        outbound = ti.static(v.field(c, cues.outbound))
         percept = vision.percept_foraging(
-            v.half,
+            cues.half,
             ground_left,
             ground_forward,
             ground_right,
@@ -163,61 +178,64 @@ def strongest_of(c: ti.template(), field: ti.template(), left, forward, right, t
 
 
 @ti.func
-def cue_level(c: ti.template(), v: ti.template(), carries, place, tick):
+def cue_level(c: ti.template(), v: ti.template(), cues: ti.template(), carries, place, tick):
     """Return the level of a cell in the pheromone that an ant with this load follows.
 
-    If ants have a compass, this is the outbound cue for all ants.
+    If ants have a compass, this is the outbound cue for all ants, or `Choice.carriers_follow`.
     """
-    level = ti.cast(level_of(ti.static(v.field(c, v.outbound)), place, tick), v.level_type)
-    if ti.static(not v.has_compass):
-        homing = ti.cast(level_of(ti.static(v.field(c, v.homing)), place, tick), v.level_type)
+    level = ti.cast(level_of(ti.static(v.field(c, cues.outbound)), place, tick), v.level_type)
+    if ti.static(cues.followed != cues.outbound):
+        followed = ti.static(v.field(c, cues.followed))
+        homing = ti.cast(level_of(followed, place, tick), v.level_type)
         level = ti.select(carries == 1, homing, level)
     return level
 
 
 @ti.func
-def strongest_cue(c: ti.template(), v: ti.template(), carries, here, heading, tick):
+def strongest_cue(
+    c: ti.template(), v: ti.template(), cues: ti.template(), carries, here, heading, tick
+):  # fmt: skip
     """Return the largest level that counts ahead, in the pheromone of `cue_level`."""
     left = here + step_towards(c.compass, heading, LEFT)
     forward = here + step_towards(c.compass, heading, FORWARD)
     right = here + step_towards(c.compass, heading, RIGHT)
-    outbound = ti.static(v.field(c, v.outbound))
+    outbound = ti.static(v.field(c, cues.outbound))
     level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
-    if ti.static(not v.has_compass):
-        field = ti.static(v.field(c, v.homing))
+    if ti.static(not cues.has_compass):
+        field = ti.static(v.field(c, cues.homing))
         homing = ti.cast(strongest_of(c, field, left, forward, right, tick), v.level_type)
         level = ti.select(carries == 1, homing, level)
     return level
 
 
 @ti.func
-def view_around(c: ti.template(), v: ti.template(), w, ant, tick):
-    """Return the view of an ant."""
+def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, carries, tick):
+    """Return the view of an ant with food (`carries` is 1) or without."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
-    carries, queen = trait(c.carries, ant), own_queen(c, v, w, ant)
-    view = v.view_type(carries=carries, own_level=cue_level(c, v, carries, here, tick))
+    queen = own_queen(c, v, w, ant)
+    view = v.view_type(carries=carries, own_level=cue_level(c, v, cues, carries, here, tick))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
         place = here + step_around(c.compass, heading, cells[k])
         held = ti.cast(c.ground[place] >> 4, ti.i32)  # 0 without an ant
         standable = (c.ground[place] & 15 == EMPTY) | (held != 0)
-        view.levels[k] = ti.select(standable, cue_level(c, v, carries, place, tick), 0)
+        view.levels[k] = ti.select(standable, cue_level(c, v, cues, carries, place, tick), 0)
         # 0 without an ant, 1 with a forager, 2 with a carrier.
         view.ants[k] = (held + 1) >> 3
         if ti.static(v.n_nests > 1):
             ours = held & ANT_STANDS == ANT_STANDS - nest_of(c, v, ant)
             view.ants[k] = ti.select(ours, 1 + (held >> 3), 0)
             view.strangers[k] = ti.cast((held != 0) & (not ours), ti.i32)
-        if ti.static(v.has_compass):
+        if ti.static(cues.has_compass):
             view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
         else:
             view.nearer[k] = ti.cast(view.levels[k] > view.own_level, ti.i32)
         view.codes[k] = looks_of(c, v, place, queen)
         read_fields(c, v, view, k, place, standable, tick)
     read_own_levels(c, v, view, here, tick)
-    view.strongest = strongest_cue(c, v, carries, here, heading, tick)
-    judge(v.half, v.homing_view, view, v.observation)
+    view.strongest = strongest_cue(c, v, cues, carries, here, heading, tick)
+    judge(cues.half, cues.homing_view, view, v.observation)
     return view
 
 
@@ -264,15 +282,6 @@ def looks_of(c: ti.template(), v: ti.template(), place, queen):
 
 
 @ti.func
-def nest_of(c: ti.template(), v: ti.template(), ant):
-    """Return the nest of an ant."""
-    nest = 0
-    if ti.static(v.n_nests > 1):
-        nest = trait(c.nest, ant)
-    return nest
-
-
-@ti.func
 def holds_nestmate(c: ti.template(), v: ti.template(), ant, place):
     """Return whether an ant of the same nest is on a cell; others are obstacles."""
     held = ti.cast(c.ground[place] >> 4, ti.i32)
@@ -306,53 +315,125 @@ def table_of(c: ti.template(), v: ti.template(), owner):
 
 @ti.func
 def owner_of(c: ti.template(), v: ti.template(), w, ant):
-    """Return the owner of the table by which an ant chooses: its slot, or its world and nest."""
-    return ant if ti.static(v.own_tables) else w * v.n_nests + nest_of(c, v, ant)
+    """Return the owner of the table by which an ant chooses: its slot, or its world and group."""
+    return ant if ti.static(v.own_tables) else w * v.n_groups + group_of(c, v, ant)
 
 
 @ti.func
-def draw_action(c: ti.template(), v: ti.template(), w, ant, state, random_state):
+def draw_action(c: ti.template(), v: ti.template(), w, ant, state, percept, tick, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
     action, bits = 0, bits_of(random_state)
-    if ti.static(v.choice == "deneubourg"):
-        action = draw_cell(c, v, w, ant, state, bits)
+    if ti.static(v.has_own_choice or v.choice == "deneubourg"):
+        if ti.static(len(v.cues) == 1):
+            action = draw_by_cues(c, v, ti.static(v.cues[0]), w, ant, state, percept, tick, bits)
+        else:
+            for i in ti.static(range(len(v.cues))):
+                if of_caste(c, ant, CasteRow.CUES) == i:
+                    cues = ti.static(v.cues[i])
+                    action = draw_by_cues(c, v, cues, w, ant, state, percept, tick, bits)
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
-        values = values_of(c.q, table, state)
+        values, explore_below = values_of(c.q, table, state), explore_below_of(c, v, ant)
         if ti.static(v.choice == "softmax"):
-            action = choose_softly(values, bits, c.explore_below, c.choice[0])
+            temperature = choice_number(c, v, ant, ti.static(CasteRow.TEMPERATURE))
+            action = choose_softly(values, bits, explore_below, temperature)
         else:
-            action = choose_in_crowd(c.compass, values, bits, c.explore_below)
+            action = choose_in_crowd(c.compass, values, bits, explore_below)
     return action
 
 
 @ti.func
-def draw_cell(c: ti.template(), v: ti.template(), w, ant, state, bits):
+def draw_by_cues(
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, percept, tick, bits
+):  # fmt: skip
+    """Return the ant's action by your own rule, or by the rule "deneubourg"."""
+    action = 0
+    if ti.static(v.has_own_choice):
+        action = v.own_choice(c, v, cues, w, ant, state, percept, tick, bits)
+    else:
+        action = draw_cell(c, v, cues, w, ant, state, bits)
+    return action
+
+
+@ti.func
+def own_reward(c: ti.template(), v: ti.template(), w, ant, percept, tick):
+    """Return the reward of an ant by your own rule, i32; `percept` is the new one."""
+    reward = 0
+    if ti.static(len(v.cues) == 1):
+        reward = v.own_reward(c, v, ti.static(v.cues[0]), w, ant, percept, tick)
+    else:
+        for i in ti.static(range(len(v.cues))):
+            if of_caste(c, ant, CasteRow.CUES) == i:
+                reward = v.own_reward(c, v, ti.static(v.cues[i]), w, ant, percept, tick)
+    return reward
+
+
+@ti.func
+def cell_ahead(
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, percept,
+    i: ti.template()
+):  # fmt: skip
+    """Return how an ant sees the cell left (0), forward (1) or right (2) of it, i32 each.
+
+    `state` is the paper's state as the ant sees it, `percept` the true one. A cell with an ant is
+    open if the traffic rules ever let an ant with this load enter it.
+
+    Returns:
+        Its code; 1 if the ant does not misread it; 1 if it is open; 1 if it is nearer to the queen.
+    """
+    heading, carries = trait(c.heading, ant), trait(c.carries, ant)
+    code = vision.code_in_view(state, i)
+    is_true = code == vision.code_in_view(percept, i)
+    opens = ti.cast(is_open(code), ti.i32)
+    nears = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(cues.has_compass))
+    if ti.static(v.traffic.shared):
+        place = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
+        if is_true & holds_nestmate(c, v, ant, place):
+            nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+            opens = 1 if ti.static(v.traffic.follow) else carries
+            nears = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(cues.has_compass))
+    return code, ti.cast(is_true, ti.i32), opens, nears
+
+
+@ti.func
+def explore_below_of(c: ti.template(), v: ti.template(), ant):
+    """Return the bound of a random 32-bit word below which an ant explores, u64."""
+    bound = c.explore_below
+    if ti.static(v.n_castes > 0):
+        own = of_caste(c, ant, CasteRow.EPSILON)
+        if own >= 0.0:
+            bound = ti.cast(own * 4294967296.0, ti.u64)
+    return bound
+
+
+@ti.func
+def choice_number(c: ti.template(), v: ti.template(), ant, row: ti.template()):
+    """Return a number of the rule by which an ant chooses, f64; `row` is a `CasteRow`."""
+    number = c.choice[row - CasteRow.TEMPERATURE]
+    if ti.static(v.n_castes > 0):
+        number = of_caste(c, ant, row)
+    return number
+
+
+@ti.func
+def draw_cell(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, bits):
     """Return the ant's action by the rule "deneubourg", with 64 random bits.
 
     `state` is the paper's state as the ant sees it. A cell that it misreads looks as if it had no
-    trail, and is nearer to the queen if it looks S. A cell with an ant is open if the traffic rules
-    ever let an ant with this load enter it. With a field as homing cue, no cell is nearer.
+    trail, and is nearer to the queen if it looks S. With a field as homing cue, no cell is nearer.
     """
     percept, heading, carries = trait(c.percept, ant), trait(c.heading, ant), trait(c.carries, ant)
     here = w * c.size + c.cell[ant]
     tick = c.worlds[WorldRow.TICKS, w]
-    nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
     codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
     weights = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
+    k = choice_number(c, v, ant, ti.static(CasteRow.K))
+    exponent = choice_number(c, v, ant, ti.static(CasteRow.EXPONENT))
     for i in ti.static((LEFT, FORWARD, RIGHT)):
+        codes[i], is_true, opens[i], nears[i] = cell_ahead(c, v, cues, w, ant, state, percept, i)
         place = here + step_towards(c.compass, heading, i)
-        code = vision.code_in_view(state, i)
-        is_true = code == vision.code_in_view(percept, i)
-        codes[i] = code
-        opens[i] = ti.cast(is_open(code), ti.i32)
-        nears[i] = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(v.has_compass))
-        if ti.static(v.traffic.shared):
-            if is_true & holds_nestmate(c, v, ant, place):
-                opens[i] = 1 if ti.static(v.traffic.follow) else carries
-                nears[i] = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(v.has_compass))
-        level = cue_level(c, v, carries, place, tick)
-        weights[i] = attraction(ti.select(is_true, level, 0), c.choice[1], c.choice[2])
+        level = cue_level(c, v, cues, carries, place, tick)
+        weights[i] = attraction(ti.select(is_true == 1, level, 0), k, exponent)
     return choose_cell(carries, codes, opens, nears, weights, bits)
 
 
@@ -380,35 +461,46 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         action = trait(c.action, ant)
     elif ti.static(v.draws_next_action):
         action = trait(c.next_action, ant)
+    idle = 0
+    if ti.static(v.has_labour):
+        idle, random_state = labour.stays_idle(c, v, w, ant, random_state)
+        # Without food, this action does nothing; `observe_and_learn` removes it.
+        action = ti.select(idle == 1, GIVE, action)
     if action < 0:
         random_state = advance(random_state)
-        action = draw_action(c, v, w, ant, state_index_of(c, v, ant), random_state)
-    put(c.action, ant, action)
+        state = state_index_of(c, v, ant)
+        action = draw_action(c, v, w, ant, state, percept, tick, random_state)
+    chosen = action
     if ti.static(v.slips):
-        action, random_state = noise.slipped(action, random_state, c.slip_below)
-        put(c.executed, ant, action)
+        if idle == 0:
+            action, random_state = noise.slipped(action, random_state, c.slip_below)
     heading = turned_by(c.compass, trait(c.heading, ant), action)
-    ahead = cell + step_towards(c.compass, heading, FORWARD)
-    enters = is_open(vision.code_in_view(percept, ti.min(action, RIGHT)))
+    step = step_towards(c.compass, heading, FORWARD)
+    # Arithmetic, because the compiler makes branches of selections between values in memory.
+    enters = 1 - (vision.code_in_view(percept, action) & 1)
     if ti.static(v.traffic.shared):
-        enters = enters | holds_nestmate(c, v, ant, w * c.size + ahead)
-    enters = enters & (action <= RIGHT)
-    wanted = ti.select(enters, ahead, cell)
-    mark = ti.select(enters, conflicts.ENTER + heading, v.idle)
+        enters |= ti.cast(holds_nestmate(c, v, ant, w * c.size + cell + step), ti.i32)
+    enters &= MOVES >> action
+    wanted = cell + enters * step
+    mark = v.idle + enters * (conflicts.ENTER + heading - v.idle)
     foods = vision.goals_in_view(percept)
-    if foods != 0 and action == PICK_UP and carries == 0:
+    if (foods != 0) & (action == PICK_UP) & (carries == 0):
         position = lowest_bit_number(foods)
         if foods & (foods - 1) != 0:  # several food items in view
             k, random_state = draw_below(random_state, popcnt(foods))
             position = bit_number(foods, k)
         wanted = cell + step_towards(c.compass, heading, position)
         mark = conflicts.TAKE + (heading + position + N_HEADINGS - 1) % N_HEADINGS
-    c.streams[ant] = random_state
-    put(c.heading, ant, heading)
-    c.want[ant] = wanted
     if ti.static(v.traffic.shared):
         takes = ti.select(mark >= conflicts.TAKE, conflicts.TAKES_FOOD, 0)
-        mark |= ti.select(carries == 1, conflicts.HAS_FOOD, 0) | takes
+        mark |= carries * conflicts.HAS_FOOD | takes
+    # All writes are last, because the compiler reads the addresses of arrays again after each.
+    c.streams[ant] = random_state
+    put(c.action, ant, chosen)
+    if ti.static(v.slips):
+        put(c.executed, ant, action)
+    put(c.heading, ant, heading)
+    c.want[ant] = wanted
     c.wants[w * c.size + cell] = ti.cast(mark, ti.u8)
 
 
@@ -420,10 +512,15 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     depend on the deposits of this tick.
     """
     base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
-    won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
-    c.wants[base + cell] = c.wants[base + cell] | ti.cast(ti.select(won, conflicts.WINS, 0), ti.u8)
-    c.want[ant] = ti.select(won, wanted, cell)
-    put(c.event, ant, event_of(c, v, base, ant, tick))
+    if ti.static(v.traffic.grant):  # then a pushed ant may need the event, too
+        put(c.event, ant, event_of(c, v, w, ant, tick))
+    if wanted != cell:
+        if conflicts.prevails(c, v.traffic, base, cell, wanted, tick):
+            if ti.static(not v.traffic.grant):
+                put(c.event, ant, event_of(c, v, w, ant, tick))
+            c.wants[base + cell] = c.wants[base + cell] | ti.u8(conflicts.WINS)
+        else:
+            c.want[ant] = cell
 
 
 @ti.func
@@ -433,22 +530,37 @@ def step_ahead(c: ti.template(), ant):
 
 
 @ti.func
-def event_of(c: ti.template(), v: ti.template(), base, ant, tick):
+def event_of(c: ti.template(), v: ti.template(), w, ant, tick):
     """Return the event of a successful move; a cell with an ant is a lure if it is better."""
     action, percept = executed_by(c, v, ant), trait(c.percept, ant)
-    event = move_event(vision.code_in_view(percept, ti.min(action, RIGHT)))
-    here = base + c.cell[ant]
+    event = move_event(vision.code_in_view(percept, action))
+    here = w * c.size + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
-        better = is_stronger(ti.static(v.field(c, v.outbound)), ahead, here, tick)
-        if trait(c.carries, ant) == 1:
-            if ti.static(v.has_compass):
-                closer = ti.cast(c.closer[own_map(c, v, base // c.size, ant)], ti.i32)
-                better = closer >> trait(c.heading, ant) & 1 == 1
-            else:
-                better = is_stronger(ti.static(v.field(c, v.homing)), ahead, here, tick)
+        better = False
+        if ti.static(len(v.cues) == 1):
+            better = is_better(c, v, ti.static(v.cues[0]), w, ant, ahead, here, tick)
+        else:
+            for i in ti.static(range(len(v.cues))):
+                if of_caste(c, ant, CasteRow.CUES) == i:
+                    better = is_better(c, v, ti.static(v.cues[i]), w, ant, ahead, here, tick)
         event = ti.select(better, Event.ENTERED_LURE, Event.ENTERED_EMPTY)
     return event
+
+
+@ti.func
+def is_better(
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, ahead, here, tick
+):  # fmt: skip
+    """Return whether the cell ahead of an ant is better than its own cell, by its cues."""
+    better = is_stronger(ti.static(v.field(c, cues.outbound)), ahead, here, tick)
+    if trait(c.carries, ant) == 1:
+        if ti.static(cues.has_compass):
+            closer = ti.cast(c.closer[own_map(c, v, w, ant)], ti.i32)
+            better = closer >> trait(c.heading, ant) & 1 == 1
+        else:
+            better = is_stronger(ti.static(v.field(c, cues.homing)), ahead, here, tick)
+    return better
 
 
 @ti.func
@@ -465,30 +577,31 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     action, percept = executed_by(c, v, ant), trait(c.percept, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
-    moves = action <= RIGHT
-    goes, filled, event, enters = cell, False, ti.select(moves, Event.BLOCKED, Event.FAILED), False
-    takes = False
+    moves = MOVES >> action & 1
+    goes, filled, enters, takes = cell, False, 0, False
+    event = Event.FAILED + moves * ti.static(Event.BLOCKED - Event.FAILED)
     if ti.static(v.traffic.shared):
         ahead = cell + step_ahead(c, ant)
-        goes, filled, event, enters = conflicts.settle(
-            *(c, v.traffic, base, cell, wanted, ahead, carries, moves, trait(c.event, ant))
+        goes, filled, event, entered = conflicts.settle(
+            *(c, v.traffic, base, cell, wanted, ahead, carries, moves == 1, trait(c.event, ant))
         )
-        takes = not moves and wanted != cell
+        enters = ti.cast(entered, ti.i32)
+        takes = (moves == 0) & (wanted != cell)
     else:
         won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
-        enters, takes = won & moves, won & (not moves)
-        goes = ti.select(enters, wanted, cell)
-        event = ti.select(
-            enters, move_event(vision.code_in_view(percept, ti.min(action, RIGHT))), event
-        )
+        # Arithmetic, because the compiler would make branches, which nothing can predict here.
+        enters, takes = ti.cast(won, ti.i32) & moves, won & (moves == 0)
+        goes = cell + enters * (wanted - cell)
+        event += enters * (vision.code_in_view(percept, action) + Event.ENTERED_EMPTY - event)
     if not filled:
         c.ground[base + cell] = EMPTY
     c.want[ant] = cell  # the cell with the ant's mark
     had_food, age = carries, c.carried[ant]
     if carries == 1:
-        carried = c.carried[ant]
+        carried = age
         if goes != cell:
-            deposit(trail, base + goes, tick, carried)
+            if lays(c, v, ant, 0):
+                deposit(trail, base + goes, tick, carried, carries, event, percept)
         elif can_give(action, percept):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
@@ -502,14 +615,22 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         put(c.carries, ant, 1)
         c.carried[ant] = 1
         take_load(c, v, ant, base + wanted, tick)
-        deposit(trail, base + wanted, tick, 0)
-        deposit(trail, base + cell, tick, 0)
+        if lays(c, v, ant, 0):
+            deposit(trail, base + wanted, tick, 0, carries, event, percept)
+            deposit(trail, base + cell, tick, 0, carries, event, percept)
         put(c.heading, ant, turn_round(heading))
     if ti.static(len(v.pheromones) > 1):
         age = ti.select(carries == had_food, age, 0)
         occasions = occasions_of(had_food, percept, action, event, goes != cell)
-        for field in ti.static(v.further_fields(c)):
-            lay(field, occasions, base, cell, goes, wanted, tick, age)
+        if ti.static(v.has_labour):
+            occasions *= 1 - trait(c.idle, ant)
+        fields = ti.static(v.further_fields(c))
+        for i in ti.static(range(len(fields))):
+            if lays(c, v, ant, i + 1):
+                lay(
+                    *(ti.static(fields[i]), occasions, base, cell, goes, wanted, tick, age),
+                    *(carries, event, percept),
+                )
         if c.counts_without_food == 1:
             c.carried[ant] = age + 1
     ground = ANT_GROUND
@@ -517,10 +638,22 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         ground = OBSTACLE | ((ANT_STANDS - nest_of(c, v, ant)) << 4) + (carries << 7)
     c.ground[base + goes] = ti.cast(ground, ti.u8)
     c.cell[ant] = goes
+    if ti.static(v.has_labour):
+        event = ti.select(trait(c.idle, ant) == 1, ti.cast(Event.NONE, ti.i32), event)
     put(c.event, ant, event)
-    tally(c, Tally.MOVES, chunk, ti.cast(moves, ti.i32))
-    tally(c, Tally.BLOCKED, chunk, ti.cast(moves & (not enters), ti.i32))
-    tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
+    tally(c, Tally.MOVES, chunk, moves)
+    tally(c, Tally.BLOCKED, chunk, moves & (1 - enters))
+    if ti.static(not v.has_own_reward):
+        tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
+
+
+@ti.func
+def lays(c: ti.template(), v: ti.template(), ant, number: ti.template()):
+    """Return whether an ant lays a pheromone; without castes, always, while a kernel compiles."""
+    does = True
+    if ti.static(v.n_castes > 0):
+        does = ti.cast(of_caste(c, ant, CasteRow.LAYS), ti.i32) >> number & 1 == 1
+    return does
 
 
 @ti.func
@@ -531,17 +664,31 @@ def tally(c: ti.template(), state, chunk, n):
 
 @ti.func
 def count_apart(c: ti.template(), v: ti.template(), ant, chunk):
-    """Count a delivery by nest and kind of food, if there are several."""
+    """Count a delivery by nest and kind of food, if there are several, and by caste."""
     if ti.static(v.counts_apart):
         place = chunk * NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
         if ti.static(v.n_kinds > 1):
             place += trait(c.kind, ant)
         c.delivered[place] = c.delivered[place] + 1
+    if ti.static(v.n_castes > 0):
+        own = chunk * MAX_CASTES + trait(c.caste, ant)
+        c.delivered_by_caste[own] = c.delivered_by_caste[own] + 1
 
 
 @ti.func
 def reward_of(c: ti.template(), v: ti.template(), ant):
-    """Return the reward of the last event of an ant, i32."""
+    """Return the reward of an ant for its last action, i32."""
+    reward = 0
+    if ti.static(v.has_own_reward):
+        reward = c.reward[ant]
+    else:
+        reward = event_reward(c, v, ant)
+    return reward
+
+
+@ti.func
+def event_reward(c: ti.template(), v: ti.template(), ant):
+    """Return the reward of the last event of an ant by the settings of the task, i32."""
     event = trait(c.event, ant)
     reward = c.rewards[event]
     if ti.static(v.has_foods):

@@ -55,7 +55,7 @@ class Timetable:
                     colony.check_same_kernels(one.changed(colony.task))
                 if isinstance(one, Policy):
                     interventions.check_follow()
-                one.check_in(colony.grid, colony.task)
+                one.check_in(colony.worlds[0], colony.task)
 
     def __enter__(self) -> None:
         if not self._events:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import taichi as ti
 
 from taichi_ants.engines.colony.layout import array_of
+from taichi_ants.engines.colony.own_rules import OwnRule
 from taichi_ants.task.constants import EMPTY, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import Occasion
@@ -39,9 +40,28 @@ class Pheromone(NamedTuple):
     decay: Any
     share: Any
     laid: Any  # the occasions of deposits; None for the trail
+    own_deposit: Any  # your rules, or None
+    own_evaporation: Any
+
+    @property
+    def has_own_deposit(self) -> bool:
+        """Whether the rule of deposits is your own."""
+        return self.own_deposit is not None
+
+    @property
+    def has_own_evaporation(self) -> bool:
+        """Whether the rule of evaporation is your own."""
+        return self.own_evaporation is not None
 
 
-def pheromone_of(c: Any, number: int, dense: bool, view: str) -> Pheromone:
+def pheromone_of(
+    c: Any,
+    number: int,
+    dense: bool,
+    view: str,
+    own_deposit: OwnRule | None,
+    own_evaporation: OwnRule | None,
+) -> Pheromone:
     """Return a pheromone with the arrays and numbers of an argument pack."""
     end = f"_{number}" if number else ""
     return Pheromone(
@@ -52,6 +72,8 @@ def pheromone_of(c: Any, number: int, dense: bool, view: str) -> Pheromone:
         getattr(c, f"spare{end}") if dense else None,
         *(getattr(c, name + end) for name in _NUMBERS),
         laid=getattr(c, f"laid{end}") if number else None,
+        own_deposit=own_deposit and own_deposit.bound(c),
+        own_evaporation=own_evaporation and own_evaporation.bound(c),
     )
 
 
@@ -82,9 +104,21 @@ def level_that_counts(c: ti.template(), field: ti.template(), place, tick):
 
 
 @ti.func
-def deposit(field: ti.template(), place, tick, carried):
-    """Deposit, by the rule of a pheromone, what an ant lays after some ticks with its load."""
-    if field.deposits != pheromone.NONE:
+def deposit(field: ti.template(), place, tick, carried, carries, event, percept):
+    """Deposit, by the rule of a pheromone, what an ant lays after some ticks with its load.
+
+    `carries` and `event` are those after the ant's action, `percept` is that before it.
+    """
+    if ti.static(field.has_own_deposit):
+        level = level_of(field, place, tick)
+        laid = field.own_deposit(
+            level=level, carried=carried, carries=carries, event=event, percept=percept, tick=tick
+        )
+        if ti.static(field.dense):
+            field.levels[place] = ti.cast(laid, ti.f32)
+        else:
+            field.levels[place] = ti.cast(ti.floor(laid), ti.i32) + tick * field.evaporates
+    elif field.deposits != pheromone.NONE:
         level = level_of(field, place, tick)
         laid = pheromone.level_after_deposit(field, field.deposits, level, carried)
         if ti.static(not field.dense):
@@ -111,24 +145,31 @@ def occasions_of(had_food, percept, action, event, has_moved):
 
 
 @ti.func
-def lay(field: ti.template(), occasions, base, cell, goes, food, tick, carried):
+def lay(
+    field: ti.template(), occasions, base, cell, goes, food, tick, carried, carries, event, percept
+):  # fmt: skip
     """Deposit in a further field on the cell that an ant leaves or enters, or on its food's."""
     laid = field.laid & occasions  # a single one, see `Field.laid`
     if laid != 0:
-        deposit(field, base + ti.select(laid == Occasion.DEAD_END, cell, goes), tick, carried)
+        place = base + ti.select(laid == Occasion.DEAD_END, cell, goes)
+        deposit(field, place, tick, carried, carries, event, percept)
         if laid == Occasion.PICKED_UP:
-            deposit(field, base + food, tick, carried)
+            deposit(field, base + food, tick, carried, carries, event, percept)
 
 
 @ti.func
-def evaporate(c: ti.template(), v: ti.template(), place):
+def evaporate(c: ti.template(), v: ti.template(), place, tick):
     """Evaporate the dense pheromones of a cell for one tick."""
     for field in ti.static(v.dense_fields(c)):
-        field.levels[place] = pheromone.evaporated(field.levels[place], field.decay)
+        if ti.static(field.has_own_evaporation):
+            left = field.own_evaporation(level=field.levels[place], tick=tick)
+            field.levels[place] = ti.cast(left, ti.f32)
+        else:
+            field.levels[place] = pheromone.evaporated(field.levels[place], field.decay)
 
 
 @ti.func
-def diffuse(c: ti.template(), v: ti.template(), place):
+def diffuse(c: ti.template(), v: ti.template(), place, tick):
     """Compute the levels of a cell after one tick of diffusion."""
     for field in ti.static(v.dense_fields(c)):
         if field.share > 0.0:
@@ -138,7 +179,7 @@ def diffuse(c: ti.template(), v: ti.template(), place):
 
 
 @ti.func
-def settle(c: ti.template(), v: ti.template(), place):
+def settle(c: ti.template(), v: ti.template(), place, tick):
     """Set the levels of a cell to the results of `diffuse`."""
     for field in ti.static(v.dense_fields(c)):
         if field.share > 0.0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,9 +15,12 @@ from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.task import Task
+from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 _PER_CHUNK = 256  # ants that one thread steps in a row
+_STEPS_OF_LAUNCH = 1 << 23  # of all ants in a rollout; a launch cannot be interrupted
+_NO_POLICY = np.zeros((1, N_ACTIONS), np.float32), np.zeros(1, np.uint64), 0.0
 # The arrays with one value per ant.
 _OF_ANTS: dict[type, tuple[str, ...]] = {
     np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
@@ -50,6 +53,9 @@ class BatchedEnvironments:
     ) -> None:
         self.worlds, self.task, self.n = tuple(worlds), task, n
         self._launch: Any = None
+        self._rollouts: dict[
+            tuple[bool, int], Callable[[Mapping[str, Any]], None]
+        ] = {}  # launches of rollouts
         common = laid_out(self.worlds, task, falls)
         size = common["size"]
         number = np.arange(n, dtype=np.int32) % len(self.worlds)
@@ -93,6 +99,60 @@ class BatchedEnvironments:
         self.arrays["actions"][:] = actions
         self._go(begins, same_step)
 
+    def rollout(
+        self,
+        rows: Mapping[str, np.ndarray],
+        shown: np.ndarray,
+        begins: np.ndarray,
+        after_end: Command,
+        policy: tuple[np.ndarray, np.ndarray, float] | None,
+    ) -> None:
+        """Take several steps, and record each.
+
+        Args:
+            rows: Arrays (steps, n, ...) by name. `taken`, int64, are the actions: given ones or,
+                with a policy, those it chose. The results are `seen`, observations of the dtype of
+                `shown`; `paid`, float64; `terminated`, `truncated` and `event_rows`, uint8; and if
+                the next episode begins in the step that ends one, `finals`, int32, the last states.
+            shown: The observation of each state, int64 or float32 (n_states, ...).
+            begins: True for ants that start an episode in the first step, bool (n,).
+            after_end: The command after the last step of an episode; STEP if the next episode
+                begins in the same step.
+            policy: Action values, float32 (n_states, 5), a random stream for each ant, uint64 (n,),
+                and epsilon; or None.
+        """
+        table, choices, epsilon = policy or _NO_POLICY
+        with runtime.alone:
+            launch = self._rollout_launch(policy is not None, shown[0].size)
+            self.arrays["commands"][:] = np.where(begins, after_end, Command.STEP)
+            values = {
+                **self.arrays,
+                "after_end": int(after_end),
+                "shown": shown.reshape(-1),
+                "q": np.pad(table, ((0, 0), (0, ROW - N_ACTIONS))).reshape(-1),
+                "choices": choices,
+                "explore_below": np.uint64(epsilon * 4294967296.0),
+            }
+            steps = max(1, _STEPS_OF_LAUNCH // self.n)
+            for first in range(0, len(rows["taken"]), steps):
+                part = {name: one[first : first + steps].reshape(-1) for name, one in rows.items()}
+                launch({**values, **part, "n_steps": len(part["taken"]) // self.n})
+        self.arrays["rewards_of"][:] = rows["paid"][-1]
+
+    def _rollout_launch(self, follows: bool, width: int) -> Callable[[Mapping[str, Any]], None]:
+        if (follows, width) not in self._rollouts:
+            runtime.start()
+            from taichi_ants.engines.arguments import Launch
+            from taichi_ants.engines.runs.kernels import failures_of
+            from taichi_ants.engines.runs.rollout_kernel import LENGTH, WIDTH, rollout_kernel
+
+            codes = np.empty(-(-self.n // WIDTH) * WIDTH * LENGTH, np.int64)
+            half = self.task.pheromone.view == "half"
+            rules = self.task.sees, self.arrays["deposits"], half, failures_of(self.task)
+            launch = Launch(partial(rollout_kernel, *rules, follows, width))
+            self._rollouts[follows, width] = lambda values: launch({**values, "codes": codes})
+        return self._rollouts[follows, width]
+
     def snapshot(self, number: int) -> Snapshot:
         """Return the present state of an ant's world; arrays are copies."""
         arrays, grid = self.arrays, self.worlds[0].grid
@@ -120,4 +180,4 @@ class BatchedEnvironments:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
-        return {**vars(self), "_launch": None}
+        return {**vars(self), "_launch": None, "_rollouts": {}}

@@ -12,10 +12,10 @@ cells around the cell that it wants.
 """
 
 import taichi as ti
+from taichi.math import popcnt
 
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.events import Event
-from taichi_ants.task.rules.actions import turn_round
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
 # The mark of an ant (u8): 0 for nothing, ENTER or TAKE plus a heading. If ants can enter cells with
@@ -24,6 +24,11 @@ ENTER, TAKE, STANDS = 1, 9, 7
 MARK = 15
 # The bits above the mark are further facts about the ant.
 HAS_FOOD, TAKES_FOOD, WINS = 16, 32, 64
+
+# Bytes of a u64, one for each heading: 1; and ENTER plus the opposite heading, which is in the mark
+# of an ant at this heading of a cell that it wants.
+_EACH = sum(1 << 8 * heading for heading in range(N_HEADINGS))
+_WANTING = sum(ENTER + (heading + 3) % N_HEADINGS << 8 * heading for heading in range(N_HEADINGS))
 
 
 @ti.func
@@ -34,33 +39,49 @@ def conflict_key(cell, tick):
 
 
 @ti.func
-def wanting(kind, heading):
-    """Return the mark of an ant that wants a cell; seen from this cell, the ant is at `heading`."""
-    return kind | 1 + turn_round(heading)
-
-
-@ti.func
 def prevails(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick):
     """Return whether the ant on `cell` wins the cell `wanted`; False if that is its own cell."""
-    kind = ti.cast(c.wants[base + cell], ti.i32) & 8  # 8 to take, else 0
-    rivals = -1  # the loop also counts the ant itself
-    for heading in ti.static(range(N_HEADINGS)):
-        other = ti.cast(c.wants[base + wanted + c.compass[heading + 1]], ti.i32) & MARK
-        rivals += ti.cast(other == wanting(kind, heading), ti.i32)
+    kind = c.wants[base + cell] & 8  # 8 to take, else 0
+    rivals = who_want(c, base, wanted, MARK, kind)  # the ant itself is one of them
     won = wanted != cell
-    if rivals > 0:
-        won = won and wins(c, traffic, base, cell, wanted, kind, tick)
+    if won & (rivals & (rivals - ti.u64(1)) != 0):
+        won = wins(c, traffic, base, cell, wanted, rivals, tick)
     return won
 
 
 @ti.func
-def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, kind, tick):
-    """Return whether the ant on `cell` precedes all others that want the same."""
-    own, won = conflict_key(cell, tick), True
-    for heading in range(N_HEADINGS):
-        other = wanted + c.compass[heading + 1]
-        mark = ti.cast(c.wants[base + other], ti.i32) & MARK
-        if mark == wanting(kind, heading) and other != cell:
+def who_want(c: ti.template(), base, cell, bits: ti.template(), mark):
+    """Return which ants around a cell want it, and have these `bits` of `mark` in their marks.
+
+    Returns:
+        A u64 with bit 7 of byte h set for the ant at heading h, seen from the cell.
+    """
+    # One byte after the other, because the compiler would move them into a vector and back.
+    marks = ti.u64(0)
+    for i in ti.static(range(N_HEADINGS)):
+        place = base + cell + c.compass[N_HEADINGS - i]
+        marks = marks << ti.u64(8) | ti.cast(c.wants[place], ti.u64)
+    others = marks & ti.u64(bits * _EACH) ^ (
+        ti.u64(_WANTING) | ti.cast(mark, ti.u64) * ti.u64(_EACH)
+    )
+    # Bytes are below 128, so that adding 127 sets bit 7 where a byte differs.
+    return ~(others + ti.u64(127 * _EACH)) & ti.u64(128 * _EACH)
+
+
+@ti.func
+def first_heading(ants):
+    """Return the lowest heading in a non-zero result of `who_want`."""
+    return ti.cast(popcnt((ants & -ants) - ti.u64(1)), ti.i32) >> 3
+
+
+@ti.func
+def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, rivals, tick):
+    """Return whether the ant on `cell` precedes all others that want the same, see `who_want`."""
+    own, won, rest = conflict_key(cell, tick), True, rivals
+    while rest != 0:
+        other = wanted + c.compass[first_heading(rest) + 1]
+        rest &= rest - ti.u64(1)
+        if other != cell:
             after = conflict_key(other, tick) > own
             if ti.static(traffic.carriers_first):
                 loaded = c.wants[base + cell] & HAS_FOOD
@@ -103,11 +124,9 @@ def way_is_free(c: ti.template(), traffic: ti.template(), base, cell, wanted):
 @ti.func
 def entering(c: ti.template(), base, cell):
     """Return the cell of the ant that wins `cell`, or -1."""
-    found = -1
-    for heading in ti.static(range(N_HEADINGS)):
-        other = cell + c.compass[heading + 1]
-        mark = ti.cast(c.wants[base + other], ti.i32) & (MARK | WINS)
-        found = ti.select(mark == wanting(WINS, heading), other, found)
+    found, winner = -1, who_want(c, base, cell, MARK | WINS, WINS)
+    if winner != 0:
+        found = cell + c.compass[first_heading(winner) + 1]
     return found
 
 
@@ -155,10 +174,10 @@ def settle(
         if enters:
             goes, event = wanted, entered
     if ti.static(traffic.swap):
-        if not enters:
+        if not enters and gives_way(c, traffic, base, cell):
             follower = entering(c, base, cell)
             if follower >= 0:
-                if c.wants[base + follower] & HAS_FOOD != 0 and gives_way(c, traffic, base, cell):
+                if c.wants[base + follower] & HAS_FOOD != 0:
                     goes, filled, event = follower, True, Event.PUSHED
                     if ti.static(traffic.grant):
                         if moves & (ahead == follower):

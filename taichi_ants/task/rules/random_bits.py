@@ -49,3 +49,11 @@ def draw_below(state, n):
     """Return a whole number in [0, n) from the upper word of the next draw, and the next state."""
     after = advance(state)
     return below(high_word(bits_of(after)), n), after
+
+
+@ti.func
+def stream_of(seed, purpose, number):
+    """Return the first state of a random stream, see `randomness.stream_state`."""
+    h = bits_of(advance(seed))
+    h = bits_of(advance(h ^ ti.cast(purpose, ti.u64)))
+    return bits_of(advance(h ^ number))

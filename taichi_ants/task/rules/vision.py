@@ -91,8 +91,11 @@ def state_index(carries, left, forward, right):
 
 @ti.func
 def code_in_view(state, position):
-    """Return the code at position 0 (left), 1 (forward) or 2 (right) of a state."""
-    return (state >> (4 - 2 * position)) & 3
+    """Return the code at position 0 (left), 1 (forward) or 2 (right) of a state.
+
+    At the positions 3 and 4, which are the actions that do not move, the code is 0.
+    """
+    return state << (2 * position) >> 4 & 3
 
 
 @ti.func

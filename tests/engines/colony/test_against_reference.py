@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from random_castes import drawn_castes
 from random_choices import NOISE
 from random_colonies import RandomColony, random_colony, with_nests
 from random_rewards import random_rewards
@@ -98,7 +99,15 @@ KERNELS = [
         SOFT | {"noise": "slip"},
     ),
     ("double_q", "independent", "paper", True, "blocking", "half", MISREADS),
-    ("q_learning", "frozen", "paper", True, "blocking", "half", BY_TRAIL),
+    (
+        "q_learning",
+        "frozen",
+        "paper",
+        True,
+        "blocking",
+        "half",
+        BY_TRAIL | with_fields("aB", "a"),
+    ),
     ("q_learning", "frozen", "paper", True, "following", "half", BY_TRAIL | MISREADS),
     (
         "q_learning",
@@ -238,6 +247,82 @@ def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers)
                 max(nests_of, default=0) > 0,
             ]
     assert (happened >= [1, 3, 3, 2, 1]).all(), happened
+
+
+# Learner, sharing, observation, dense, traffic, view; castes, labour, nests; more rules.
+CASTES = [
+    ("sarsa", "shared", "ants", False, "right_of_way", "half", 2, True, 1, {}),
+    (
+        *("dyna_q", "shared", "paper", True, "following", "strongest", 3, True, 2),
+        with_fields("ab", "a") | {"cues_of": [("a", "compass"), ("b", "trail")]},
+    ),
+    ("n_step_sarsa", "independent", "paper", False, "blocking", "half", 2, True, 1, {}),
+    (
+        *("q_learning", "frozen", "paper", False, "right_of_way", "half", 2, True, 1),
+        BY_TRAIL
+        | {"noise": NOISE}
+        | with_fields("ab")
+        | {"cues_of": [("trail", "b"), ("a", "compass")]},
+    ),
+    (
+        *("expected_sarsa", "shared", "paper", False, "blocking", "half", 3, False, 1),
+        {"noise": "slip"},
+    ),
+    ("sarsa_lambda", "independent", "ants_seen", False, "right_of_way", "half", 2, True, 2, {}),
+    ("q_learning", "frozen", "queues", False, "following", UNDER, 2, True, 1, SOFT),
+    (
+        *("q_learning", "shared", "trail_levels", True, "blocking", "half", 2, False, 1),
+        with_fields("aB") | {"noise": NOISE, "cues_of": [("B", "a"), ("trail", "compass")]},
+    ),
+    ("dyna_q", "independent", "paper", False, "blocking", "half", 1, True, 1, SOFT),
+]
+QUICK_CASTES = [
+    one if k < 4 else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(CASTES)
+]
+
+
+@pytest.mark.parametrize("kernel", QUICK_CASTES, ids=str)
+def test_every_tick_with_castes_and_division_of_labour(kernel):
+    """Numbers, tables, cues and deposits of castes, births, thresholds and idle ants."""
+    learner, sharing, observation, dense, traffic, view, castes, labour, nests, more = kernel
+    happened, cues = np.zeros(6, dtype=int), more.get("cues_of")
+    rules = {name: one for name, one in more.items() if name != "cues_of"}
+    for seed in range(40):
+        drawn = random_colony(
+            seed,
+            sharing=sharing,
+            learner=learner,
+            observation=observation,
+            dense=dense,
+            traffic=traffic,
+            view=view,
+            changes=True,
+            **rules,
+        )
+        if nests > 1:
+            drawn = with_nests(drawn, seed, nests, 1, loads=False)
+        drawn = drawn_castes(drawn, seed, castes, labour, cues)
+        if drawn is None or drawn.world.n_nests != nests:
+            continue
+        colony, plain = both(drawn)
+        for ticks in (13, 9):
+            colony.begin_episode(ticks)
+            plain.begin_episode()
+            assert_equal(colony, plain)
+            for tick in range(ticks):
+                if not plain.over:
+                    idle = colony.idle & colony.living
+                    colony.tick()
+                    plain.tick(last=tick == ticks - 1)
+                    assert_equal(colony, plain)
+                    now = colony.idle & colony.living
+                    happened[4:] += [(idle & ~now).any(), (now & ~idle).any()]
+            colony.end_episode()
+            plain.end_episode()
+            record = plain.records[-1]
+            several = len({ant.caste for ant in plain.ants.values()}) == castes
+            happened[:4] += [record.births > 0, record.deaths > 0, record.deliveries > 0, several]
+    assert (happened >= [1, 3, 2, 5, 20 * labour, 5 * labour]).all(), happened
 
 
 def test_each_learner_and_observation_is_compared():

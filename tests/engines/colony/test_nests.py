@@ -11,8 +11,11 @@ from random_colonies import RandomColony, random_colony, with_nests
 from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, World, train
 from taichi_ants.analysis.bounds.limits import limits_of
 from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.interventions import AddAnts, Place, RemoveAnts
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.offline import record_colony
+from taichi_ants.protocol import At
+from taichi_ants.reference import ReferenceColony
 from taichi_ants.rendering import colony_snapshots, frames
 from taichi_ants.task import Food
 from taichi_ants.task.constants import FOOD
@@ -53,6 +56,31 @@ def drawn_nests(sharing: str = "frozen", most: int = 12):
         one = with_nests(one, seed, 2, 2, loads=True)
         if one.world.n_nests == 2:
             yield one
+
+
+def test_snapshots_have_nests_and_kinds():
+    """As the reference has them, by the numbers of ants and the cells of food and queens."""
+    rules = {"ants": 12, "sharing": "frozen", "q_values": trail_follower("paper")}
+    colony, seen = two_nests(seeds=[5]), set()
+    plain = ReferenceColony(WORLD, Task(foods=KINDS), TRAINING, 5, **rules)
+    colony.begin_episode()
+    plain.begin_episode()
+    for _ in range(40):
+        colony.tick()
+        plain.tick()
+        now, kinds = colony.snapshot(), np.zeros(colony.grid.size, np.uint8)
+        ants = {ant.number: ant for ant in plain.ants.values()}
+        of_ants = [ants[number] for number in now.ant_numbers.tolist()]
+        assert now.ant_nests.tolist() == [ant.nest for ant in of_ants]
+        carried = [ant.kind if ant.carries else -1 for ant in of_ants]
+        assert now.ant_foods.tolist() == carried
+        seen.update(zip(now.ant_nests.tolist(), carried, strict=True))
+        for cell, kind in plain.world.kinds.items():
+            if plain.world.ground[cell] == FOOD:
+                kinds[colony.grid.index(cell)] = kind
+        assert (now.food_kinds == kinds).all()
+    assert now.queens.tolist() == [int(colony.grid.index(cell)) for cell in plain.world.queens]
+    assert {(0, -1), (0, 0), (1, -1), (1, 0), (1, 1)} <= seen
 
 
 def loads_of(colony: Colony, world: int) -> np.ndarray:
@@ -142,6 +170,24 @@ def test_each_nest_learns_into_its_own_table():
     assert np.array_equal(frozen.q_values, tables)
 
 
+def test_changes_by_hand_keep_nests_and_kinds_in_later_episodes():
+    colony = two_nests(capacity=20)
+    interventions = Interventions(colony)
+    colony.begin_episode()
+    Place("food", [[5, 3, 0]], kind="sugar").apply(interventions)
+    Place("queen", [[6, 6, 0]], nest=1).apply(interventions)
+    AddAnts(number=3, nest=1).apply(interventions)
+    RemoveAnts(share=1.0, nest=0).apply(interventions)
+    assert colony.nests[colony.living].tolist() == [1] * 9
+    interventions.begin_episode()
+    world = colony.worlds[0]
+    assert world.queens.tolist() == [[0, 0, 0], [6, 6, 0]]
+    kinds = dict(zip(map(tuple, world.foods.tolist()), world.food_kinds.tolist(), strict=True))
+    before = zip(map(tuple, WORLD.foods.tolist()), WORLD.food_kinds.tolist(), strict=True)
+    assert kinds == {**dict(before), (5, 3, 0): 1}
+    assert sorted(colony.nests[colony.living].tolist()) == [0] * 6 + [1] * 6
+
+
 def test_pictures_show_every_queen():
     shots = [*colony_snapshots(begun(), 5, follow=1)]
     assert next(iter(frames(shots))).ndim == 3
@@ -156,7 +202,11 @@ def test_pictures_show_every_queen():
          "`task.foods` is seed, sugar; the bounds hold for one kind of food"),
         (lambda: Recorder(begun()), "the viewer supports one nest"),
         (lambda: record_colony(two_nests(), 1, 5), "record_colony supports one nest"),
-        (lambda: Interventions(begun()), "the colony has several nests or kinds of food"),
+        (lambda: AddAnts(number=1, nest=2).apply(Interventions(begun())), "nest is 2"),
+        (lambda: Place("food", [[1, 0, 0]], kind="wax").apply(Interventions(begun())),
+         "place.kind is 'wax'"),
+        (lambda: begun().run(1, 5, protocol=[At(2, remove_ants={"share": 0.5, "nest": 2})]),
+         "`remove_ants.nest` is 2, but the world has 2 nests"),
         (lambda: Colony(WORLD, Task(), TRAINING), "the world has 2 kinds of food, but the task 1"),
         (lambda: Colony([WORLD, replace(WORLD, other_queens=())], Task(foods=KINDS), TRAINING,
                         [1, 2]), "all worlds of a colony must have the same number"),

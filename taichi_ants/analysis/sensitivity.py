@@ -1,0 +1,141 @@
+"""Sensitivity indices of Sobol: the shares of a measure's variance that single settings make.
+
+The first-order index of a setting is the share that it makes by itself, and the total index adds
+what it makes together with others. SALib computes both, with intervals from its bootstrap, from
+means over seeds at the points of Saltelli's scheme. What seeds still change in these means looks
+like an interaction of all settings, so `seed_share` gives its size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from taichi_ants.analysis import style
+from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal
+from taichi_ants.analysis.sweeps import short
+from taichi_ants.analysis.tables import Table, interval, number, percent, plain_text, sentence
+
+RESAMPLES = 1000
+_WIDTH = 120
+
+
+class Index(NamedTuple):
+    """A row of the table: the indices of one setting for one measure, with 95 % intervals.
+
+    `seed_share` is the same for all settings of a measure.
+    """
+
+    measure: str
+    setting: str
+    first_order: float
+    first_order_low: float
+    first_order_high: float
+    total: float
+    total_low: float
+    total_high: float
+    seed_share: float
+
+
+def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[Index]:
+    """Return the indices of settings, from values of a measure float64 (points, seeds).
+
+    The points are those of Saltelli's scheme without second order: N * (len(names) + 2) rows. The
+    list is empty if a value is missing (nan), or all means over seeds are equal.
+    """
+    from SALib.analyze import sobol
+
+    means = values.mean(axis=1)
+    if not np.isfinite(means).all() or all_equal(means[None])[0]:
+        return []
+    problem = {"num_vars": len(names), "names": list(names), "bounds": [[0, 1]] * len(names)}
+    how = {"calc_second_order": False, "num_resamples": RESAMPLES, "seed": RANDOM_SEED}
+    found = sobol.analyze(problem, means, **how)
+    share = seed_share(values, len(names))
+    columns = (found[name].tolist() for name in ("S1", "S1_conf", "ST", "ST_conf"))
+    return [
+        Index(measure, name, one, one - a, one + a, total, total - b, total + b, share)
+        for name, one, a, total, b in zip(names, *columns, strict=True)
+    ]
+
+
+def seed_share(values: np.ndarray, n_settings: int) -> float:
+    """Return the share of the variance of means over seeds that the seeds make, 0 to 1.
+
+    It is estimated from the points that are drawn independently, the first and the last of each
+    group of the scheme. What a seed adds to all points alike does not count, because all points
+    have the same seeds. Nan for one seed.
+    """
+    step, seeds = n_settings + 2, values.shape[1]
+    if seeds < 2:
+        return float("nan")
+    drawn = np.concatenate([values[::step], values[step - 1 :: step]])
+    rest = drawn - drawn.mean(axis=1, keepdims=True) - drawn.mean(axis=0) + drawn.mean()
+    noise = np.square(rest).sum() / ((len(drawn) - 1) * (seeds - 1)) / seeds
+    variance = drawn.mean(axis=1).var(ddof=1)
+    return min(1.0, float(noise / variance)) if variance > 0 else float("nan")
+
+
+def report(found: Mapping[str, Sequence[Index]], seeds: int) -> str:
+    """Return the indices by measure as tables for a terminal, the largest total index first."""
+    blocks: list[str | Table] = []
+    for measure, several in found.items():
+        if not several:
+            blocks.append(
+                f"{measure} has no indices: it has no value at some points, or is constant."
+            )
+            continue
+        names = [one.setting for one in several]
+        lines = [
+            [
+                short(one.setting, names),
+                f"{number(one.first_order, 2)} "
+                f"{interval(one.first_order_low, one.first_order_high, 2)}",
+                f"{number(one.total, 2)} {interval(one.total_low, one.total_high, 2)}",
+            ]
+            for one in sorted(several, key=lambda one: -one.total)
+        ]
+        blocks.append(Table("", [measure, "first order", "total"], lines, [_noise(several, seeds)]))
+    return plain_text(blocks, _WIDTH)
+
+
+def _noise(several: Sequence[Index], seeds: int) -> str:
+    share = percent(several[0].seed_share)
+    return f"Means over {seeds} seeds; seeds make {share} of their variance, in each total index."
+
+
+def draw(path: Path, several: Sequence[Index], words: str, seeds: int) -> None:
+    """Draw the indices of a measure, called `words`, as bars, the largest total index on top.
+
+    Raises:
+        AntsError: The file (.png) cannot be written.
+    """
+    ordered = sorted(several, key=lambda one: one.total)
+    names = [one.setting for one in ordered]
+    places = np.arange(len(ordered))
+    with style.styled():
+        figure = style.new_figure(1.6 + 0.34 * len(ordered))
+        axes = figure.subplots()
+        for field, shift, colour, label in (
+            ("first_order", 0.2, style.ORANGE, "First order: alone"),
+            ("total", -0.2, style.BLUE, "Total: also together with others"),
+        ):
+            value, low, high = (
+                np.array([getattr(one, f"{field}{end}") for one in ordered])
+                for end in ("", "_low", "_high")
+            )
+            axes.barh(places + shift, value, 0.36, color=colour, label=label)
+            axes.hlines(places + shift, low, high, color=style.INK, linewidth=1)
+        share = several[0].seed_share
+        axes.axvline(share, color=style.GREY, linestyle="--", linewidth=1, label="Share of seeds")
+        axes.axvline(0, color=style.INK, linewidth=0.8)
+        axes.set_yticks(places, [short(name, names) for name in names])
+        axes.grid(visible=False, axis="y")
+        axes.set_xlabel(f"Share of the variance of {words}")
+        caption = f"95 % intervals by SALib's bootstrap. {_noise(several, seeds)}"
+        title = f"{sentence(words)}: sensitivity indices"
+        style.frame(figure, title, caption, style.legend_entries([axes]))
+    style.save(figure, path)

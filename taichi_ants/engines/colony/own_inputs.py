@@ -1,0 +1,169 @@
+"""The inputs of rules of choice and reward that you wrote; only those that a rule reads compile.
+
+A rule of choice reads what the ant sees before its action. A rule of rewards runs when the ant
+observes at the end of a tick, before it learns, so it reads levels after the tick.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import taichi as ti
+
+from taichi_ants.engines.colony.own_rules import OwnRule
+from taichi_ants.engines.colony.steps import (
+    cell_ahead,
+    cue_level,
+    event_reward,
+    explore_below_of,
+    owner_of,
+    table_of,
+    trait,
+)
+from taichi_ants.engines.colony.trail import level_of
+from taichi_ants.engines.own_rules import for_kernels
+from taichi_ants.learners.memory import values_of
+from taichi_ants.rules.inputs import AHEAD, field_of
+from taichi_ants.task.constants import EMPTY
+from taichi_ants.task.rules.actions import step_towards
+from taichi_ants.task.rules.random_bits import high_word, low_word
+from taichi_ants.task.rules.vision import code_in_view
+
+_CODE, _IS_TRUE, _IS_OPEN, _NEARER = range(4)  # the results of `cell_ahead`
+_WORDS = 4294967296.0
+
+
+def choice(rule: OwnRule | None) -> Callable[..., Any] | None:
+    """Return a function for kernels that returns an action, i32; see `steps.draw_by_cues`."""
+    if rule is None:
+        return None
+
+    def choose(
+        c: Any, v: Any, cues: Any, w: Any, ant: Any, state: Any, percept: Any, tick: Any, bits: Any
+    ) -> Any:
+        seen = state if v.is_papers else percept
+        carries = trait(c.carries, ant)
+        make = {
+            "values": lambda: _values(c, v, w, ant, state),
+            "codes": lambda: _ahead(c, v, cues, w, ant, seen, percept, _CODE),
+            "is_open": lambda: _ahead(c, v, cues, w, ant, seen, percept, _IS_OPEN),
+            "nearer": lambda: _ahead(c, v, cues, w, ant, seen, percept, _NEARER) * carries,
+            "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, percept, tick),
+            "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick),
+            "carries": lambda: carries,
+            "percept": lambda: seen,
+            "epsilon": lambda: _share(explore_below_of(c, v, ant)),
+            "random": lambda: _share(low_word(bits)),
+            "random_2": lambda: _share(high_word(bits)),
+            "tick": lambda: tick,
+        }
+        return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, percept, tick))
+
+    return for_kernels(choose)
+
+
+def reward(rule: OwnRule | None) -> Callable[..., Any] | None:
+    """Return a function for kernels that returns a reward, i32; see `steps.own_reward`."""
+    if rule is None:
+        return None
+
+    def pay(c: Any, v: Any, cues: Any, w: Any, ant: Any, next_percept: Any, tick: Any) -> Any:
+        carries, seen = trait(c.carries, ant), next_percept
+        make = {
+            "reward": lambda: event_reward(c, v, ant),
+            "event": lambda: trait(c.event, ant),
+            "carries": lambda: carries,
+            "percept": lambda: trait(c.percept, ant),
+            "next_percept": lambda: next_percept,
+            "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, seen, tick + 1),
+            "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick + 1),
+            "tick": lambda: tick,
+        }
+        return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, seen, tick + 1))
+
+    return for_kernels(pay)
+
+
+def _made(
+    make: dict[str, Callable[[], Any]],
+    rule: OwnRule,
+    c: Any,
+    v: Any,
+    cues: Any,
+    w: Any,
+    ant: Any,
+    seen: Any,
+    percept: Any,
+    tick: Any,
+) -> dict[str, Any]:
+    """Return the inputs that a rule reads, by name; those that are not in `make` read a field."""
+    inputs = {}
+    for name in rule.inputs:
+        if name in make:
+            inputs[name] = make[name]()
+        else:
+            number = v.field_numbers[field_of(name)]
+            if name.startswith("levels_"):
+                inputs[name] = _levels(c, v, cues, w, ant, number, seen, percept, tick)
+            else:
+                inputs[name] = level_of(v.field(c, number), _place(c, w, ant), tick)
+    return inputs
+
+
+@ti.func
+def _share(word):
+    """Return a 32-bit word as a share of all words, f64."""
+    return ti.cast(word, ti.f64) / ti.f64(_WORDS)
+
+
+@ti.func
+def _values(c: ti.template(), v: ti.template(), w, ant, state):
+    """Return the action values of an ant in a state, f32 (5,)."""
+    return values_of(c.q, table_of(c, v, owner_of(c, v, w, ant)), state)
+
+
+@ti.func
+def _place(c: ti.template(), w, ant):
+    """Return the place of the cell of an ant in arrays of cells."""
+    return w * c.size + c.cell[ant]
+
+
+@ti.func
+def _ahead(
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, seen, percept,
+    which: ti.template()
+):  # fmt: skip
+    """Return one of the results of `cell_ahead` for the cells ahead, i32 (3,)."""
+    found = ti.Vector([0, 0, 0])
+    for i in ti.static(range(AHEAD)):
+        code, _, opens, nears = cell_ahead(c, v, cues, w, ant, seen, percept, i)
+        if ti.static(which == _CODE):
+            found[i] = code
+        elif ti.static(which == _IS_OPEN):
+            found[i] = opens
+        else:
+            found[i] = nears
+    return found
+
+
+@ti.func
+def _levels(
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, number: ti.template(), seen,
+    percept, tick
+):  # fmt: skip
+    """Return the levels ahead of a pheromone, or of the ant's cue for number -1, f64 (3,).
+
+    Cells on which no ant can be have level 0, and so do cells that the ant misreads.
+    """
+    found = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
+    carries, heading = trait(c.carries, ant), trait(c.heading, ant)
+    for i in ti.static(range(AHEAD)):
+        place = _place(c, w, ant) + step_towards(c.compass, heading, i)
+        shows = (c.ground[place] & 15 == EMPTY) | (c.ground[place] >> 4 != 0)
+        shows = shows & (code_in_view(seen, i) == code_in_view(percept, i))
+        level = ti.f64(0.0)
+        if ti.static(number < 0):
+            level = ti.cast(cue_level(c, v, cues, carries, place, tick), ti.f64)
+        else:
+            level = ti.cast(level_of(ti.static(v.field(c, number)), place, tick), ti.f64)
+        found[i] = ti.select(shows, level, ti.f64(0.0))
+    return found

@@ -1,0 +1,157 @@
+"""Rules that you wrote, as Taichi functions, and their comparison with their twins.
+
+Each rule is compiled, and compared with its twin for many inputs, in a forked process before a
+kernel includes it. See `taichi_ants.rules`.
+"""
+
+import linecache
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+import taichi as ti
+
+from taichi_ants import runtime
+from taichi_ants.engines.plugin_check import fault_apart, last_line
+from taichi_ants.errors import unusable
+from taichi_ants.rules.inputs import KINDS
+from taichi_ants.rules.registry import TRIES, Rule, tries
+from taichi_ants.task.rules.numbers import exponential, logarithm, power
+
+
+@ti.func
+def modulo(x, y):
+    """Return x modulo y, with the sign of y: f64 -> f64."""
+    return x - y * ti.floor(x / y)
+
+
+@ti.func
+def smaller(x, y):
+    """Return the smaller of two numbers as Python's `min` does: f64 -> f64."""
+    return ti.select(y < x, y, x)
+
+
+@ti.func
+def larger(x, y):
+    """Return the larger of two numbers as Python's `max` does: f64 -> f64."""
+    return ti.select(y > x, y, x)
+
+
+@ti.func
+def bounded_power(x, y):
+    """Return x to the power of y, for y up to 1000, so that the number of steps is limited."""
+    return power(x, ti.min(y, ti.f64(1000.0)))
+
+
+_NAMES = {
+    **{"ti": ti, "modulo": modulo, "min_": smaller, "max_": larger, "abs_": ti.abs},
+    **{"exp_": exponential, "log_": logarithm, "power_": bounded_power},
+}
+
+
+@cache
+def plain_function(rule: Rule) -> Callable[..., Any]:
+    """Return a `ti.func` of the arguments of a rule, of any types, that returns an f64."""
+    place = f"<rule {rule.name} {id(rule)}>"
+    # Taichi reads the source of functions.
+    lines = rule.source.splitlines(keepends=True)
+    linecache.cache[place] = (len(rule.source), None, lines, place)
+    names: dict[str, Any] = dict(_NAMES)
+    exec(compile(rule.source, place, "exec"), names)
+    return ti.func(names["rule"])
+
+
+@cache
+def bounded_function(rule: Rule) -> Callable[..., Any]:
+    """Return a `ti.func` as `plain_function`, whose results are in the range of the rule's kind.
+
+    A result that is not a number becomes the smallest one. Results of kinds with whole numbers are
+    rounded down, as i32; others are f64. AntsError if the rule does not equal its twin.
+    """
+    _check(rule)
+    kind, function = KINDS[rule.kind], plain_function(rule)
+    least, most, is_whole = float(kind.least), float(kind.most), kind.is_whole
+
+    @ti.func
+    def bounded(result):
+        inside = ti.select(result > ti.f64(least), result, ti.f64(least))
+        inside = ti.select(inside < ti.f64(most), inside, ti.f64(most))
+        return ti.cast(ti.floor(inside), ti.i32) if ti.static(is_whole) else inside
+
+    def rule_function(*arguments: Any) -> Any:
+        return bounded(function(*arguments))
+
+    return for_kernels(rule_function)
+
+
+def for_kernels(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a Python function that kernels call while they compile."""
+    # Taichi requires this attribute, with any value.
+    function._is_taichi_function = False
+    return function
+
+
+@cache
+def _check(rule: Rule) -> None:
+    fault = fault_apart(lambda: difference(rule))
+    if fault:
+        raise unusable(rule, fault)
+
+
+def difference(rule: Rule, n: int = TRIES) -> str:
+    """Return the first difference of a rule and its twin for n drawn inputs, or an empty string."""
+    drawn = list(tries(rule, n))
+    names = (*rule.inputs, *rule.parameters)
+    lengths = [rule.inputs[name].length if name in rule.inputs else 0 for name in names]
+    rows = np.array(
+        [
+            [x for name in names for x in np.atleast_1d({**inputs, **parameters}[name])]
+            for inputs, parameters in drawn
+        ],
+        np.float64,
+    ).reshape(n, -1)
+    try:
+        found = _results(rule, rows, lengths)
+    except Exception as error:
+        return last_line(error)
+    for (inputs, parameters), result in zip(drawn, found.tolist(), strict=True):
+        twin = float(rule.twin(**inputs, **parameters))
+        if result != twin:
+            shown = ", ".join(f"{k}={v}" for k, v in {**inputs, **parameters}.items())
+            return f"its kernel returns {result!r}, but its twin {twin!r}, for {shown}"
+    return ""
+
+
+@ti.func
+def _entry(rows: ti.template(), row, column):
+    """Return an entry of an array of rows."""
+    return rows[row, column]
+
+
+def _results(rule: Rule, rows: np.ndarray, lengths: list[int]) -> np.ndarray:
+    """Return the results of a rule in a kernel for rows of all arguments, float64 (n,)."""
+    function = plain_function(rule)
+    results = np.zeros(len(rows))
+    rows_type = ti.types.ndarray(dtype=ti.f64, ndim=2)
+    results_type = ti.types.ndarray(dtype=ti.f64, ndim=1)
+
+    def of_row(inputs: Any, row: Any) -> Any:
+        arguments, at = [], 0
+        for length in lengths:
+            entries = [_entry(inputs, row, at + k) for k in range(max(1, length))]
+            arguments.append(ti.Vector(entries) if length else entries[0])
+            at += max(1, length)
+        return function(*arguments)
+
+    for_kernels(of_row)
+
+    @ti.kernel
+    def compute(inputs: rows_type, outputs: results_type):
+        ti.loop_config(serialize=True)
+        for row in range(outputs.shape[0]):
+            outputs[row] = of_row(inputs, row)
+
+    with runtime.quiet():
+        compute(rows if rows.size else np.zeros((len(rows), 1)), results)
+    return results

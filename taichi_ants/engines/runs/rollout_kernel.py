@@ -1,0 +1,157 @@
+"""The kernel for several steps of batched environments, which records each step.
+
+A thread takes `WIDTH` ants at a time, and each ant takes up to `LENGTH` steps in a row, so that its
+cells stay in the processor's first cache. The ant writes a code for each step into `codes`. Then
+the thread writes the codes of all its ants as rows of results, with neighbouring ants in
+neighbouring memory.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import taichi as ti
+
+from taichi_ants.engines.layout import Command
+from taichi_ants.engines.runs.kernels import Failures
+from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, percept_of, restore, state_seen
+from taichi_ants.learners.memory import values_of
+from taichi_ants.task.constants import PICK_UP
+from taichi_ants.task.events import Event
+from taichi_ants.task.observations import Observation
+from taichi_ants.task.rules.delivery import step_end
+from taichi_ants.task.rules.noise import slipped
+from taichi_ants.task.rules.pheromone import FADING
+from taichi_ants.task.rules.policy import choose
+from taichi_ants.task.rules.random_bits import advance, bits_of
+
+WIDTH, LENGTH = 512, 64
+# A code is an i64, with the state in bits 0 to 31. The lowest bits of its other parts:
+_RESULT = 32
+_EVENT, _ACTION, _TERMINATED, _TRUNCATED = _RESULT, _RESULT + 8, _RESULT + 16, _RESULT + 17
+
+
+@cache
+def rollout_kernel(
+    observation: Observation,
+    deposit: int,
+    half: bool,
+    failures: Failures,
+    follows: bool,
+    width: int,
+    arguments: Any,
+) -> Callable[..., None]:
+    """Return the kernel of a rollout; see `BatchedEnvironments.rollout`.
+
+    If `follows`, ants choose by a table, with draws from their own streams, else they take given
+    actions. `width` is the number of values in an observation. Steps are equal to `step_kernel`'s.
+    """
+    state_of = state_seen(observation, half, failures.misreads)
+
+    @ti.func
+    def observe(a: ti.template(), base, ant, clock):
+        """Return the percept and the state of an ant, and the stream after possible draws."""
+        percept, state, after = percept_of(half, a, base, ant, clock), 0, ant.random_state
+        if ti.static(failures.misreads):
+            state, after = state_of(a, base, ant, clock, percept)
+        else:
+            state = state_of(a, base, ant, clock, percept)
+        return percept, state, after
+
+    @ti.func
+    def take_steps(a: ti.template(), i, first, n_steps, place):
+        """Let ant i take steps from row `first` on; its first code is at `place`."""
+        own, origin = a.shared_cells + i * (a.size + EXTRA_CELLS), a.worlds[i] * a.size
+        ant = Ant(origin=origin, cell=a.ant_cells[i], heading=ti.cast(a.headings[i], ti.i32))
+        ant.carries, ant.random_state = ti.cast(a.carries[i], ti.i32), a.random_states[i]
+        if ti.static(deposit == FADING):
+            ant.carried = a.carried[i]
+        percept, state = ti.cast(a.percepts[i], ti.i32), a.states[i]
+        # Until an ant changes its world, it reads cells that all ants share.
+        steps, base = a.steps[i], ti.select(a.changed[i] == 1, own, origin)
+        command, choices = ti.cast(a.commands[i], ti.i32), a.choices[i]
+        for t in range(n_steps):
+            action, event, terminated, truncated = 0, ti.cast(Event.NONE, ti.i32), 0, 0
+            if ti.static(follows):
+                choices = advance(choices)
+                action = choose(values_of(a.q, 0, state), bits_of(choices), a.explore_below)
+            else:
+                action = ti.cast(a.codes[place + t * WIDTH], ti.i32)
+            begins = ti.cast(command == Command.BEGIN, ti.i32)
+            if command == Command.STEP:
+                executed = action
+                if ti.static(failures.slips):
+                    executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
+                into = ti.select(executed == PICK_UP, own, base)
+                ant = act(deposit, a, into, ant, percept, executed, steps * a.evaporates)
+                event = ant.event
+                if event == Event.PICKED_UP:  # the store keeps this a branch, which is faster
+                    a.changed[i] = ti.cast(1, ti.u8)
+                    base = own
+                steps += 1
+                percept, state, ant.random_state = observe(a, base, ant, steps * a.evaporates)
+                last = ti.cast(steps == a.max_steps, ti.i32)
+                terminated, truncated = step_end(
+                    event, a.delivery_terminates, a.delivery_truncates, last
+                )
+                if terminated | truncated == 1:
+                    command = a.after_end
+                    if command == Command.STEP:  # the next episode begins in the same step
+                        a.finals[(first + t) * a.n + i] = state
+                        begins = 1
+            seen = state
+            if begins == 1:
+                if base == own:
+                    restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
+                    a.changed[i] = ti.cast(0, ti.u8)
+                stream = ant.random_state
+                ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
+                ant.random_state = stream
+                steps, base, command = 0, origin, Command.STEP
+                percept, state, ant.random_state = observe(a, origin, ant, 0)
+                seen = state
+            result = event | action << 8 | terminated << 16 | truncated << 17
+            a.codes[place + t * WIDTH] = ti.cast(seen, ti.i64) | ti.cast(result, ti.i64) << _RESULT
+        a.ant_cells[i], a.headings[i] = ant.cell, ti.cast(ant.heading, ti.u8)
+        a.carries[i], a.random_states[i] = ti.cast(ant.carries, ti.u8), ant.random_state
+        if ti.static(deposit == FADING):
+            a.carried[i] = ant.carried
+        a.percepts[i], a.states[i] = ti.cast(percept, ti.u8), state
+        a.steps[i], a.commands[i] = steps, ti.cast(command, ti.u8)
+        if ti.static(follows):
+            a.choices[i] = choices
+
+    @ti.func
+    def record(a: ti.template(), row, code):
+        """Write the results of a step."""
+        state, event = ti.cast(code, ti.i32), ti.cast(code >> _EVENT, ti.i32) & 255
+        if ti.static(follows):
+            a.taken[row] = code >> _ACTION & 7
+        a.paid[row] = a.rewards[event]
+        a.event_rows[row] = ti.cast(event, ti.u8)
+        a.terminated[row] = ti.cast(code >> _TERMINATED & 1, ti.u8)
+        a.truncated[row] = ti.cast(code >> _TRUNCATED & 1, ti.u8)
+        for k in ti.static(range(width)):
+            a.seen[row * width + k] = a.shown[state * width + k]
+
+    @ti.kernel
+    def rollout(a: arguments):
+        ti.loop_config(block_dim=1)
+        for chunk in range((a.n + WIDTH - 1) // WIDTH):
+            ant, ants = chunk * WIDTH, ti.min(WIDTH, a.n - chunk * WIDTH)
+            place, first = chunk * WIDTH * LENGTH, 0
+            while first < a.n_steps:
+                length = ti.min(LENGTH, a.n_steps - first)
+                if ti.static(not follows):
+                    for t in range(length):
+                        for j in range(ants):
+                            a.codes[place + t * WIDTH + j] = a.taken[(first + t) * a.n + ant + j]
+                for j in range(ants):
+                    take_steps(a, ant + j, first, length, place + j)
+                for t in range(length):
+                    for j in range(ants):
+                        code = a.codes[place + t * WIDTH + j]
+                        record(a, (first + t) * a.n + ant + j, code)
+                first += length
+
+    return rollout

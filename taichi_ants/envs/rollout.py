@@ -1,0 +1,174 @@
+"""Rollouts of vector environments: several steps in one call, as arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from gymnasium.error import InvalidAction
+
+from taichi_ants import checks
+from taichi_ants.errors import AntsError, check_array, checked_whole, shown
+from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants.grid.randomness import GAMMA, mix, stream_state
+from taichi_ants.learners.policies import frozen_policy
+from taichi_ants.task import Task
+from taichi_ants.task.constants import N_ACTIONS
+
+if TYPE_CHECKING:
+    from taichi_ants.envs.formats import Shown
+
+_ALL_ACTIONS = (1 << N_ACTIONS) - 1  # a mask, in which bit a is action a
+
+
+class Rollout(NamedTuple):
+    """The results of several steps of n environments; row t of each array is step t.
+
+    Attributes:
+        observations: The observations before each step, and after the last one: (steps + 1, n, ...)
+            of the dtype of the observation space. `observations[1:]` are those that `step` returns.
+        actions: The actions taken, int64 (steps, n).
+        rewards: float64 (steps, n).
+        terminated, truncated: bool (steps, n).
+        events: The results of the actions, codes of `Event` as uint8 (steps, n). `NONE` in steps
+            that only begin an episode, or of environments that wait for a reset.
+        final_observations: The last observation of each episode that ended, (episodes, ...), in
+            the order of `np.argwhere(terminated | truncated)`.
+    """
+
+    observations: np.ndarray
+    actions: np.ndarray
+    rewards: np.ndarray
+    terminated: np.ndarray
+    truncated: np.ndarray
+    events: np.ndarray
+    final_observations: np.ndarray
+
+    @classmethod
+    def empty(cls, steps: int, n: int, formats: Shown) -> Rollout:
+        """Return a rollout whose arrays have no values yet."""
+        shape, (_, *seen) = (steps, n), formats.table.shape
+        return cls(
+            observations=np.empty((steps + 1, n, *seen), formats.table.dtype),
+            actions=np.empty(shape, np.int64),
+            rewards=np.empty(shape),
+            terminated=np.empty(shape, bool),
+            truncated=np.empty(shape, bool),
+            events=np.empty(shape, np.uint8),
+            final_observations=np.empty((0, *seen), formats.table.dtype),
+        )
+
+    def check_like(self, other: Rollout) -> None:
+        """Raise AntsError unless the arrays of this `out` have the shapes and types of another."""
+        for name, mine, wanted in zip(self._fields[:-1], self, other, strict=False):
+            check_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
+            if not mine.flags.carray:
+                raise AntsError(
+                    f"out.{name} is not contiguous or not writeable; give a rollout that "
+                    "`rollout` returned."
+                )
+
+
+class Choices(NamedTuple):
+    """The choices of n ants by a table of action values.
+
+    Attributes:
+        q_values: Action values, float32 (n_states, 5).
+        streams: The state of each ant's random stream, uint64 (n,), separate from the streams of
+            the environments.
+        epsilon: The probability of a random action.
+    """
+
+    q_values: np.ndarray
+    streams: np.ndarray
+    epsilon: float
+
+    @classmethod
+    def of(cls, q_values: np.ndarray, n: int, epsilon: float, seed: int) -> Choices:
+        """Return the choices of n ants with random streams of a seed."""
+        return cls(q_values, stream_state(seed, STREAM_ROLLOUT, np.arange(n)), epsilon)
+
+    def masks(self) -> np.ndarray:
+        """Return the actions with the largest value in each state, as bits: int64 (n_states,)."""
+        best = self.q_values >= self.q_values.max(axis=1, keepdims=True)
+        return best @ (1 << np.arange(N_ACTIONS))
+
+    def draw(self, masks: np.ndarray) -> np.ndarray:
+        """Return an action of each ant's mask, int64 (n,), with the draw of `rules.policy.choose`.
+
+        With probability epsilon, the action is any of the five.
+        """
+        self.streams[:] += np.uint64(GAMMA)
+        bits = mix(self.streams)
+        explores = bits >> np.uint64(32) < np.uint64(self.epsilon * 4294967296.0)
+        allowed = np.where(explores, _ALL_ACTIONS, masks)
+        words = bits & np.uint64(0xFFFFFFFF)
+        k = (words * _COUNTS.take(allowed) >> np.uint64(32)).astype(np.int64)
+        return _KTH.take(allowed * N_ACTIONS + k)
+
+
+def _actions_of_masks() -> np.ndarray:
+    """Return action number k of each mask, int64 (32, 5)."""
+    bits = np.arange(_ALL_ACTIONS + 1)[:, None] >> np.arange(N_ACTIONS) & 1
+    return np.argsort(1 - bits, axis=1, kind="stable")
+
+
+_KTH = _actions_of_masks().reshape(-1)
+_COUNTS = np.array([mask.bit_count() for mask in range(_ALL_ACTIONS + 1)], np.uint64)
+
+
+def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
+    """Return actions as an array of integers of a shape; InvalidAction for others."""
+    try:
+        given = np.asarray(actions)
+    except ValueError:  # lists of several lengths
+        given = np.empty(0)
+    if given.shape != shape or given.dtype.kind not in "iu":
+        raise InvalidAction(
+            f"the actions are {shown(actions)}; they must be an array of an integer type and of "
+            f"shape {shape}."
+        )
+    if given.min() < 0 or given.max() >= N_ACTIONS:
+        wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
+        raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
+    return given
+
+
+def checked_plan(
+    policy: Any, steps: int | None, n: int, task: Task
+) -> tuple[int, np.ndarray | None, np.ndarray | None]:
+    """Return the number of steps, and either actions, int64 (steps, n), or action values.
+
+    Raises:
+        AntsError, InvalidAction: The policy or the number of steps is not allowed.
+    """
+    if isinstance(policy, str):
+        table = frozen_policy(policy, task.observation)
+    else:
+        try:
+            given = np.asarray(getattr(policy, "q_values", policy))
+        except ValueError:  # lists of several lengths
+            given = np.empty(0)
+        if given.dtype.kind in "iu":
+            if given.ndim != 2 or not len(given):
+                raise InvalidAction(
+                    f"the actions are {shown(policy)}; they must be an array of shape (steps, {n}) "
+                    "with at least one step."
+                )
+            if steps not in (None, len(given)):
+                raise AntsError(
+                    f"steps is {shown(steps)}, but there are actions for {len(given)} steps; leave "
+                    "steps out."
+                )
+            actions = checked_actions(given, (len(given), n))
+            return len(given), np.ascontiguousarray(actions, np.int64), None
+        if given.dtype.kind != "f" or given.shape[-2:] != (task.n_states, N_ACTIONS):
+            raise AntsError(
+                f"policy is {shown(policy)}; give actions, integers of shape (steps, {n}), or a "
+                f"policy: action values of shape ({task.n_states}, {N_ACTIONS}), a name, or the "
+                "path of a policy file."
+            )
+        table = checks.checked_table(policy, task)
+    if steps is None:
+        raise AntsError("steps is None; give the number of steps in which ants follow the policy.")
+    return checked_whole("steps", steps), None, table

@@ -1,0 +1,134 @@
+"""Castes, response thresholds and idle ants in plain Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from taichi_ants.errors import AntsError
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_TRAIT
+from taichi_ants.reference.ants import Ant
+from taichi_ants.reference.geometry import Cell, neighbour
+from taichi_ants.reference.numbers import exponential, logarithm, power
+from taichi_ants.reference.random_stream import RandomStream, stream_state
+
+if TYPE_CHECKING:
+    from taichi_ants.task import Caste, Labour, Task, Threshold
+
+_WORDS = 4294967296.0
+
+
+def shares_of(castes: Sequence[Caste], nest: int) -> list[float | None]:
+    """Return the share of each caste in a nest; None if `ants` gives its number, or it is absent.
+
+    Castes with neither divide the remaining share equally.
+    """
+    here = [caste for caste in castes if caste.nest is None or caste.nest == nest]
+    taken = sum([caste.share for caste in here if caste.share is not None])
+    neither = [caste for caste in here if caste.share is None and caste.ants is None]
+    shares: list[float | None] = []
+    for caste in castes:
+        if not any(caste is one for one in here) or caste.ants is not None:
+            shares.append(None)
+        elif caste.share is not None:
+            shares.append(caste.share)
+        else:
+            shares.append(max(1.0 - taken, 0.0) / len(neither))
+    return shares
+
+
+def fixed_numbers(castes: Sequence[Caste], nest: int) -> list[int]:
+    """Return the ants that `ants` gives to each caste of a nest."""
+    return [
+        caste.ants if caste.ants is not None and caste.nest in (None, nest) else 0
+        for caste in castes
+    ]
+
+
+def castes_at_start(castes: Sequence[Caste], nest: int, n: int) -> list[int]:
+    """Return the castes of the n ants of a nest, in the order of their numbers."""
+    numbers, shares = fixed_numbers(castes, nest), shares_of(castes, nest)
+    rest = n - sum(numbers)
+    if rest < 0 or (rest and not any(shares)):
+        raise AntsError(f"the castes do not fit the {n} ants of nest {nest}; change them.")
+    quotas = [round(share * rest, 9) if share is not None else 0.0 for share in shares]
+    numbers = [fixed + int(quota) for fixed, quota in zip(numbers, quotas, strict=True)]
+    while sum(numbers) < n:
+        left = [quota - int(quota) for quota in quotas]
+        largest = left.index(max(left))
+        numbers[largest] += 1
+        quotas[largest] = 0.0
+    return [caste for caste, number in enumerate(numbers) for _ in range(number)]
+
+
+def draw_caste(castes: Sequence[Caste], nest: int, n: int, stream: RandomStream) -> int:
+    """Return the caste of an ant that is born in a nest in which n ants started."""
+    if len(castes) < 2:
+        return 0
+    high, _ = stream.draw()
+    fixed, shares = fixed_numbers(castes, nest), shares_of(castes, nest)
+    rest = (n - sum(fixed)) / n if n else 1.0
+    cumulative = 0.0
+    for caste in range(len(castes) - 1):
+        share = shares[caste]
+        cumulative += fixed[caste] / max(n, 1) + (0.0 if share is None else share * rest)
+        if cumulative > high / _WORDS:
+            return caste
+    return len(castes) - 1
+
+
+def draw_threshold(threshold: Threshold, seed: int, number: int) -> np.float32:
+    """Return the threshold of the ant with a number, 0 without one."""
+    if threshold.distribution == "none":
+        return np.float32(0)
+    assert threshold.value is not None
+    value, spread = threshold.value, threshold.spread or 0.0
+    stream = RandomStream(stream_state(seed, STREAM_TRAIT, number))
+    if threshold.distribution == "fixed":
+        return np.float32(value)
+    if threshold.distribution == "uniform":
+        high, _ = stream.draw()
+        return np.float32(value + spread * (2.0 * ((high + 0.5) / _WORDS) - 1.0))
+    while True:
+        high, low = stream.draw()
+        a, b = ((word + 0.5) / 2147483648.0 - 1.0 for word in (high, low))
+        q = a * a + b * b
+        if q >= 1.0:
+            continue
+        z = a * power(-2.0 * logarithm(q) / q, 0.5)
+        if threshold.distribution == "lognormal":
+            return np.float32(value * exponential(spread * z))
+        if value + spread * z >= 0.0:
+            return np.float32(value + spread * z)
+
+
+def starts_foraging(ant: Ant, stimulus: float, labour: Labour) -> bool:
+    """Return whether an idle ant starts to forage, by a draw."""
+    assert labour.exponent is not None
+    high, _ = ant.stream.draw()
+    if stimulus <= 0.0:
+        return False
+    ratio = float(ant.threshold) / stimulus
+    raised = power(ratio, labour.exponent) if ratio > 0.0 else 0.0
+    return high < int(1.0 / (1.0 + raised) * _WORDS)
+
+
+def stops_foraging(ant: Ant, queen: Cell, task: Task) -> bool:
+    """Return whether a forager becomes idle, by a draw if it can."""
+    caste, chance = list(task.castes.values())[ant.caste], task.labour.quit
+    at_nest = queen in [neighbour(ant.cell, heading) for heading in range(N_HEADINGS)]
+    if not chance or caste.threshold.distribution == "none" or ant.carries or not at_nest:
+        return False
+    high, _ = ant.stream.draw()
+    return high < int(chance * _WORDS)
+
+
+def lays(task: Task, ant: Ant, name: str) -> bool:
+    """Return whether an ant lays a pheromone."""
+    if not task.castes:
+        return True
+    caste = list(task.castes.values())[ant.caste]
+    names = [one.strip() for one in caste.lays.split(",")]
+    return names == ["all"] or name in names

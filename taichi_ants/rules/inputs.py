@@ -1,0 +1,158 @@
+"""The inputs that rules can read: their meaning, their number of entries, and drawn values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    import numpy as np
+
+AHEAD = 3  # entries of an input with a value for each cell ahead: left, forward, right
+LEVELS, LEVEL = "levels_", "level_"  # the beginnings of inputs that read a field
+MOST_LEVEL = 1_000_000_000
+MOST_REWARD = 1000
+
+
+class Input(NamedTuple):
+    """An input: its meaning, and its number of entries if it is a vector, else 0."""
+
+    meaning: str
+    length: int = 0
+
+
+class Kind(NamedTuple):
+    """A kind of rule: its result and the range of its result, and its inputs by name."""
+
+    result: str
+    least: float
+    most: float
+    is_whole: bool
+    inputs: Mapping[str, Input]
+    reads_fields: bool = False
+
+
+_CODES = "codes seen: 0 E, 1 O, 2 T or S, 3 F or Q; see the glossary"
+_CUE = "the ant's cue: the pheromone that an ant with its load follows"
+KINDS: dict[str, Kind] = {
+    "choice": Kind(
+        "an action: 0 left, 1 forward, 2 right, 3 pick up, 4 give",
+        *(0, 4, True),
+        {
+            "values": Input("action values of the ant's state; the ants then need a table", 5),
+            "codes": Input(_CODES, AHEAD),
+            "levels": Input(f"levels of {_CUE}; 0 on obstacles, food and misread cells", AHEAD),
+            "nearer": Input("1 if the cell is seen as S by the compass, else 0", AHEAD),
+            "is_open": Input("1 if the ant can try to enter the cell, else 0", AHEAD),
+            "level": Input("level of the ant's cue on its own cell"),
+            "carries": Input("1 with food, else 0"),
+            "percept": Input("the paper's state, 0 to 127"),
+            "epsilon": Input("exploration rate"),
+            "random": Input("random number from 0 to less than 1"),
+            "random_2": Input("another random number from 0 to less than 1"),
+            "tick": Input("number of the tick in the episode, from 0"),
+        },
+        reads_fields=True,
+    ),
+    "deposit": Kind(
+        "the new level of the cell; the level itself for no deposit",
+        *(0, MOST_LEVEL, False),
+        {
+            "level": Input("level of the cell before the deposit"),
+            "carried": Input("ticks since the ant's load changed"),
+            "carries": Input("1 if the ant has food after its action, else 0"),
+            "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
+            "percept": Input("the paper's state of the ant before its action, 0 to 127"),
+            "tick": Input("number of the tick in the episode, from 0"),
+        },
+    ),
+    "evaporation": Kind(
+        "the level of a cell after the tick, before diffusion",
+        *(0, MOST_LEVEL, False),
+        {
+            "level": Input("level of the cell before evaporation"),
+            "tick": Input("number of the tick in the episode, from 0"),
+        },
+    ),
+    "reward": Kind(
+        "the reward of the ant's action",
+        *(-MOST_REWARD, MOST_REWARD, True),
+        {
+            "reward": Input("reward by `task.rewards` and `task.foods`"),
+            "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
+            "carries": Input("1 if the ant has food after its action, else 0"),
+            "percept": Input("the paper's state of the ant before its action, 0 to 127"),
+            "next_percept": Input("the paper's state after the tick, 0 to 127"),
+            "levels": Input(f"levels of {_CUE}, after the tick; 0 on obstacles and food", AHEAD),
+            "level": Input("level of the ant's cue on its own cell, after the tick"),
+            "tick": Input("number of the tick in the episode, from 0"),
+        },
+        reads_fields=True,
+    ),
+}
+
+
+def input_of(kind: str, name: str) -> Input | None:
+    """Return an input of a kind of rules by its name; None if there is none."""
+    if name in KINDS[kind].inputs:
+        return KINDS[kind].inputs[name]
+    for start, length in ((LEVELS, AHEAD), (LEVEL, 0)):
+        if KINDS[kind].reads_fields and name.startswith(start) and name != start:
+            return Input(f"level of {name.removeprefix(start)}", length)
+    return None
+
+
+def field_of(name: str) -> str:
+    """Return the name of the field that an input of any kind reads, or an empty string."""
+    known = any(name in kind.inputs for kind in KINDS.values())
+    for start in (LEVELS, LEVEL):
+        if name.startswith(start) and not known:
+            return name.removeprefix(start)
+    return ""
+
+
+class Vector(tuple):
+    """A vector of numbers whose indices are whole numbers that are not negative, as in kernels."""
+
+    def __getitem__(self, k: Any) -> Any:
+        if k != int(k) or not 0 <= k < len(self):
+            raise IndexError(f"there is no entry {k}")
+        return super().__getitem__(int(k))
+
+
+def drawn(inputs: Mapping[str, Input], n: int, seed: int = 0) -> Iterator[dict[str, Any]]:
+    """Yield n drawn sets of inputs by name: floats, and Vectors of floats."""
+    import numpy as np
+
+    rng = np.random.default_rng(seed)
+    for _ in range(n):
+        yield {
+            name: Vector(_drawn(rng, name) for _ in range(one.length))
+            if one.length
+            else _drawn(rng, name)
+            for name, one in inputs.items()
+        }
+
+
+def _drawn(rng: np.random.Generator, name: str) -> float:
+    """Return a value that an input of this name, or an entry of it, can have."""
+    import numpy as np
+
+    if name in _MOST:
+        return float(rng.integers(_MOST[name] + 1))
+    if name in ("random", "random_2", "epsilon"):
+        return float(rng.integers(2**32)) / 2**32
+    if name in ("tick", "carried"):
+        return float(int(10 ** rng.uniform(0, 7)) - 1)
+    if name == "reward":
+        return float(rng.integers(-MOST_REWARD, MOST_REWARD + 1))
+    if name == "values":
+        return float(np.float32(rng.choice([0.0, 1.0, rng.normal(scale=30)])))
+    level = rng.choice([0.0, 250.0, 10 ** rng.uniform(0, 6)])
+    return float(np.float32(level) if rng.random() < 0.5 else int(level))
+
+
+_MOST = {
+    **{"codes": 3, "nearer": 1, "is_open": 1, "carries": 1, "event": 7},
+    **{"percept": 127, "next_percept": 127},
+}

@@ -1,0 +1,250 @@
+"""The language of rules: a part of Python that means the same in Python and in kernels.
+
+All numbers are 64-bit floating-point numbers, whole numbers too. A rule computes with + - * / // %,
+comparisons, `and`, `or`, `not`, conditional expressions, and `exp`, `log`, `power`, `min`, `max`
+and `abs`. Statements are assignments, `if`, and `for` over a `range` of literal numbers. The only
+`return` is the last line. So a rule always ends, and reads nothing but its arguments.
+
+`kernel_source` translates a rule into source text for Taichi. Python types a variable at each
+assignment, Taichi at the first one; the translation removes this and other differences.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from textwrap import dedent
+from typing import Any
+
+FUNCTIONS = {"exp": 1, "log": 1, "power": 2, "min": 2, "max": 2, "abs": 1}  # numbers of arguments
+_MOST_REPEATS = 256  # of the body of the innermost loop
+_OPERATORS = {ast.Add: "{} + {}", ast.Sub: "{} - {}", ast.Mult: "{} * {}", ast.Div: "{} / {}"}
+_OPERATORS |= {ast.FloorDiv: "ti.floor({} / {})", ast.Mod: "modulo({}, {})"}
+_COMPARISONS = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+}
+
+
+class LanguageError(ValueError):
+    """The reason why a function is not a rule, with the line in the function, from 1."""
+
+
+def kernel_source(function: Callable[..., Any], lengths: Mapping[str, int]) -> str:
+    """Return the source of a Taichi function `rule` that does the same as a function.
+
+    `lengths` has all arguments in order: 0 for a number, else the length of a vector. Raises
+    LanguageError if the function contains anything else than the module's docstring describes.
+    """
+    try:
+        (tree,) = ast.parse(dedent(inspect.getsource(function))).body
+    except (OSError, SyntaxError, TypeError, ValueError) as error:
+        raise LanguageError("its source cannot be read; define it with def, in a file") from error
+    if not isinstance(tree, ast.FunctionDef):
+        raise LanguageError("it must be a function that is defined with def")
+    return _Translation(function, tree, lengths).source()
+
+
+class _Translation:
+    """The translation of one function; names of the rule begin with `u_` in the result."""
+
+    def __init__(
+        self, function: Callable[..., Any], tree: ast.FunctionDef, lengths: Mapping[str, int]
+    ) -> None:
+        closure = inspect.getclosurevars(function)
+        self._outside = {**closure.builtins, **closure.globals, **closure.nonlocals}
+        self._tree, self._lengths = tree, lengths
+        self._first_line = tree.lineno - len(tree.decorator_list)
+        self._loops: list[tuple[str, int]] = []  # variables and repetitions of the present loops
+        assigned = (
+            one.id
+            for one in ast.walk(tree)
+            if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)
+        )
+        self._numbers = dict.fromkeys([*(n for n in lengths if not lengths[n]), *assigned])
+        self._loop_variables = {
+            one.target.id
+            for one in ast.walk(tree)
+            if isinstance(one, ast.For) and isinstance(one.target, ast.Name)
+        }
+
+    def source(self) -> str:
+        """Return the source of the function."""
+        body = self._tree.body
+        if ast.get_docstring(self._tree) is not None:
+            body = body[1:]
+        returns = [one for one in ast.walk(self._tree) if isinstance(one, ast.Return)]
+        if not body or returns != body[-1:]:
+            raise LanguageError("its last line, and no other, must be a return")
+        if returns[0].value is None:
+            raise LanguageError("its return has no value")
+        lines = [f"def rule({', '.join(f'a_{name}' for name in self._lengths)}):"]
+        lines += [f"    u_{name} = ti.cast(a_{name}, ti.f64)" for name in self._lengths]
+        inner = [name for name in self._numbers if name not in self._lengths]
+        lines += [
+            f"    u_{name} = ti.f64(0.0)" for name in inner if name not in self._loop_variables
+        ]
+        for statement in body[:-1]:
+            lines += self._statement(statement, "    ")
+        result = self._number(returns[0].value)
+        return "\n".join([*lines, f"    return ti.cast({result}, ti.f64)", ""])
+
+    def _refuse(self, node: ast.AST, why: str = "is not allowed") -> LanguageError:
+        line = getattr(node, "lineno", 1) - self._first_line + 1
+        text = " ".join(ast.unparse(node).split())
+        text = text if len(text) <= 60 else text[:57] + "..."
+        return LanguageError(f"line {line} of it, `{text}`, {why}")
+
+    def _statement(self, node: ast.stmt, indent: str) -> Iterator[str]:
+        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            yield f"{indent}{self._target(node.targets[0])} = {self._cast(node.value)}"
+        elif isinstance(node, ast.AugAssign):
+            read = ast.copy_location(ast.Name(getattr(node.target, "id", ""), ast.Load()), node)
+            whole = ast.copy_location(ast.BinOp(read, node.op, node.value), node)
+            yield f"{indent}{self._target(node.target)} = {self._cast(whole)}"
+        elif isinstance(node, ast.If):
+            yield f"{indent}if {self._truth(node.test)}:"
+            for statement in node.body:
+                yield from self._statement(statement, indent + "    ")
+            if node.orelse:
+                yield f"{indent}else:"
+                for statement in node.orelse:
+                    yield from self._statement(statement, indent + "    ")
+        elif isinstance(node, ast.For) and not node.orelse:
+            yield from self._loop(node, indent)
+        elif isinstance(node, ast.Pass):
+            yield f"{indent}pass"
+        else:
+            raise self._refuse(node)
+
+    def _target(self, node: ast.expr) -> str:
+        if not isinstance(node, ast.Name):
+            raise self._refuse(node, "is not allowed; assign to one name at a time")
+        if node.id in self._loop_variables or self._lengths.get(node.id):
+            raise self._refuse(node, "cannot be assigned; choose another name")
+        return f"u_{node.id}"
+
+    def _loop(self, node: ast.For, indent: str) -> Iterator[str]:
+        over, variable = node.iter, node.target
+        is_range = isinstance(over, ast.Call) and ast.unparse(over.func) == "range"
+        if not is_range or not isinstance(variable, ast.Name) or variable.id in self._lengths:
+            raise self._refuse(
+                over, "is not allowed; a loop must be over a range of literal numbers"
+            )
+        try:
+            repeats = range(*(ast.literal_eval(one) for one in over.args))  # type: ignore[attr-defined]
+        except (TypeError, ValueError):
+            raise self._refuse(over, "must have literal whole numbers") from None
+        self._loops.append((variable.id, len(repeats)))
+        total = 1
+        for _, n in self._loops:
+            total *= max(1, n)
+        if total > _MOST_REPEATS:
+            raise self._refuse(over, f"repeats {total} times; at most {_MOST_REPEATS} are allowed")
+        yield f"{indent}for u_{variable.id} in ti.static({ast.unparse(over)}):"
+        for statement in node.body:
+            yield from self._statement(statement, indent + "    ")
+        self._loops.pop()
+
+    def _cast(self, node: ast.expr) -> str:
+        return f"ti.cast({self._number(node)}, ti.f64)"
+
+    def _number(self, node: ast.expr) -> str:
+        """Return an expression of a number, f64."""
+        if isinstance(node, ast.Constant):
+            return self._literal(node, node.value)
+        if isinstance(node, ast.Name):
+            return self._name(node)
+        if isinstance(node, ast.Attribute):
+            return self._literal(node, self._attribute(node))
+        if isinstance(node, ast.Subscript):
+            return self._entry(node)
+        if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
+            form = _OPERATORS[type(node.op)]
+            return f"({form.format(self._number(node.left), self._number(node.right))})"
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
+            sign = "-" if isinstance(node.op, ast.USub) else ""
+            return f"({sign}{self._number(node.operand)})"
+        if isinstance(node, ast.Compare):
+            return f"ti.cast({self._truth(node)}, ti.f64)"
+        if isinstance(node, ast.IfExp):
+            branches = f"{self._number(node.body)}, {self._number(node.orelse)}"
+            return f"ti.select({self._truth(node.test)}, {branches})"
+        if isinstance(node, ast.Call):
+            return self._call(node)
+        raise self._refuse(node)
+
+    def _literal(self, node: ast.expr, value: Any) -> str:
+        if not isinstance(value, (bool, int, float)):
+            raise self._refuse(node, "is not a number")
+        return f"ti.f64({float(value)!r})"
+
+    def _name(self, node: ast.Name) -> str:
+        if any(node.id == variable for variable, _ in self._loops):
+            return f"ti.cast(u_{node.id}, ti.f64)"
+        if node.id in self._numbers and node.id not in self._loop_variables:
+            return f"u_{node.id}"
+        if node.id in self._lengths:
+            raise self._refuse(node, "is a vector; use its entries, for example with [0]")
+        if node.id in self._loop_variables:
+            raise self._refuse(node, "is used outside its loop")
+        if node.id not in self._outside:
+            raise self._refuse(node, "is not defined")
+        return self._literal(node, self._outside[node.id])
+
+    def _attribute(self, node: ast.Attribute) -> Any:
+        inner = node.value
+        if isinstance(inner, ast.Attribute):
+            return getattr(self._attribute(inner), node.attr, None)
+        name = inner.id if isinstance(inner, ast.Name) else ""
+        return getattr(self._outside.get(name), node.attr, None)
+
+    def _entry(self, node: ast.Subscript) -> str:
+        name = node.value.id if isinstance(node.value, ast.Name) else ""
+        length, place = self._lengths.get(name, 0), node.slice
+        if not length:
+            raise self._refuse(node, "is not an entry of a vector")
+        if isinstance(place, ast.Constant):
+            if type(place.value) is not int or not 0 <= place.value < length:
+                raise self._refuse(node, f"must have an index from 0 to {length - 1}")
+            return f"u_{name}[{place.value}]"
+        if isinstance(place, ast.Name) and any(place.id == one for one, _ in self._loops):
+            return f"u_{name}[u_{place.id}]"
+        index = f"ti.cast({self._number(place)}, ti.i32)"
+        return f"u_{name}[ti.max(ti.min({index}, {length - 1}), 0)]"
+
+    def _call(self, node: ast.Call) -> str:
+        name = node.func.id if isinstance(node.func, ast.Name) else ""
+        if name not in FUNCTIONS or name in self._numbers:
+            raise self._refuse(node, f"calls another function than {', '.join(FUNCTIONS)}")
+        wanted, given = FUNCTIONS[name], [self._number(one) for one in node.args]
+        several = name in ("min", "max") and len(given) >= wanted
+        if node.keywords or not (len(given) == wanted or several):
+            raise self._refuse(node, f"must have {wanted} arguments")
+        result = given[0] if several else f"{name}_({', '.join(given)})"
+        for one in given[1:] if several else ():
+            result = f"{name}_({result}, {one})"
+        return result
+
+    def _truth(self, node: ast.expr) -> str:
+        """Return an expression of a truth value."""
+        if isinstance(node, ast.BoolOp):
+            sign = " & " if isinstance(node.op, ast.And) else " | "
+            return f"({sign.join(self._truth(one) for one in node.values)})"
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            return f"(not {self._truth(node.operand)})"
+        if not isinstance(node, ast.Compare):
+            return f"({self._number(node)} != ti.f64(0.0))"
+        parts, left = [], self._number(node.left)
+        for operator, right in zip(node.ops, node.comparators, strict=True):
+            if type(operator) not in _COMPARISONS:
+                raise self._refuse(node)
+            following = self._number(right)
+            parts.append(f"({left} {_COMPARISONS[type(operator)]} {following})")
+            left = following
+        return f"({' & '.join(parts)})"

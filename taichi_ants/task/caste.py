@@ -1,0 +1,230 @@
+"""Castes of ants, their response thresholds, and the division of a nest's ants into castes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from numbers import Real
+from typing import Annotated, Any, Literal, get_args
+
+from taichi_ants.errors import AntsError, is_flag
+from taichi_ants.settings import Is, Settings
+from taichi_ants.task.constants import MAX_NESTS, MAX_STEPS
+
+Distribution = Literal["none", "fixed", "uniform", "normal", "lognormal"]
+DISTRIBUTIONS: tuple[str, ...] = get_args(Distribution)
+ALL, NOTHING = "all", "none"  # values of `Caste.lays` that are not names
+
+
+@dataclass(frozen=True)
+class Threshold(Settings, path="task.castes.NAME.threshold"):
+    """The distribution of the response thresholds of a caste; by default, it has none.
+
+    - "fixed": all ants have the threshold `value`.
+    - "uniform": thresholds lie between `value` - `spread` and `value` + `spread`.
+    - "normal": `value` is the mean and `spread` the standard deviation. Values below 0 are drawn
+      again.
+    - "lognormal": `value` is the median and `spread` the standard deviation of the logarithm.
+    """
+
+    distribution: Annotated[
+        Distribution,
+        Is("distribution of thresholds over the ants of the caste; with none, they always forage"),
+    ] = "none"
+    value: Annotated[
+        float | None,
+        Is("threshold, or the middle of its distribution", unit="units of stimulus"),
+        Is(least=0, most=1e6, usual=10.0, only=("distribution", *DISTRIBUTIONS[1:])),
+    ] = None
+    spread: Annotated[
+        float | None,
+        Is("width of the distribution: half the range, or a standard deviation"),
+        Is(least=0, most=1e6, usual=1.0, only=("distribution", *DISTRIBUTIONS[2:])),
+    ] = None
+
+    def __post_init__(self) -> None:
+        self.check()
+        if self.distribution == "uniform" and self.spread > self.value:  # type: ignore[operator]
+            raise AntsError(
+                f"`{self.path}.spread` is {self.spread}; it must be at most the value, "
+                f"{self.value}, because thresholds cannot be negative."
+            )
+        if self.distribution == "lognormal" and self.spread > 20:  # type: ignore[operator]
+            raise AntsError(
+                f"`{self.path}.spread` is {self.spread}; it must be between 0 and 20 for "
+                "'lognormal'."
+            )
+
+    @classmethod
+    def named(cls) -> Mapping[str, Threshold]:
+        """Return the named values, one for each distribution."""
+        return {name: cls(name) for name in DISTRIBUTIONS}  # type: ignore[arg-type]
+
+    @property
+    def exists(self) -> bool:
+        """Whether the ants have a threshold."""
+        return self.distribution != "none"
+
+    @property
+    def numbers(self) -> tuple[float, float, float]:
+        """The number of the distribution, `value` and `spread`, as kernels read them."""
+        return DISTRIBUTIONS.index(self.distribution), self.value or 0.0, self.spread or 0.0
+
+
+@dataclass(frozen=True, repr=False)
+class Caste(Settings, path="task.castes.NAME"):
+    """A caste of ants, for colonies only.
+
+    Ants of a caste share a table of action values, and can have their own numbers. None means that
+    they have those of the task, or of the training. A caste has a `share` of the ants of each nest,
+    or a number of `ants`; castes without both divide the remaining share equally. With a `policy`,
+    the ants of the caste follow it and do not learn. `lays` can also be a list of names, and
+    `threshold` a number, which is a fixed threshold.
+    """
+
+    share: Annotated[
+        float | None, Is("share of the ants of a nest that `ants` does not give to castes"),
+        Is(least=0, most=1),
+    ] = None  # fmt: skip
+    ants: Annotated[
+        int | None, Is("number of ants in each nest at the start, instead of a share"),
+        Is(least=0, most=1 << 24),
+    ] = None  # fmt: skip
+    nest: Annotated[
+        int | None,
+        Is("number of the nest that has the caste; off: each nest", least=0, most=MAX_NESTS - 1),
+    ] = None
+    policy: Annotated[
+        str | None,
+        Is("policy file, or the name of a hand-written policy, that the ants follow; off: learn"),
+    ] = None
+    epsilon: Annotated[float | None, Is("constant exploration rate", least=0, most=1)] = None
+    learning_rate: Annotated[
+        float | None, Is("constant learning rate", least=1e-37, most=1)
+    ] = None  # fmt: skip
+    discount: Annotated[float | None, Is("discount factor", least=0, most=1)] = None
+    temperature: Annotated[
+        float | None, Is("temperature of the rule softmax", least=1e-6, most=1e6)
+    ] = None
+    k: Annotated[
+        float | None,
+        Is("attraction of a cell without a trail, for the rule deneubourg", least=0.001, most=1e6),
+    ] = None
+    exponent: Annotated[
+        float | None,
+        Is("exponent of the attraction of a cell, for the rule deneubourg", least=0, most=20),
+    ] = None
+    lays: Annotated[
+        str, Is("pheromones that the ants lay: all, none, or names separated by commas")
+    ] = ALL
+    outbound_cue: Annotated[
+        str | None, Is("pheromone that ants without food see as T; off: that of the task")
+    ] = None
+    homing_cue: Annotated[
+        str | None, Is("what ants with food see as S; off: the cue of the task")
+    ] = None
+    lifespan: Annotated[
+        int | None, Is("age at which an ant dies; off: that of the task", unit="ticks"),
+        Is(least=1, most=MAX_STEPS),
+    ] = None  # fmt: skip
+    threshold: Annotated[Threshold, Is("response thresholds of the ants")] = field(
+        default_factory=Threshold
+    )
+
+    def __post_init__(self) -> None:
+        lays: Any = self.lays
+        if isinstance(lays, (list, tuple)) and all(isinstance(name, str) for name in lays):
+            object.__setattr__(self, "lays", ",".join(lays) or NOTHING)
+        value: Any = self.threshold
+        if isinstance(value, Real) and not is_flag(value):
+            object.__setattr__(self, "threshold", Threshold("fixed", value))  # type: ignore[arg-type]
+        self.check()
+        if self.share is not None and self.ants is not None:
+            raise AntsError(
+                f"`{self.path}.ants` is {self.ants}, but `share` is {self.share}; give one of them."
+            )
+
+    def __repr__(self) -> str:
+        """Return the settings that differ from their defaults."""
+        usual, own = vars(Caste()), vars(self)
+        return f"Caste({', '.join(f'{n}={own[n]!r}' for n in own if own[n] != usual[n])})"
+
+    @property
+    def fixed(self) -> tuple[Any, ...]:
+        """The settings that cannot change in an episode."""
+        return self.share, self.ants, self.nest, self.policy, self.threshold.exists
+
+    def laid(self, names: Sequence[str]) -> list[str]:
+        """Return the pheromones that the ants lay, of those with these names."""
+        if self.lays in (ALL, NOTHING):
+            return list(names) if self.lays == ALL else []
+        return [name.strip() for name in self.lays.split(",")]
+
+    def is_in(self, nest: int) -> bool:
+        """Return whether a nest has the caste."""
+        return self.nest in (None, nest)
+
+
+def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
+    """Return the share of each caste in the ants of a nest that `ants` does not give to castes.
+
+    AntsError if the nest has no caste, or shares do not add up to 1.
+    """
+    ours = [caste for caste in castes.values() if caste.is_in(nest)]
+    if not ours:
+        raise AntsError(
+            f"`task.castes` has no caste for nest {nest}; add one, or leave `nest` out of a caste."
+        )
+    given = [caste.share for caste in ours if caste.share is not None]
+    n_open = sum(caste.share is None and caste.ants is None for caste in ours)
+    left = 1.0 - sum(given)
+    if left < -1e-9 or (given and not n_open and left > 1e-9):
+        raise AntsError(
+            f"the shares of `task.castes` in nest {nest} add up to {sum(given):g}; they must add "
+            "up to 1, or to less if another caste has neither `share` nor `ants`."
+        )
+    equal = max(left, 0.0) / n_open if n_open else 0.0
+    return [
+        0.0
+        if not caste.is_in(nest) or caste.ants is not None
+        else equal
+        if caste.share is None
+        else caste.share
+        for caste in castes.values()
+    ]
+
+
+def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
+    """Return the number of ants of each caste among the n ants of a nest at the start.
+
+    The ants that `ants` does not give to castes are divided by shares: each caste gets the whole
+    part of its quota, which is rounded to nine decimals, and the castes with the largest remainders
+    get one more. The first of equal remainders comes first.
+
+    AntsError if there are too few ants, or ants without a caste.
+    """
+    shares = shares_in(castes, nest)
+    found = [(caste.ants or 0) if caste.is_in(nest) else 0 for caste in castes.values()]
+    rest = n - sum(found)
+    if rest < 0 or (rest > 0 and not any(shares)):
+        raise AntsError(
+            f"the castes have {sum(found)} ants in nest {nest}, but {n} ants start there; change "
+            "`ants` of a caste, or give a caste a share."
+        )
+    quotas = [round(share * rest, 9) for share in shares]
+    found = [one + int(quota) for one, quota in zip(found, quotas, strict=True)]
+    order = sorted(range(len(quotas)), key=lambda i: int(quotas[i]) - quotas[i])
+    for i in order[: n - sum(found)]:
+        found[i] += 1
+    return found
+
+
+def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
+    """Return the probability of each caste for an ant that is born in a nest that n ants start.
+
+    That is the caste's share, or its `ants` divided by n.
+    """
+    shares, most = shares_in(castes, nest), max(n, 1)
+    fixed = [(caste.ants or 0) if caste.is_in(nest) else 0 for caste in castes.values()]
+    rest = (n - sum(fixed)) / most if n else 1.0
+    return [one / most + share * rest for one, share in zip(fixed, shares, strict=True)]

@@ -1,0 +1,60 @@
+"""Division of labour by response thresholds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
+
+from taichi_ants.settings import Is, Settings
+
+LabourRule = Literal["none", "thresholds"]
+
+
+@dataclass(frozen=True)
+class Labour(Settings, path="task.labour"):
+    """The rule by which ants start and stop foraging; by default, they always forage.
+
+    With "thresholds", after Bonabeau, Theraulaz and Deneubourg (1996), each nest has a stimulus. It
+    rises by `demand` in each tick and falls by `relief` with each delivery, but not below 0. An
+    idle ant with the threshold t starts foraging with the probability s^n / (s^n + t^n) per tick,
+    for a stimulus s and n = `exponent`. A forager without food next to its queen becomes idle with
+    the probability `quit` per tick. See `docs/colony.md`.
+    """
+
+    rule: Annotated[LabourRule, Is("rule by which ants start and stop foraging")] = "none"
+    demand: Annotated[
+        float | None,
+        Is("rise of the stimulus of each nest", unit="units of stimulus per tick"),
+        Is(least=0, most=1e6, usual=1.0, only=("rule", "thresholds")),
+    ] = None
+    relief: Annotated[
+        float | None,
+        Is("fall of the stimulus with each delivery", unit="units of stimulus"),
+        Is(least=0, most=1e6, usual=10.0, only=("rule", "thresholds")),
+    ] = None
+    exponent: Annotated[
+        float | None,
+        Is("exponent of the response to the stimulus; larger values make it steeper"),
+        Is(least=0, most=20, usual=2.0, only=("rule", "thresholds")),
+    ] = None
+    quit: Annotated[
+        float | None,
+        Is("probability per tick that a forager without food next to its queen becomes idle"),
+        Is(least=0, most=1, usual=0.2, only=("rule", "thresholds")),
+    ] = None
+
+    @classmethod
+    def named(cls) -> Mapping[str, Labour]:
+        """Return the named values: "none" and "thresholds"."""
+        return {rule: cls(rule) for rule in get_args(LabourRule)}
+
+    @property
+    def divides(self) -> bool:
+        """Whether ants can be idle."""
+        return self.rule != "none"
+
+    @property
+    def numbers(self) -> tuple[float, float, float]:
+        """The numbers `demand`, `relief` and `exponent`, as kernels read them."""
+        return self.demand or 0.0, self.relief or 0.0, self.exponent or 0.0

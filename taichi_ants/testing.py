@@ -1,0 +1,155 @@
+"""Checks of rules that you wrote: the kernels against the plain reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from taichi_ants import rules, runtime, worlds
+from taichi_ants.engines.colony.colony import Colony
+from taichi_ants.errors import checked_whole
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.rules import Rule
+from taichi_ants.settings import declared
+from taichi_ants.task import Task
+
+SEEDS, TICKS = 6, 60
+_LAID = ("with_food", "without_food", "always", "dead_end", "failed_pick_up")
+
+
+class RuleCheck(NamedTuple):
+    """The result of a check of a rule.
+
+    Attributes:
+        rule: The name of the rule.
+        inputs: The number of drawn inputs that were compared.
+        ticks: The number of ticks of drawn colonies that were compared.
+        difference: The first difference, or an empty string.
+    """
+
+    rule: str
+    inputs: int
+    ticks: int
+    difference: str
+
+    def __str__(self) -> str:
+        compared = f"{self.inputs} drawn inputs and {self.ticks} ticks of {SEEDS} colonies"
+        return f"{self.rule}: {compared}: {self.difference or 'equal'}"
+
+
+def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
+    """Return the result of a comparison of a rule in kernels with its twin.
+
+    First the results for drawn inputs are compared, then small drawn colonies that use the rule.
+    After each tick, cells, headings, loads, percepts, actions, events, rewards, states, levels and
+    action values must be equal in every bit.
+
+    Args:
+        name: The name of a registered rule.
+        inputs: The number of drawn inputs.
+
+    Raises:
+        AntsError: There is no rule of this name.
+    """
+    from taichi_ants.engines.own_rules import difference
+
+    rule = rules.get(name)
+    checked_whole("inputs", inputs)
+    runtime.start()
+    found = difference(rule, inputs)
+    if found:
+        return RuleCheck(name, inputs, 0, found)
+    ticks = 0
+    try:
+        for seed in range(SEEDS):
+            for found in _differences(rule, seed):
+                if found:
+                    return RuleCheck(name, inputs, ticks, found)
+                ticks += 1
+    except (ArithmeticError, ValueError, IndexError) as error:
+        return RuleCheck(name, inputs, ticks, f"seed {seed} fails: {error}")
+    return RuleCheck(name, inputs, ticks, "")
+
+
+def _task(rule: Rule, seed: int) -> Task:
+    """Return a drawn task that uses a rule, with drawn parameters within their ranges.
+
+    Kernels are compiled for two tasks only; others differ in numbers.
+    """
+    rng, drawn, numbers = np.random.default_rng([seed, 17]), seed % 2, {}
+    for one in declared(rule.settings):
+        least, most = one.rule.least, one.rule.most
+        if least is not None and most is not None and rng.random() < 0.5:
+            value = float(rng.uniform(least, most))
+            numbers[one.name] = round(value) if one.kind is int else value
+    settings: dict = {"rules": {rule.name: numbers}, "evaporation_in_training": True}
+    settings["fields"] = {name: {"laid": "always"} for name in rule.fields if name != "trail"}
+    settings["traffic"] = ("blocking", "following")[drawn]
+    pheromone: dict = {"diffusion": 0.1 * drawn}
+    if rule.kind == "choice":
+        settings["choice"] = {"rule": rule.name}
+        settings["noise"] = {"misread": 0.2 * drawn}
+    elif rule.kind == "reward":
+        settings["reward"] = rule.name
+        settings["homing_cue"] = ("compass", "trail")[drawn]
+    else:
+        pheromone[rule.kind] = rule.name
+        field = {"laid": _LAID[seed % len(_LAID)], rule.kind: rule.name}
+        settings["fields"]["second"] = field
+    return Task().but(**settings, pheromone=pheromone)
+
+
+def _differences(rule: Rule, seed: int) -> Iterator[str]:
+    """Yield, after each tick of a drawn colony, its first difference from the reference, or ""."""
+    task, world = _task(rule, seed), worlds.open_world(seed, ranges=(5, 5, 5))
+    learner = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 1.0) if task.choice.needs_table else None
+    sharing = "frozen" if learner is None else "shared"
+    schedule = ("by_world", "by_chunk")[seed % 2]
+    colony = Colony(world, task, learner, seed, 12, sharing=sharing, schedule=schedule)
+    plain = ReferenceColony(world, task, learner, seed, 12, sharing=sharing)
+    colony.begin_episode(TICKS)
+    plain.begin_episode()
+    for tick in range(TICKS):
+        colony.tick()
+        plain.tick(last=tick == TICKS - 1)
+        found = _difference(colony, plain)
+        yield found and f"seed {seed}, tick {tick}: {found}"
+
+
+def _difference(colony: Colony, plain: ReferenceColony) -> str:
+    """Return the first difference of a colony from its reference, or an empty string."""
+    ours, grid = colony.snapshot(), colony.grid
+    order = np.argsort(colony.numbers[0])
+    ants = [plain.ants[slot] for slot in sorted(plain.ants, key=lambda n: plain.ants[n].number)]
+    pairs = {
+        "cells": (grid.cells(colony.cells[0, order]), [ant.cell for ant in ants]),
+        "headings": (colony.headings[0, order], [ant.heading for ant in ants]),
+        "loads": (colony.carrying[0, order], [ant.carries for ant in ants]),
+        "percepts": (colony.percepts[0, order], [ant.percept for ant in ants]),
+        "states": (colony.states[0, order], [ant.state for ant in ants]),
+        "actions": (colony.actions[0, order], [ant.action for ant in ants]),
+        "events": (colony.events[0, order], [ant.event for ant in ants]),
+        "rewards": (colony.rewards[0, order], [ant.reward for ant in ants]),
+        **{f"levels of {name}": _levels(grid, ours.fields, plain, name) for name in ours.fields},
+        "action values": (colony.q_values[0], plain.q_values),
+    }
+    for what, (kernel, twin) in pairs.items():
+        expected = np.asarray(twin).astype(kernel.dtype)
+        if not np.array_equal(kernel, expected):
+            at = np.unravel_index(np.argmax(kernel != expected), kernel.shape)
+            return f"{what} are {kernel[at]} in kernels, but {expected[at]} in the reference"
+    return ""
+
+
+def _levels(
+    grid: AxialGrid, fields: Mapping[str, np.ndarray], plain: ReferenceColony, name: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the levels of a pheromone in all cells: those of kernels, and of the reference."""
+    cells = list(plain.world.ground)
+    places = grid.index(np.array(cells, np.int64).reshape(-1, 3))
+    trail = plain.world.pheromone_named(name)
+    return fields[name][places], np.array([trail.level(cell) for cell in cells])

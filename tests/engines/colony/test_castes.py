@@ -1,0 +1,262 @@
+"""Castes, thresholds and idle ants: what always holds, distributions, files, and refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from random_castes import drawn_castes
+from random_colonies import random_colony
+from scipy.stats import kstest, lognorm, truncnorm, uniform
+
+from taichi_ants import AntsError, Colony, Task, TrainingConfig, task, train, worlds
+from taichi_ants.analysis.bounds.limits import limits_of
+from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.envs.colony import ColonyWorlds
+from taichi_ants.envs.vector import Arguments
+from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
+from taichi_ants.live.setup import Setup
+from taichi_ants.offline import record_colony
+from taichi_ants.task import Labour, Threshold
+from taichi_ants.task.caste import chances_in, numbers_in
+from taichi_ants.task.events import Event
+from taichi_ants.viewer.recorder import Recorder
+
+TRAINING = TrainingConfig("q_learning", 0.5, 0.9, 0.1, 1.0)
+WORLD = worlds.open_world(seed=3, ranges=(50, 50, 50))
+LABOUR = Labour("thresholds", demand=6.0, relief=0.0, quit=0.0)
+IDLE = {"castes": {"worker": {"threshold": 1e6}}, "labour": LABOUR}
+
+
+def follows(rules: Task, world=WORLD, seeds=0, **options) -> Colony:
+    """A colony in which all ants follow a hand-written rule, in its first episode."""
+    given = {"sharing": "frozen", "q_values": trail_follower(rules.observation), **options}
+    colony = Colony(world, rules, TRAINING, seeds, **given)
+    colony.begin_episode()
+    return colony
+
+
+@pytest.mark.parametrize(
+    ("castes", "n", "numbers", "chances"),
+    [
+        ({"a": {"share": 0.5}, "b": {"share": 0.3}, "c": {"share": 0.2}}, 7, [4, 2, 1], None),
+        ({"a": {"share": 0.5}, "b": {"share": 0.5}}, 3, [2, 1], [0.5, 0.5]),
+        ({"a": {}, "b": {}, "c": {}}, 5, [2, 2, 1], [1 / 3] * 3),
+        ({"a": {"ants": 2}, "b": {"share": 0.75}, "c": {}}, 10, [2, 6, 2], [0.2, 0.6, 0.2]),
+        ({"a": {"nest": 1}, "b": {"nest": 0}}, 4, [0, 4], [0.0, 1.0]),
+        ({"a": {"ants": 3}}, 3, [3], [1.0]),
+    ],
+)
+def test_ants_of_a_nest_are_divided_by_shares(castes, n, numbers, chances):
+    given = Task(castes=castes).castes
+    assert numbers_in(given, 0, n) == numbers
+    found = chances_in(given, 0, n)
+    assert found == pytest.approx(chances or [one["share"] for one in castes.values()])
+
+
+def test_castes_are_blocks_of_ant_numbers():
+    rules = Task(castes={"minor": {"share": 0.75}, "major": {}})
+    assert follows(rules, ants=8).castes.tolist() == [[0] * 6 + [1] * 2]
+
+
+@pytest.mark.parametrize(
+    ("threshold", "law"),
+    [
+        (Threshold("uniform", 5, 2), uniform(3, 4).cdf),
+        (Threshold("normal", 1, 2), truncnorm(-0.5, np.inf, 1, 2).cdf),
+        (Threshold("lognormal", 4, 0.7), lognorm(0.7, scale=4).cdf),
+    ],
+    ids=["uniform", "normal", "lognormal"],
+)
+def test_thresholds_have_their_distribution(threshold, law):
+    """They last through episodes, and do not depend on the other worlds."""
+    rules = Task(castes={"worker": {"threshold": threshold}}, labour=LABOUR)
+    colony = follows(rules, seeds=[4, 5], ants=2000)
+    drawn = colony.thresholds
+    assert kstest(drawn[0], law).pvalue > 0.001
+    assert drawn.dtype == np.float32
+    assert not (drawn[0] == drawn[1]).any()
+    colony.end_episode()
+    colony.begin_episode()
+    assert (colony.thresholds == drawn).all()
+    assert (follows(rules, seeds=5, ants=2000).thresholds[0] == drawn[1]).all()
+
+
+@pytest.mark.parametrize("exponent", [1.0, 2.0, 2.5])
+def test_idle_ants_respond_to_the_stimulus(exponent):
+    """After s^n / (s^n + t^n), with s = 6 in the second tick and t = 4."""
+    rules = Task(castes={"worker": {"threshold": 4}}, labour=Labour("thresholds", 6, 0, exponent))
+    colony = follows(rules, ants=4000, start="spread")
+    colony.tick()
+    assert colony.idle.all()  # the stimulus was 0
+    colony.tick()
+    chance = 6**exponent / (6**exponent + 4**exponent)
+    error = np.sqrt(chance * (1 - chance) / 4000)
+    quits = (~colony.idle).mean()  # some foragers at the nest may have become idle again
+    assert chance - 4 * error - 0.002 < quits < chance + 4 * error
+    assert colony.stimuli.tolist() == [[12.0]]
+
+
+def test_idle_ants_do_nothing():
+    colony = follows(Task(**IDLE), ants=50)
+    before = colony.cells.copy(), colony.headings.copy()
+    colony.tick(20)
+    assert colony.idle.all()
+    assert (colony.events == Event.NONE).all()
+    assert (colony.actions == -1).all()
+    assert (colony.cells == before[0]).all()
+    assert (colony.headings == before[1]).all()
+    outcome = colony.outcome()
+    assert not outcome.returns.any()
+    assert not outcome.moves.any()
+    assert not outcome.blocked.any()
+    assert colony.snapshot().ant_idle.all()
+
+
+def test_ants_that_stop_foraging_are_without_food_next_to_their_queen():
+    castes = {"worker": {"threshold": Threshold("lognormal", 5, 1)}}
+    rules = task.foraging().but(castes=castes, labour=Labour("thresholds", 1, 1, quit=0.5))
+    colony, stopped = follows(rules, ants=60), 0
+    near = WORLD.distances() == 1
+    for _ in range(200):
+        foraged = ~colony.idle
+        colony.tick()
+        stops = foraged & colony.idle
+        assert near[colony.cells[stops]].all()
+        assert not colony.carrying[stops].any()
+        stopped += np.count_nonzero(stops)
+    assert stopped > 20
+
+
+def test_a_caste_with_a_policy_does_not_learn():
+    castes = {"learns": {"share": 0.5}, "follows": {"policy": "trail_follower"}}
+    colony = Colony(WORLD, Task(castes=castes), TRAINING, seeds=[0, 1], ants=20)
+    colony.run(1, 50)
+    learned, followed = np.moveaxis(colony.q_values, 1, 0)
+    assert learned.any()
+    assert (followed == trail_follower()).all()
+
+
+def drawn() -> list:
+    found = []
+    for seed in range(30):
+        one = random_colony(seed, sharing="shared", learner="sarsa", dense=False, changes=True)
+        one = drawn_castes(one, seed, 2, True, None)
+        found += [] if one is None else [one]
+    return found[:1]
+
+
+def test_schedules_threads_and_files_change_nothing(tmp_path):
+    for one in drawn():
+        results = []
+        for schedule, threads in (("by_world", 1), ("by_chunk", 2)):
+            options = {**one.population, "schedule": schedule, "threads": threads}
+            colony = Colony(one.world, one.task, one.training, [3, 4], **options)
+            colony.begin_episode()
+            colony.tick(9)
+            colony.save(tmp_path / "colony.npz")
+            again = Colony.load(tmp_path / "colony.npz")
+            assert again == colony
+            for made in (colony, again):
+                made.tick(9)
+            assert again == colony
+            outcome = colony.outcome()
+            assert (outcome.caste_deliveries.sum(axis=2) == outcome.deliveries).all()
+            results.append((outcome, colony.q_values, colony.stimuli))
+        assert results[0][0] == results[1][0]
+        assert np.array_equal(results[0][1], results[1][1])
+        assert np.array_equal(results[0][2], results[1][2])
+
+
+def test_a_file_of_a_colony_needs_no_policy_file(tmp_path):
+    policy = tmp_path / "policy.npz"
+    save_policy(policy, random_policy(), {})
+    colony = follows(Task(castes={"lost": {"policy": str(policy)}}), ants=5, q_values=None)
+    colony.tick(3)
+    colony.save(tmp_path / "colony.npz")
+    policy.unlink()
+    again = Colony.load(tmp_path / "colony.npz")
+    assert again == colony
+    with pytest.raises(AntsError, match=r"policy\.npz"):
+        follows(colony.task, ants=5)
+
+
+def test_numbers_of_castes_change_in_an_episode():
+    castes = {"a": {"share": 0.5, "threshold": 3.0}, "b": {"threshold": 9.0}}
+    colony = follows(Task(castes=castes, labour=LABOUR), ants=5)
+    interventions = Interventions(colony)
+    interventions.set_task(colony.task.but(castes={"a": {"lifespan": None, "epsilon": 1.0}}))
+    assert colony.arrays["castes"][0].tolist() == [1.0, -1.0]
+    interventions.set_task(colony.task.but(labour={"demand": 2.0}))
+    assert colony.arrays["labour"][0] == 2.0
+    for fixed in ({"share": 0.25}, {"policy": "random"}, {"threshold": Threshold()}):
+        with pytest.raises(AntsError, match="cannot change the share, ants, nest or policy"):
+            interventions.set_task(colony.task.but(castes={"a": fixed}))
+
+
+CASTES = Task(castes={"minor": {}})
+GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: train(worlds.paper(), TRAINING, 0, 1, task=CASTES), "only colonies support them"),
+        (lambda: limits_of(worlds.paper(), CASTES), "a bound on deliveries does not support"),
+        (lambda: Recorder(follows(CASTES)), "the viewer does not support castes"),
+        (lambda: record_colony(follows(CASTES), 1, 1), "record_colony does not support castes"),
+        (lambda: Setup("paper", CASTES, TRAINING), "the live page does not support castes"),
+        (lambda: ColonyWorlds(1, CASTES, GIVEN, 2, "nest"), "an environment does not"),
+        (
+            lambda: Colony(worlds.paper(), CASTES, sharing="frozen"),
+            "a colony with given actions does not support castes",
+        ),
+        (
+            lambda: Colony(
+                worlds.paper(),
+                Task(castes={"a": {"policy": "random"}}),
+                TRAINING,
+                sharing="independent",
+            ),
+            r"^`task\.castes\.a\.policy` is 'random', but sharing is \"independent\"",
+        ),
+        (
+            lambda: follows(Task(castes={"a": {"policy": "no_such"}})),
+            r"^`task\.castes\.a\.policy` is 'no_such'; it must be one of",
+        ),
+        (
+            lambda: follows(Task(castes={"a": {"ants": 3}}), ants=5),
+            "the castes have 3 ants in nest 0, but 5 ants start there",
+        ),
+        (
+            lambda: follows(Task(castes={"a": {"nest": 1}}), ants=5),
+            "`task.castes` has no caste for nest 0",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused(make, says):
+    with pytest.raises(AntsError, match=says):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("rules", "says"),
+    [
+        ({"castes": {"a": {"share": 0.3}}}, "add up to 0.3; they must add up to 1"),
+        ({"castes": {"a": {"share": 0.7}, "b": {"share": 0.7}}}, "add up to 1.4"),
+        ({"castes": {"a": {"share": 1, "ants": 2}}}, "give one of them"),
+        ({"castes": {"a": {"threshold": 3}}}, "leave it out unless `task.labour.rule`"),
+        ({"labour": "thresholds"}, "ants have no thresholds; add a caste"),
+        ({"castes": {"a": {"lays": ["trail", "home"]}}}, "it must be all, none, or names of trail"),
+        ({"castes": {"a": {"k": 2}}}, "because `task.choice.rule` is 'greedy'"),
+        ({"castes": {"a": {"homing_cue": "home"}}}, "it must be one of compass, trail"),
+        ({"castes": {"a": {"threshold": -1}}}, r"`task\.castes\.a\.threshold\.value` is -1"),
+        (
+            {"castes": {"a": {"threshold": {"distribution": "uniform", "value": 1, "spread": 2}}}},
+            "it must be at most the value, 1.0",
+        ),
+        ({"castes": {str(k).join("ab"): {} for k in range(17)}}, "at most 16 are allowed"),
+    ],
+)
+def test_wrong_castes_are_named(rules, says):
+    with pytest.raises(AntsError, match=says):
+        Task(**rules)

@@ -1,0 +1,19 @@
+"""The rules of tests are registered while a file of this folder runs, and forgotten after it."""
+
+from __future__ import annotations
+
+import importlib
+
+import own_rules
+import pytest
+
+from taichi_ants.rules import registry
+
+registry._RULES.clear()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _registered():
+    importlib.reload(own_rules)
+    yield
+    registry._RULES.clear()

@@ -1,0 +1,318 @@
+"""Rules of users: what they may contain, how tasks name them, and refusals in one sentence."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from taichi_ants import (
+    AntsError,
+    Colony,
+    Field,
+    Interventions,
+    Pheromone,
+    Task,
+    TrainingConfig,
+    rules,
+    train,
+    worlds,
+)
+from taichi_ants.interventions import TaskNumbers
+from taichi_ants.rules import exp, log, power, registry
+from taichi_ants.rules.inputs import KINDS
+from taichi_ants.task import Choice
+from taichi_ants.testing import check_rule
+
+
+@pytest.fixture
+def clean(monkeypatch):
+    """Forget the rules that a test registers."""
+    monkeypatch.setattr(registry, "_RULES", dict(registry._RULES))
+
+
+def test_a_task_names_rules_and_their_parameters():
+    task = Task(choice="weber", pheromone=Pheromone("power_law", deposit="weaker"))
+    assert list(task.rules) == ["weber", "weaker", "power_law"]
+    assert task.rules["weber"].k == 20.0
+    other = task.but(rules={"weber": {"k": 3}})
+    assert (other.rules["weber"].k, other.rules["weber"].exponent) == (3.0, 1.5)
+    assert other != task
+    assert Task.from_dict(other.as_dict()) == other == pickle.loads(pickle.dumps(other))
+    greedy = other.but(choice="greedy")  # parameters of a rule that is no longer used are dropped
+    assert list(greedy.rules) == ["weaker", "power_law"]
+    assert greedy.but(choice="weber").rules["weber"].k == 20.0
+    assert task.pheromone.dense
+    assert not task.choice.needs_table
+    assert Choice("restless").needs_table
+
+
+def test_functions_of_rules_equal_the_real_ones():
+    for x in (1e-6, 0.3, 1.0, 2.5, 40.0):
+        assert exp(x) == pytest.approx(np.exp(x), rel=1e-12)
+        assert log(x) == pytest.approx(np.log(x), rel=1e-12, abs=1e-15)
+        assert power(x, 1.7) == pytest.approx(x**1.7, rel=1e-12)
+
+
+def no_return(level):
+    level = level + 1
+
+
+def two_returns(level):
+    if level > 1:
+        return level
+    return 0
+
+
+def forever(level):
+    while level >= 0:
+        level = level + 1
+    return level
+
+
+def endless(level):
+    for _ in range(10**9):
+        level = level + 1
+    return level
+
+
+def many_loops(level):
+    for _i in range(64):
+        for _j in range(64):
+            level = level + 0
+    return level
+
+
+def not_a_number(level):
+    return level * 1e308 * 1e308 * 0
+
+
+def too_large(level):
+    return level + 2e9
+
+
+def negative(level):
+    return level - 300
+
+
+def unknown_input(levl):
+    return levl
+
+
+def calls(level):
+    return round(level)
+
+
+def imports(level):
+    import math
+
+    return math.floor(level)
+
+
+def writes(level):
+    level[0] = 3
+    return level
+
+
+def text(level):
+    return "level" if level else 0
+
+
+def divides(level):
+    return 1 / (level - level)
+
+
+def roots(level):
+    return power(0 - level, 0.5)
+
+
+def undefined(level):
+    return level + nowhere  # noqa: F821
+
+
+def bits(level):
+    return level & 3
+
+
+def whole_vector(levels):
+    return levels
+
+
+def outside(levels):
+    return levels[3]
+
+
+def far_entry(levels, random):
+    return levels[3 + random] * 0
+
+
+def tuples(level):
+    level, other = 1, 2
+    return level + other
+
+
+def starred(*level):
+    return 0
+
+
+def bad_default(level, amount: float = -1.0, word: str = "x"):
+    return level
+
+
+def after_loop(level):
+    for i in range(3):
+        level = level + i
+    return i
+
+
+def half(random):
+    return random * 4
+
+
+WRONG = [
+    ("evaporation", no_return, "its last line, and no other, must be a return"),
+    ("evaporation", two_returns, "its last line, and no other, must be a return"),
+    ("evaporation", forever, "line 2 of it, `while level >= 0:"),
+    ("evaporation", endless, "must have literal whole numbers"),
+    ("evaporation", many_loops, "repeats 4096 times; at most 256 are allowed"),
+    ("evaporation", not_a_number, "it returns nan"),
+    ("evaporation", too_large, "but must return the level of a cell after the tick"),
+    ("evaporation", negative, "a number from 0 to 1000000000"),
+    ("evaporation", unknown_input, "has the argument 'levl', which is not an input"),
+    ("evaporation", calls, "calls another function than exp, log, power, min, max, abs"),
+    ("evaporation", imports, "`import math`, is not allowed"),
+    ("evaporation", writes, "assign to one name at a time"),
+    ("evaporation", text, "`'level'`, is not a number"),
+    ("evaporation", divides, "ZeroDivisionError"),
+    ("deposit", roots, "x must be above 0"),
+    ("evaporation", undefined, "`nowhere`, is not defined"),
+    ("evaporation", bits, "`level & 3`, is not allowed"),
+    ("choice", whole_vector, "is a vector; use its entries"),
+    ("choice", outside, "must have an index from 0 to 2"),
+    ("choice", far_entry, "IndexError: there is no entry 3"),
+    ("choice", half, "an action, a whole number from 0 to 4"),
+    ("evaporation", tuples, "assign to one name at a time"),
+    ("deposit", starred, "use plain arguments"),
+    ("deposit", bad_default, "declare a whole number (int) or a number (float)"),
+    ("evaporation", after_loop, "is used outside its loop"),
+    ("evaporation", lambda level: level, "it must be a function defined with def"),
+]
+
+
+@pytest.mark.parametrize(("kind", "function", "says"), WRONG, ids=[f.__name__ for _, f, _ in WRONG])
+def test_wrong_rules_are_refused_in_one_sentence(kind, function, says, clean):
+    with pytest.raises(AntsError) as caught:
+        rules.register(kind)(function)
+    assert says in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert function.__name__ not in rules.names()
+
+
+def same(level):
+    return level
+
+
+def test_names_are_checked(clean):
+    for arguments, says in (
+        ({"kind": "deposits"}, "the kind of the rule is 'deposits'"),
+        ({"kind": "deposit", "name": "set"}, "is the name of a built-in rule"),
+        ({"kind": "deposit", "name": "a b"}, "must be a word"),
+        ({"kind": "deposit", "name": "weber"}, "is the name of a rule of the kind 'choice'"),
+        ({"kind": "deposit", "twin": shaped_twin}, "it must have the same arguments"),
+    ):
+        with pytest.raises(AntsError) as caught:
+            rules.register(**arguments)(same)
+        assert says in str(caught.value)
+
+
+def shaped_twin(level, more):
+    return level
+
+
+REFUSED = [
+    (lambda: Task(choice="webber"), "weber"),
+    (lambda: Task(pheromone=Pheromone(deposit="lost")), "`task.pheromone.deposit` is 'lost'"),
+    (lambda: Task(rules={"weber": {"k": 2}}), "a rule that the task does not use"),
+    (lambda: Task(rules={"nothing": {}}), "there is no rule 'nothing'"),
+    (lambda: Task(choice="weber", rules={"weber": {"k": 31}}), "`task.rules.weber.k` is 31"),
+    (lambda: Task(choice="weber", rules={"weber": {"q": 1}}), "`task.rules.weber.q` is not"),
+    (lambda: Task("ants", choice="weber", noise={"misread": 0.1}), "`task.noise` is"),
+    (
+        lambda: train(worlds.paper(), own_config(), 0, 1, task=Task(reward="shaped")),
+        "your rules shaped; a run of one ant supports only built-in rules",
+    ),
+]
+
+
+def own_config():
+    return TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
+
+
+@pytest.mark.parametrize(("make", "says"), REFUSED, ids=[says[:30] for _, says in REFUSED])
+def test_refusals_name_the_rule(make, says):
+    with pytest.raises(AntsError) as caught:
+        make()
+    assert says in str(caught.value)
+
+
+def reads_a_field(levels_home):
+    return 0 * levels_home[0]
+
+
+def test_a_rule_that_reads_a_field_needs_it(clean):
+    rules.register("choice")(reads_a_field)
+    with pytest.raises(AntsError, match=r"reads the field 'home'; add `task\.fields\.home`"):
+        Task(choice="reads_a_field")
+    Task(choice="reads_a_field", fields={"home": Field()})
+
+
+def test_parameters_change_without_other_kernels_and_in_an_episode(clean):
+    """Ticks after a change are those of a colony with the new parameter."""
+    task = Task(choice="weber", pheromone=Pheromone(deposit="weaker"))
+    world = worlds.open_world(1, ranges=(8, 8, 8))
+    colony = Colony(world, task, None, 0, 8, sharing="frozen")
+    other = task.but(rules={"weaker": {"amount": 7}})
+    assert colony.check_same_kernels(other) is None
+    colony.begin_episode()
+    TaskNumbers((("rules.weaker.amount", 7.0),)).apply(Interventions(colony))
+    assert colony.task == other
+    plain = Colony(world, other, None, 0, 8, sharing="frozen")
+    plain.begin_episode()
+    colony.tick(200)
+    plain.tick(200)
+    assert colony.deliveries == plain.deliveries
+    assert np.array_equal(colony.snapshot().trail, plain.snapshot().trail)
+    assert colony.deliveries[0] > 0
+
+
+def test_a_colony_file_keeps_the_rule(tmp_path, clean):
+    colony = Colony(worlds.paper(), Task(choice="weber"), None, 0, 3, sharing="frozen")
+    colony.begin_episode()
+    colony.save(tmp_path / "colony.npz")
+    assert Colony.load(tmp_path / "colony.npz") == colony
+    del registry._RULES["weber"]
+    with pytest.raises(AntsError, match="weber"):
+        Colony.load(tmp_path / "colony.npz")
+
+
+def wrong_twin(level):
+    return level / 2
+
+
+def test_a_rule_that_differs_from_its_twin_is_refused(clean):
+    rules.register("evaporation", twin=wrong_twin)(same)
+    check = check_rule("same", inputs=50)
+    assert "but its twin" in check.difference
+    assert str(check).startswith("same: 50 drawn inputs and 0 ticks")
+    task = Task(pheromone=Pheromone("same"), evaporation_in_training=True)
+    with pytest.raises(AntsError, match="rule 'same' cannot be used: its kernel returns"):
+        Colony(worlds.paper(), task, own_config(), 0).run(1, 1)
+
+
+def test_every_input_is_used_by_the_rules_of_the_tests():
+    used = {kind: set() for kind in KINDS}
+    for name in ("power_law", "weaker", "weber", "restless", "shaped"):
+        used[rules.get(name).kind] |= set(rules.get(name).inputs)
+    for kind, known in KINDS.items():
+        assert known.inputs.keys() <= used[kind], kind

@@ -1,0 +1,125 @@
+"""Rules of each kind, which use all inputs and operators; a plugin file for tests."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from taichi_ants import rules
+from taichi_ants.rules import exp, log, power
+from taichi_ants.settings import Is
+from taichi_ants.task.events import Event
+
+HIGHEST = 1000
+
+
+@rules.register("evaporation")
+def power_law(
+    level, tick, exponent: Annotated[float, Is("exponent of the loss", least=1, most=1.5)] = 1.1
+):
+    """Return the level after a loss that grows faster than the level."""
+    return max(level - 0.001 * power(level, exponent) - (tick % 2), 0) if level > 1 else 0
+
+
+@rules.register("deposit")
+def weaker(
+    level,
+    carried,
+    carries,
+    event,
+    percept,
+    tick,
+    amount: Annotated[float, Is("level of a new deposit", least=0, most=300)] = 100.0,
+):
+    """Return a level that depends on all inputs."""
+    found = level
+    if event == Event.PICKED_UP or (percept % 4 == 2 and not carries):
+        found = max(level, 3 * amount)
+    elif 0 < tick < 5:
+        pass
+    else:
+        found += amount * exp(-carried / 20) + log(1 + level)
+    return min(found, HIGHEST)
+
+
+@rules.register("choice")
+def weber(
+    codes,
+    levels,
+    nearer,
+    is_open,
+    level,
+    carries,
+    random,
+    k: Annotated[float, Is("attraction of a cell without a trail", least=1, most=30)] = 20.0,
+    exponent: Annotated[float, Is("exponent of the attraction", least=0, most=5)] = 1.5,
+):
+    """Return an action without action values."""
+    total = 0
+    best = 0
+    for i in range(3):
+        if is_open[i] and (nearer[i] or not carries):
+            total += power(k + abs(levels[i] - level / 2), exponent)
+    if codes[0] == 3 or codes[1] == 3 or codes[2] == 3:
+        best = 4 if carries else 3
+    elif total == 0:
+        best = 0 if random < 0.5 else 2
+    else:
+        drawn = random * total
+        total = 0
+        for i in range(3):
+            if is_open[i] and (nearer[i] or not carries):
+                total += power(k + abs(levels[i] - level / 2), exponent)
+                if total <= drawn:
+                    best = i + 1
+        best = min(best, 2)
+    return best
+
+
+@rules.register("choice")
+def restless(
+    values,
+    epsilon,
+    random,
+    random_2,
+    level_trail,
+    levels_trail,
+    percept,
+    tick,
+    boost: Annotated[int, Is("addition to a value", least=0, most=9)] = 1,
+):
+    """Return an action by action values and levels."""
+    best = 0
+    top = values[0]
+    for a in range(1, 5):
+        value = values[a]
+        if a == 3:
+            value += boost * (levels_trail[0] > level_trail)
+        if value > top:
+            top = value
+            best = a
+    if random < epsilon + 0.1:
+        best = (random_2 * 5 + tick + percept) // 1 % 5
+    return best
+
+
+@rules.register("reward")
+def shaped(
+    reward,
+    event,
+    carries,
+    percept,
+    next_percept,
+    levels,
+    level,
+    tick,
+    scale: Annotated[float, Is("reward for a rising level", least=0, most=9)] = 2.0,
+):
+    """Return a reward that depends on all inputs."""
+    more = 0
+    if levels[1] > level and not carries:
+        more = scale
+    if event == Event.DELIVERED:
+        more += 5 + tick % 3
+    if percept == next_percept:
+        more -= 1
+    return min(max((reward + more) // 1, -1000), 1000)
