@@ -116,6 +116,10 @@ class Model:
         """Return the names of kinds of food."""
         return self._entries("task.foods.")
 
+    def castes(self) -> list[str]:
+        """Return the names of castes of ants."""
+        return self._entries("task.castes.")
+
     def _entries(self, group: str) -> list[str]:
         found = (one[len(group) :].split(".")[0] for one in self.settings if one.startswith(group))
         return list(dict.fromkeys(found))
@@ -222,6 +226,10 @@ def _entities(model: Model) -> Iterator[str]:
         ("load", "whether the ant carries a food item", "-"),
         ("state", f"what the ant sees, one of {_states(model)} states", "-"),
     ]
+    if model.castes():
+        rows.append(("caste", f"one of {_words(model.castes())}", "-"))
+    if model.has("task.labour.rule", "thresholds"):
+        rows.append(("idle", "whether the ant waits at its nest instead of foraging", "-"))
     if model.has("task.life.lifespan") or model.has("task.life.births", True):
         rows.append(("age", "time since the ant was born", "ticks"))
     if model.has("task.pheromone.deposit", "fading") or model.fields():
@@ -380,7 +388,8 @@ def _concepts(model: Model) -> Iterator[str]:
             + ("The world is drawn from a seed. " if _is_drawn(model) else "")
             + "The same seed gives the same run, to the bit."
         ),
-        "Collectives": (
+        "Collectives": _castes_in_words(model)
+        + (
             f"Ants belong to {nests} nests, each with its queen."
             if nests > 1
             else "All ants form one colony."
@@ -495,6 +504,9 @@ def _submodels(model: Model) -> Iterator[str]:
     if _lives(model):
         yield "### 7.7 Life and food"
         yield from _life(model)
+    if model.castes():
+        yield "### 7.8 Castes and division of labour"
+        yield from _castes(model)
 
 
 def _observation(model: Model) -> Iterator[str]:
@@ -580,6 +592,9 @@ def _actions(model: Model) -> Iterator[str]:
             ("any", "otherwise", "none; a blocked move still turns the ant", reward["failed"]),
         ],
     )
+    for name in model.all("task.reward"):
+        if name not in (None, "by_event"):
+            yield f"Rewards follow the rule `{name}` of the plugin instead, see its source."
     if model.has("task.turns_at_queen", True):
         some = " in some points" if model.has("task.turns_at_queen", False) else ""
         yield f"After a delivery the ant turns round{some} (`task.turns_at_queen`)."
@@ -688,6 +703,22 @@ def _life(model: Model) -> Iterator[str]:
         )
 
 
+def _castes_in_words(model: Model) -> str:
+    castes = model.castes()
+    return (
+        f"Ants belong to {count(len(castes), 'caste')}: {_words(castes)} (7.8). " if castes else ""
+    )
+
+
+def _castes(model: Model) -> Iterator[str]:
+    for name in model.castes():
+        own = [one for one in model.settings if one.startswith(f"task.castes.{name}.")]
+        given = [one for one in own if model.has(one) and not model.has(one, "none", "all")]
+        words = "; ".join(f"{one.split('.', 3)[3]} {model.text(one)}" for one in given)
+        yield f"Caste `{name}`: {words or 'as all ants of the nest'}."
+    yield from model.choices("task.labour.rule", rules.LABOUR, "task.labour.")
+
+
 def _settings(model: Model) -> Iterator[str]:
     rows = list(_changed(model))
     yield (
@@ -744,7 +775,7 @@ def _known(model: Model) -> dict[str, Setting]:
     """Return the declarations of settings by their full names, of named groups with NAME."""
     found = {one.path: one for one in all_of(Task) if not one.is_group}
     for group in named_groups(Task):
-        found |= {one.path: one for one in declared(group.entry)}
+        found |= {one.path: one for one in all_of(group.entry) if not one.is_group}
     found |= {one.path: one for one in declared(TrainingConfig)}
     for name in model.all("training.learner"):
         if name in LEARNERS:

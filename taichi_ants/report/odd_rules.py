@@ -128,6 +128,16 @@ SHARING = {
     ),
     "independent": "Each ant has its own table.",
 }
+LABOUR = {
+    "none": "All ants forage.",
+    "thresholds": (
+        "Each nest has a stimulus s, which is 0 at the start of an episode, rises by {demand} per "
+        "tick, and falls by {relief} with each delivery, but not below 0. An idle ant with "
+        "threshold t starts to forage with probability `s^n / (s^n + t^n)` per tick, where n is "
+        "{exponent}. A forager without food next to its queen becomes idle with probability "
+        "{quit} per tick. The rule is that of Bonabeau, Theraulaz and Deneubourg (1996)."
+    ),
+}
 WORLDS = {
     "paper": (
         "the world of the paper: ranges (10, 10, 10) with 271 cells, the queen at (0, 9, 9), one "
