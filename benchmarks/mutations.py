@@ -49,6 +49,8 @@ RESULTS_OF_RUNS = "tests/analysis/test_results.py"
 SWEEPS = "tests/commands/test_sweep_measures.py"
 CHOICE = "tests/task/test_choice.py"
 OWN_RULES = "tests/rules"
+ARCHIVE = "tests/commands/test_archive.py"
+ODD = "tests/report/test_odd.py"
 NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
 DESIGN = "tests/studies/test_design.py"
@@ -347,6 +349,18 @@ MUTATIONS = [
     ("studies/search.py", "max(seeds) + 1, max(seeds) + 1 + n", "n", SEARCH),
     ("studies/search.py", "sign * (best - default)", "best - default", SEARCH),
     ("studies/search.py", "PRUNED if done.state == PRUNED", "PRUNED if False", SEARCH),
+    # Archives of studies, and descriptions of models.
+    ("files/bundles.py", 'not {"", ".", ".."}.intersection(parts)', "True", ARCHIVE),
+    ("files/bundles.py", 'if digest.hexdigest() != facts["sha256"]:', "if False:", ARCHIVE),
+    ("files/bundles.py", "            if left < 0:", "            if False:", ARCHIVE),
+    ("files/bundles.py", "stat.S_IFMT(mode) not in _TYPES", "False", ARCHIVE),
+    ("files/bundles.py", "size > MOST_BYTES or len(members)", "len(members)", ARCHIVE),
+    ("commands/reproduce.py", "    if different:", "    if False:", ARCHIVE),
+    ("commands/reproduce.py", "if not settings.trust_plugins:", "if False:", ARCHIVE),
+    ("files/inputs.py", "return _copies.get(os.fspath(path), path)", "return path", ARCHIVE),
+    ("report/odd.py", "if one not in found:", "if not found:", ODD),
+    ("report/odd.py", "all(value == usual for value in values)", "values[0] == usual", ODD),
+    ("report/odd_rules.py", "{level} - {slope} · a", "{level} - {cap} · a", ODD),
 ]
 
 

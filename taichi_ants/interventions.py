@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
+from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.policies import NAMED, checked_values, load_policy
 from taichi_ants.settings import (
@@ -414,7 +415,7 @@ class Policy(Intervention, path="policy"):
         if self.source in NAMED:
             return
         if self.table is None:
-            if not self.source.endswith(".npz") and not Path(self.source).exists():
+            if not self.source.endswith(".npz") and not Path(place_of(self.source)).exists():
                 names = ", ".join(NAMED)
                 raise AntsError(
                     f"`policy` is {self.source!r}; it must be one of {names}, or a policy file."

@@ -17,6 +17,8 @@ COMMANDS = {  # modules of this package with their help
     "sweep": "run every combination of the settings in a file, and compare them",
     "merge": "join the shards of a sweep, a comparison or a colony study",
     "status": "show what is done in a folder of results, and how long is left",
+    "archive": "pack a finished study, with all that repeats it, into one file",
+    "reproduce": "repeat the study in an archive, and compare all of its files",
     "render": "draw an episode, a colony, learning, or a policy",
     "check-rule": "compare the rules of a file with the plain reference",
     "watch": "watch and change ants in a browser while they run",

@@ -140,6 +140,7 @@ def build_study(settings: argparse.Namespace) -> Study[RunPoint]:
 
 def compare(settings: argparse.Namespace) -> None:
     """Run the comparison, or show its results if it is finished."""
+    from taichi_ants.files.inputs import recorded
     from taichi_ants.files.results import MANIFEST
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.worker_process import WorkerProcess
@@ -163,8 +164,10 @@ def compare(settings: argparse.Namespace) -> None:
     with WorkerProcess(not settings.no_figures and settings.threads != 1) as worker:
         if not (settings.out / MANIFEST).exists():
             worker.begin(import_module, "taichi_ants.report.results")  # slow, so start early
-        study = build_study(settings)
-        work_or_show(settings, study.settings(), work, page=page, study=study, take=take)
+        with recorded() as inputs:
+            study = build_study(settings)
+        how: dict[str, Any] = {"page": page, "study": study, "take": take, "inputs": inputs}
+        work_or_show(settings, study.settings(), work, **how)
 
 
 def main(arguments: list[str] | None = None) -> None:

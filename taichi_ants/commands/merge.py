@@ -7,14 +7,20 @@ without --shard. See docs/many_machines.md.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from taichi_ants.studies import command_line
 
-# The functions of commands that compute or show results from their settings.
-STARTS = {"sweep": "sweep", "compare": "compare", "colony": "start"}
+# The functions of commands that compute or show results from their settings, with their modules
+# and the arguments without which the command line is not complete.
+STARTS = {
+    "sweep": ("taichi_ants.commands.sweep", "sweep", ["FILE"]),
+    "compare": ("taichi_ants.commands.compare", "compare", []),
+    "colony": ("taichi_ants.commands.colony", "start", ["study"]),
+}
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -33,11 +39,19 @@ def merge(settings: argparse.Namespace) -> None:
     manifest = join(settings.folders, settings.out)
     options = {**manifest["options"], "shard": None, "workers": None, "force": False}
     options |= {name: Path(options[name]) for name in ("file",) if options.get(name)}
-    name = manifest["command"]
-    start: Callable[[argparse.Namespace], None] = getattr(
-        import_module(f"taichi_ants.commands.{name}"), STARTS[name]
-    )
-    start(argparse.Namespace(**{**options, "out": settings.out}))
+    started(manifest["command"], {**options, "out": settings.out})
+
+
+def started(name: str, options: Mapping[str, Any]) -> None:
+    """Run the command with this name and these options, which a manifest contained.
+
+    Options that another version of the package did not have get their defaults.
+    """
+    place, function, arguments = STARTS[name]
+    module = import_module(place)
+    start: Callable[[argparse.Namespace], None] = getattr(module, function)
+    usual = vars(module.parse_arguments(arguments))
+    start(argparse.Namespace(**{**usual, **options, "command": name}))
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -9,8 +9,9 @@ and docs/designs.md.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
@@ -39,15 +40,17 @@ def parse_arguments(
 def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
     from taichi_ants.files import read_text
+    from taichi_ants.files.inputs import recorded
     from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.search import Search, read
 
-    command_line.load_plugin(settings.plugin)
-    settings.text = settings.text or read_text(settings.file)
-    asked = read(settings.file, settings.text)
+    with recorded() as inputs:
+        command_line.load_plugin(settings.plugin)
+        settings.text = settings.text or read_text(settings.file)
+        asked = read(settings.file, settings.text)
     if isinstance(asked, Search):
-        return _search(settings, asked)
+        return _search(settings, asked, inputs)
     if not settings.force:
         asked.design.check_folder(settings.out)
 
@@ -59,10 +62,11 @@ def sweep(settings: argparse.Namespace) -> None:
         asked.write(values, ready, draws=not settings.no_figures)
         asked.write_series(blocks, ready)
 
-    work_or_show(settings, asked.facts(), work, study=asked.study, take=asked.take)
+    more: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
+    work_or_show(settings, asked.facts(), work, **more)
 
 
-def _search(settings: argparse.Namespace, asked: Search) -> None:
+def _search(settings: argparse.Namespace, asked: Search, inputs: Mapping[str, bytes]) -> None:
     """Run a search, or show its results if it is finished."""
     from taichi_ants.studies.executors import chosen
     from taichi_ants.studies.result_folder import work_or_show
@@ -78,7 +82,7 @@ def _search(settings: argparse.Namespace, asked: Search) -> None:
             found = asked.measured(blocks, progress, **how)
         asked.write(found, ready, draws=not settings.no_figures)
 
-    work_or_show(settings, asked.facts(), work)
+    work_or_show(settings, asked.facts(), work, inputs=inputs)
 
 
 def main(

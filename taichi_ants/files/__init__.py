@@ -27,6 +27,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from taichi_ants.errors import AntsError, expect, shown
+from taichi_ants.files import inputs
 
 if sys.version_info >= (3, 11):
     import tomllib as tomllib
@@ -172,12 +173,14 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
             raise OSError("it contains a null character")
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         no_wait = getattr(os, "O_NONBLOCK", 0)
-        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
+        place = inputs.place_of(path)
+        with open(place, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise OSError("it is a device or a pipe")
             if status.st_size > most:
                 raise OSError(f"it has {status.st_size} bytes, and at most {most} are allowed")
+            inputs.note(path, file)
             yield file
     except (OSError, UnicodeEncodeError) as error:
         raise AntsError(

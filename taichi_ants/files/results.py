@@ -21,6 +21,7 @@ from taichi_ants.errors import AntsError
 MANIFEST = "manifest.json"
 REPORT = "report.txt"  # the text that commands print
 PAGE = "report.html"  # the whole result as a page
+INPUTS = "inputs"  # in finished results: copies of the files that the study has read
 UNFINISHED, BLOCKS = "unfinished", "blocks"  # the folder of work in progress, and that of blocks
 ROWS, FAILED = "rows", "failed.json"  # in UNFINISHED: tables of finished blocks, failed blocks
 # Settings that results of the same runs can differ in, with checksums of plugins.

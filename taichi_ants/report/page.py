@@ -30,6 +30,7 @@ _PLAYING = ("history.js", "stage.js", "timeline.js")
 # Sizes of drawings of intervals.
 WIDTH, _MIDDLE, _NUMBERS, _LINE = 340.0, 15.0, 39.0, 15.0
 _SIDE = 26.0  # space for a number
+_SHOWN_PACKAGES = ("taichi_ants", "taichi", "numpy", "scipy", "matplotlib")
 _LETTERS = 58  # characters of a line as wide as the drawing
 
 
@@ -250,12 +251,14 @@ def _plain(value: Any) -> str:
 
 def made_facts(made: Mapping[str, Any]) -> dict[str, str]:
     """Return the command, versions, machine and time of results as text, from their manifest."""
-    packages = ", ".join(f"{name} {version}" for name, version in made["packages"].items())
+    several = [one for one in made["packages"].items() if one[0] in _SHOWN_PACKAGES]
+    packages = ", ".join(f"{name} {version}" for name, version in several)
+    changed = ", with changes that are not committed" if made.get("clean") is False else ""
     cpus = f"{made['cpus']} processors" if made["cpus"] != 1 else "one processor"
     facts = {
         "Command": made["command"],
         "Finished": made["finished"].replace("T", " ").replace("+00:00", " UTC"),
-        "Commit": made["commit"],
+        "Commit": made["commit"] and made["commit"] + changed,
         "Versions": f"Python {made['python']}, {packages}",
         "Machine": f"{made['platform']}, {cpus}",
         "Time": f"{made['seconds']:.0f} seconds",

@@ -2,34 +2,34 @@
 
 from __future__ import annotations
 
-import datetime
-import os
-import platform
-import shlex
-import subprocess
+import hashlib
+import itertools
+import re
 import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib.metadata import version
+from operator import methodcaller
 from pathlib import Path
 from typing import Any, TypeVar
 
-from taichi_ants import __version__, files
+from taichi_ants import files
 from taichi_ants.files.results import (
     FAILED,
+    INPUTS,
     PAGE,
     REPORT,
     ResultFolder,
-    checksum_of,
     read_manifest,
     seeds_by_point,
 )
 from taichi_ants.studies.blocks import Blocks
+from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.runner import FailedBlocksError, Study
 
-_PACKAGES = ("taichi", "numpy", "scipy", "matplotlib")
+# Options that do not determine results, and the text of a sweep file, which is an input.
+_OF_THE_RUN = ("out", "force", "shard", "workers", "threads", "ray", "text", "command")
 Results = TypeVar("Results")
 # (folder of results, results if just computed, manifest) -> HTML
 Pages = Callable[[Path, Results | None, Mapping[str, Any]], str]
@@ -45,6 +45,7 @@ def work_or_show(
     page: Pages[Results] | None = None,
     study: Study[Any] | None = None,
     take: Take | None = None,
+    inputs: Mapping[str, bytes] | None = None,
 ) -> None:
     """Compute the results of a command unless its folder has them, and print the report.
 
@@ -56,8 +57,11 @@ def work_or_show(
         page: A function that makes the page; a missing page is made again.
         study: The study that `work` computes, if any.
         take: A function that writes the blocks of finished results that are a part of the study.
+        inputs: The contents of the files that the study has read, by path, except the plugin and
+            the sweep file. The results contain copies of them.
     """
-    plugin = checksum_of(Path(settings.plugin)) if settings.plugin else None
+    given = {**(inputs or {}), **_given(settings)}
+    plugin = hashlib.sha256(given[settings.plugin]).hexdigest() if settings.plugin else None
     facts = {**determines, "arch": settings.arch, "plugin": plugin}
     shard = getattr(settings, "shard", None)
     runs = study.runs(shard or (1, 1)) if study else None
@@ -77,6 +81,7 @@ def work_or_show(
             report = files.read_text(ready / REPORT)
             seconds = folder.seconds_before + time.perf_counter() - began
             made = provenance(sys.argv) | {"seconds": seconds, "figures": not settings.no_figures}
+            made |= {"asked": _again(settings), "inputs": _copied(given, ready)}
             if page:
                 files.write_text(ready / PAGE, page(ready, results, made))
             folder.publish(ready, made)
@@ -88,6 +93,37 @@ def work_or_show(
 def _asked(settings: Namespace) -> dict[str, Any]:
     """Return what `merge` needs to run a command again, for the manifest of unfinished work."""
     return {"command": getattr(settings, "command", None), "options": vars(settings)}
+
+
+def _again(settings: Namespace) -> dict[str, Any]:
+    """Return the command and those options that determine results, for the manifest of results."""
+    asked = _asked(settings)
+    options = {n: value for n, value in asked["options"].items() if n not in _OF_THE_RUN}
+    return {**asked, "options": options}
+
+
+def _given(settings: Namespace) -> dict[str, bytes]:
+    """Return the contents of the plugin and of the sweep file, by path."""
+    found = {}
+    if getattr(settings, "text", None) is not None:
+        found[str(settings.file)] = settings.text.encode()
+    if settings.plugin:
+        with files.opened(settings.plugin) as file:
+            found[settings.plugin] = file.read()
+    return found
+
+
+def _copied(inputs: Mapping[str, bytes], folder: Path) -> dict[str, str]:
+    """Write copies of inputs to a folder of results; return their names there, by path."""
+    names: dict[str, str] = {}
+    for path in inputs:
+        base = re.sub(r"[^\w.-]", "_", Path(path).name)
+        numbered = (f"{INPUTS}/{f'{n}-' if n > 1 else ''}{base}" for n in itertools.count(1))
+        names[path] = next(name for name in numbered if name not in names.values())
+    for path, name in names.items():
+        files.check_writable_folder(folder / INPUTS)
+        files.write_atomically(folder / name, methodcaller("write", inputs[path]))
+    return names
 
 
 def _take(folder: ResultFolder, part: Mapping[str, Any], take: Take, blocks: Path) -> None:
@@ -131,29 +167,3 @@ def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None
         print("They have no figures because of --no-figures; use --force to draw figures.")
     if page and is_missing:
         print(f"{PAGE} was missing and has been written again from the other files.")
-
-
-def provenance(arguments: Sequence[str]) -> dict[str, Any]:
-    """Return the command, time, commit, versions and machine, for the manifest of results."""
-    return {
-        "command": shlex.join(arguments),
-        "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
-        "commit": commit(),
-        "python": platform.python_version(),
-        "packages": {"taichi_ants": __version__, **{name: version(name) for name in _PACKAGES}},
-        "platform": platform.platform(),
-        "cpus": os.cpu_count(),
-    }
-
-
-def commit() -> str | None:
-    """Return the commit of the source, with "-dirty" if files differ; None outside a checkout."""
-    root = Path(__file__).resolve().parents[2]
-    if not (root / ".git").exists():
-        return None
-    command = ["git", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty"]
-    how: dict[str, Any] = {"stderr": subprocess.DEVNULL, "text": True, "timeout": 10}
-    try:
-        return subprocess.check_output(command, cwd=root, **how).strip()
-    except (OSError, subprocess.SubprocessError):
-        return None

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from taichi_ants.errors import AntsError, expect, shown, whole
+from taichi_ants.files import inputs
 from taichi_ants.settings import Setting, declared, not_a_setting
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world
@@ -106,7 +107,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> 
             of = f"the world {shown(name_or_path)}"
             raise AntsError(f"`world.{name}` {not_a_setting(name, sorted(allowed), of)}")
     if builder is None:
-        if os.path.exists(name_or_path):
+        if os.path.exists(inputs.place_of(name_or_path)):
             return load_map(name_or_path)
         raise AntsError(
             f"there is no world named {shown(os.fspath(name_or_path))} and no such file; choose "

@@ -101,6 +101,7 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
     folder = Path("results/sweep-my")
     assert set(contents(folder)) == {
         *("runs.csv", "summary.csv", "report.txt", "manifest.json", "figures/return_last50.png"),
+        "inputs/my.toml",
     }
     rows = read_csv(folder / "runs.csv")
     names = ["training.learning_rate", "training.epsilon", "task.rewards.shaping"]

@@ -11,7 +11,7 @@ import pytest
 from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, train
 from taichi_ants.files import archives
 from taichi_ants.studies import runner
-from taichi_ants.studies.result_folder import commit, provenance
+from taichi_ants.studies.provenance import provenance, source
 from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, RunPoint, Study, world_facts
 from taichi_ants.task import Life, Pheromone, Rewards, Task
 from taichi_ants.worlds import World, open_world, paper
@@ -424,4 +424,6 @@ def test_provenance():
     facts = provenance(["compare.py", "--out", "a b"])
     assert facts["command"] == "compare.py --out 'a b'"
     assert facts["packages"]["taichi"] == "1.7.4"
-    assert facts["commit"] == commit()
+    assert {"kiwisolver", "mdurl"} <= facts["packages"].keys()  # which Matplotlib and Rich need
+    assert not {"pytest", "mypy", "pip"} & facts["packages"].keys()
+    assert {name: facts[name] for name in ("commit", "clean")} == source()

@@ -1,0 +1,46 @@
+"""Put a finished study into one file with everything that repeats it.
+
+FOLDER is a folder of finished results of a sweep, a comparison or a colony study. The archive has
+the results, all files that the study has read, the versions of all packages, a description of the
+model, and checksums. See docs/archives.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from taichi_ants.errors import AntsError
+from taichi_ants.studies import command_line
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Return the settings of the command line."""
+    parser = command_line.Parser(__doc__)
+    add = parser.add_argument
+    add("folder", type=Path, metavar="FOLDER", help="folder of results")
+    add("--out", type=Path, metavar="FILE", help="write the archive here (default: FOLDER.zip)")
+    add("--force", action="store_true", help="replace an existing FILE")
+    return parser.parse_args(arguments)
+
+
+def archive(settings: argparse.Namespace) -> None:
+    """Write the archive, and print what it contains."""
+    from taichi_ants.files import check_writable_file
+    from taichi_ants.report.odd import odd_of
+    from taichi_ants.studies.reproduction import checked_manifest, write_archive
+
+    folder = settings.folder
+    out = settings.out or Path(f"{folder.resolve()}.zip")
+    manifest = checked_manifest(folder)
+    if out.exists() and not settings.force:
+        raise AntsError(f"{str(out)!r} exists; choose another --out, or give --force.")
+    write_archive(check_writable_file(out), folder, manifest, odd_of(folder, manifest))
+    size, number = out.stat().st_size / 1e6, len(manifest["files"]) + 1
+    print(f"{out}: {number} files of results, ODD.md, requirements.txt ({size:.1f} MB)")
+    print(f"To repeat the study and compare: taichi-ants reproduce {out}")
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command."""
+    command_line.run_command(lambda: archive(parse_arguments(arguments)))

@@ -1,0 +1,220 @@
+"""Archives of finished studies, which contain all that repeats them, and their reproduction."""
+
+from __future__ import annotations
+
+import platform
+import re
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from taichi_ants import __version__, files
+from taichi_ants.errors import AntsError, count, shown
+from taichi_ants.files import bundles, inputs
+from taichi_ants.files.results import MANIFEST, PAGE, UNFINISHED, ResultFolder, read_manifest
+from taichi_ants.studies.provenance import packages, source
+
+RESULTS = "results/"  # begins the names of the files of a results folder in an archive
+COMMANDS = ("sweep", "compare", "colony")
+_SOURCE = re.compile(rb"(<dt>(Command|Finished|Commit|Versions|Machine|Time)</dt><dd>).*?</dd>")
+_SHOWN = 5  # versions that differ, at most, in a message
+
+
+def checked_manifest(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a folder of finished results, all of whose files are unchanged.
+
+    Raises:
+        AntsError: The folder has no finished results of this version, a file is missing or has
+            changed, or its command cannot be repeated.
+    """
+    if not (folder / MANIFEST).exists():
+        if (folder / UNFINISHED / MANIFEST).exists():
+            raise AntsError(
+                f"{str(folder)!r} has unfinished work; run its command again to finish it, then "
+                "archive it."
+            )
+        raise AntsError(f"{str(folder)!r} has no results; name the folder of a finished study.")
+    manifest = read_manifest(folder)
+    version = manifest["settings"].get("version")
+    if version != __version__ or "asked" not in manifest:
+        written = f"version {version}" if version != __version__ else "an older state"
+        raise AntsError(
+            f"{str(folder)!r} has results of {written} of this package, and this is {__version__}; "
+            "archive it with that version, or run the command again with --force."
+        )
+    if manifest["asked"]["command"] not in COMMANDS or "runs" not in manifest:
+        raise AntsError(
+            f"{str(folder)!r} has results of another kind; name a folder of a sweep with [vary], "
+            "a comparison or a colony study."
+        )
+    ResultFolder(folder, manifest["settings"]).check()
+    return manifest
+
+
+def write_archive(path: Path, folder: Path, manifest: Mapping[str, Any], odd: str) -> None:
+    """Write the archive of checked results; `odd` is the description of the model."""
+    contents: dict[str, Path | str] = {
+        f"{RESULTS}{name}": folder / name for name in (*manifest["files"], MANIFEST)
+    }
+    contents |= {"ODD.md": odd, "requirements.txt": lock(manifest)}
+    contents["README.md"] = _readme(manifest)
+    facts = {name: manifest[name] for name in ("command", "finished")}
+    bundles.write(path, contents, {"version": __version__, **facts})
+
+
+def lock(manifest: Mapping[str, Any]) -> str:
+    """Return the packages of a run with exact versions, in the format of pip's requirements."""
+    others = {n: one for n, one in manifest["packages"].items() if n != "taichi_ants"}
+    own = f"taichi-ants=={manifest['packages']['taichi_ants']}"
+    if manifest["commit"]:
+        changed = "" if manifest["clean"] else ", with changes that are not committed"
+        own = f"# {own} ran from its source, commit {manifest['commit']}{changed}"
+    lines = [f"# Python {manifest['python']}", own, *(f"{n}=={v}" for n, v in others.items())]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _readme(manifest: Mapping[str, Any]) -> str:
+    given = "".join(
+        f"- `{RESULTS}{place}`, read from `{path}`\n" for path, place in manifest["inputs"].items()
+    )
+    return f"""# Archive of a study with Taichi Ants
+
+The results come from this command, which finished {manifest["finished"]}:
+
+    {manifest["command"]}
+
+To compute them again and compare every file, install the versions in `requirements.txt` and run
+this command with the name of this archive:
+
+    taichi-ants reproduce FILE
+
+- `ODD.md` describes the model of this study by the ODD protocol (Grimm et al. 2020).
+- `requirements.txt` has the versions of all packages that the study used.
+- `{RESULTS}` has the results. Its `{MANIFEST}` has the settings, the processor and the checksums.
+- `{bundles.INDEX}` has the size and the SHA-256 of every file of this archive.
+{given and f"{chr(10)}The study has read these files:{chr(10)}{chr(10)}{given}"}"""
+
+
+def plugins_of(bundle: bundles.Bundle, manifest: Mapping[str, Any]) -> list[str]:
+    """Return the names in a bundle of the plugins, which are code that its study runs."""
+    path = manifest["asked"]["options"].get("plugin")
+    return [RESULTS + manifest["inputs"][path]] if path else []
+
+
+def manifest_of(bundle: bundles.Bundle) -> dict[str, Any]:
+    """Return the manifest in a bundle; AntsError if it does not fit the files of the bundle."""
+    with tempfile.TemporaryDirectory() as place:
+        if RESULTS + MANIFEST not in bundle.names:
+            raise AntsError(
+                f"{files.named(bundle.path)} has no {RESULTS}{MANIFEST}; get another copy of it."
+            )
+        bundle.unpack(RESULTS + MANIFEST, Path(place, MANIFEST))
+        manifest = read_manifest(Path(place))
+    try:
+        known = manifest["asked"]["command"] in COMMANDS
+        for name, checksum in manifest["files"].items():
+            known = known and bundle.checksum_of(RESULTS + name) == checksum
+        known = known and {*manifest["inputs"].values()} <= manifest["files"].keys()
+    except (LookupError, TypeError, AttributeError):
+        known = False
+    if not known:
+        raise AntsError(
+            f"the manifest in {files.named(bundle.path)} does not fit its files; get another copy "
+            "of it."
+        )
+    return manifest
+
+
+@contextmanager
+def unpacked(bundle: bundles.Bundle, manifest: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """Yield the options of the command in a bundle, while the package reads the bundle's inputs."""
+    options = dict(manifest["asked"]["options"])
+    with ExitStack() as stack:
+        place = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        copies = {
+            path: bundle.unpack(RESULTS + name, place / str(number) / Path(name).name)
+            for number, (path, name) in enumerate(manifest["inputs"].items())
+        }
+        if options.get("plugin"):  # worker processes read it too
+            options["plugin"] = str(copies.pop(options["plugin"]))
+        if options.get("file"):
+            options["file"] = Path(options["file"])
+        stack.enter_context(inputs.replaced(copies))
+        yield options
+
+
+def other_versions(manifest: Mapping[str, Any]) -> str:
+    """Return which versions of this process differ from those of a run, in words; "" if none do."""
+    here: dict[str, Any] = {"Python": platform.python_version(), **packages()}
+    there: dict[str, Any] = {"Python": manifest["python"], **manifest["packages"]}
+    names = {n: n.replace("taichi_ants", "taichi-ants") for n in there}
+    found = [
+        f"{names[n]} {here.get(n, 'is missing')} instead of {one}"
+        for n, one in there.items()
+        if here.get(n) != one
+    ]
+    own, other = (_state(one) for one in (source(), manifest))
+    if own and other and own != other:
+        found.append(f"the source at {own} instead of {other}")
+    more = f" and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+    return f"{', '.join(found[:_SHOWN])}{more}"
+
+
+def _state(facts: Mapping[str, Any]) -> str:
+    """Return the commit of a source, and whether it was changed, in words."""
+    changed = "" if facts["clean"] else " with changes"
+    return f"commit {facts['commit'][:12]}{changed}" if facts["commit"] else ""
+
+
+class Compared(NamedTuple):
+    """A file of the results: its name, and its difference in words, "" if it is equal."""
+
+    name: str
+    difference: str = ""
+    note: str = ""
+
+
+def compare(
+    bundle: bundles.Bundle, manifest: Mapping[str, Any], folder: Path
+) -> Iterator[Compared]:
+    """Yield each file of the results in a bundle and in a folder, with its first difference.
+
+    Pages and manifests name the command, the time and the machine of a run. These facts may differ.
+    """
+    made = read_manifest(folder)
+    for name in sorted({*manifest["files"], *made["files"]}):
+        if name not in made["files"]:
+            yield Compared(name, "is only in the archive")
+        elif name not in manifest["files"]:
+            yield Compared(name, "is not in the archive")
+        elif made["files"][name] == manifest["files"][name]:
+            yield Compared(name)
+        elif name == PAGE and _without_run(bundle.read(RESULTS + name)) == _without_run(
+            (folder / name).read_bytes()
+        ):
+            yield Compared(name, note="except the time and the machine of the run")
+        else:
+            with bundle.open(RESULTS + name) as one, files.opened(folder / name) as other:
+                yield Compared(name, bundles.first_difference(one, other))
+    own, other = manifest["settings"], made["settings"]
+    different = [one for one in {**own, **other} if own.get(one) != other.get(one)]
+    words = f"settings differ: {', '.join(different)}" if different else ""
+    yield Compared(MANIFEST, words, "its settings")
+
+
+def _without_run(page: bytes) -> bytes:
+    """Return a page without the facts about the run."""
+    return _SOURCE.sub(rb"\1</dd>", page)
+
+
+def plugins_in_words(bundle: bundles.Bundle, names: list[str]) -> str:
+    """Return the names, sizes and checksums of plugins."""
+    several = []
+    for name in names:
+        lines = bundle.read(name).count(b"\n")
+        several.append(
+            f"{shown(name)} ({count(lines, 'line')}, SHA-256 {bundle.checksum_of(name)[:16]}...)"
+        )
+    return ", ".join(several)
