@@ -84,6 +84,12 @@ MUTATIONS = [
     ("engines/colony/kernels.py", "features.carriers_follow if", "outbound if", CHOICE),
     ("measures/tidy.py", "else parts", "else []", RESULTS_OF_RUNS),
     ("rendering/rasteriser.py", "snapshot.ant_nests % len", "0 * snapshot.ant_nests % len", RASTER),
+    (
+        "rendering/rasteriser.py",
+        "[np.maximum(snapshot.ant_foods, 0) %",
+        "[0 * snapshot.ant_foods %",
+        RASTER,
+    ),
     ("engines/colony/state.py", "np.where(carries, of_ants", "np.where(~carries, of_ants", NESTS),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),
@@ -130,6 +136,12 @@ MUTATIONS = [
     ("task/rules/policy.py", "(is_open_at * is_nearer).sum() > 0", "False", COLONY),
     ("task/rules/numbers.py", "if m > ti.f64(SQRT_2)", "if m > ti.f64(2.0)", NUMBERS),
     ("task/rules/noise.py", "ti.cast(other >= code", "ti.cast(other > code", CHOICE),
+    (
+        "task/rules/noise.py",
+        "observation.reads[i])[k] = 0",
+        "observation.reads[i])[k] += 0",
+        COLONY,
+    ),
     ("engines/colony/steps.py", "ti.select(is_true, level, 0)", "level", COLONY),
     (
         "engines/colony/learning.py",

@@ -318,6 +318,13 @@ class ColonyState:
         return self._column_or_zeros("caste", np.int32)
 
     @property
+    def tables_of_ants(self) -> np.ndarray:
+        """The table of `owners` by which the last ant in each slot acts, int32 (W, capacity)."""
+        if self.one_a_slot:
+            return np.tile(np.arange(self.capacity, dtype=np.int32), (len(self.seeds), 1))
+        return self.nests * np.int32(self.n_groups // self.n_nests) + self.castes
+
+    @property
     def idle(self) -> np.ndarray:
         """Whether the last ant in each slot is idle, see `Labour`, bool (W, capacity)."""
         return self._column_or_zeros("idle", bool)
