@@ -90,6 +90,7 @@ MUTATIONS = [
         "[0 * snapshot.ant_foods %",
         RASTER,
     ),
+    ("engines/colony/state.py", '{"nest": self.n_nests, "caste"', '{"caste"', NESTS),
     ("engines/colony/state.py", "np.where(carries, of_ants", "np.where(~carries, of_ants", NESTS),
     ("task/rules/actions.py", "heading < 3, heading + 3", "heading < 2, heading + 3", RUNS),
     ("task/rules/actions.py", "return code & 1 == 0", "return code & 2 == 0", RUNS),

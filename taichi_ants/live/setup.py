@@ -12,7 +12,7 @@ import numpy as np
 from taichi_ants import files, learners, worlds
 from taichi_ants.checks import checked_seeds, checked_share, checked_table, refuse_castes
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, listing, shown
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -33,11 +33,10 @@ _MOST_NUMBERS = 1 << 27  # elements of independent tables
 def check_cues(task: Task) -> None:
     """Raise AntsError if a task has pheromones that the live page cannot show."""
     if task.fields or (task.outbound_cue, task.homing_cue) != (TRAIL, COMPASS):
-        names = ", ".join(task.fields) or "no"
         raise AntsError(
-            f"the task has {names} further fields, and its cues are {task.outbound_cue} and "
-            f"{task.homing_cue}; the live page has only the trail and the compass, so draw a "
-            "Colony instead."
+            f"the task has {listing(task.fields, 'further field')}, and its cues are "
+            f"{task.outbound_cue} and {task.homing_cue}; the live page has only the trail and the "
+            "compass, so draw a Colony instead."
         )
 
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
 from taichi_ants.checks import checked_world, refuse_castes
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, listing
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
@@ -52,8 +52,8 @@ def limits_of(world: World, task: Task | None = None) -> Limits:
     checked_world(world)
     if task.foods:
         raise AntsError(
-            f"`task.foods` is {', '.join(task.foods)}; the bounds hold for one kind of food, so "
-            "leave it out."
+            f"`task.foods` has the {listing(task.foods, 'kind')}; the bounds hold without kinds of "
+            "food, so leave them out."
         )
     refuse_castes(task, "a bound on deliveries")
     around = world.grid.index(world.queen) + world.grid.offsets
