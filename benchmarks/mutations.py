@@ -141,7 +141,7 @@ MUTATIONS = [
         "task/rules/noise.py",
         "observation.reads[i])[k] = 0",
         "observation.reads[i])[k] += 0",
-        COLONY,
+        f"{COLONY}::test_misread_cells_show_no_further_pheromone",
     ),
     ("engines/colony/steps.py", "ti.select(is_true, level, 0)", "level", COLONY),
     (
