@@ -85,6 +85,12 @@ MUTATIONS = [
     ("measures/tidy.py", "else parts", "else []", RESULTS_OF_RUNS),
     ("rendering/rasteriser.py", "snapshot.ant_nests % len", "0 * snapshot.ant_nests % len", RASTER),
     (
+        "viewer/recorder.py",
+        "self.colony.tables_of_ants[self.world, slots] *",
+        "0 * slots *",
+        RECORDING,
+    ),
+    (
         "rendering/rasteriser.py",
         "[np.maximum(snapshot.ant_foods, 0) %",
         "[0 * snapshot.ant_foods %",

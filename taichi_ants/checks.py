@@ -68,6 +68,15 @@ def check_one_nest(colony: Colony, who: str) -> None:
         )
 
 
+def refuse_foods(task: Task, who: str) -> None:
+    """Raise AntsError if a task has kinds of food, which `who` does not support."""
+    if task.foods:
+        raise AntsError(
+            f"`task.foods` has the {listing(task.foods, 'kind')}; {who} does not support kinds of "
+            "food, so leave them out."
+        )
+
+
 def check_castes(task: Task, sharing: str, is_given_actions: bool) -> None:
     """Raise AntsError if the castes of a task do not fit how the ants of a colony learn."""
     if is_given_actions:

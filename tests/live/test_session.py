@@ -535,6 +535,12 @@ def test_a_policy_is_a_training_or_one_table(table):
         Setup("paper", Task(), table)
 
 
+def test_several_nests_are_refused():
+    two = replace(SETUPS["paper"], world="Q . . R\n . . . f\n. . . .\n")
+    with pytest.raises(AntsError, match="the live page supports one nest and no"):
+        Session(two)
+
+
 def test_what_a_hand_has_set_stays_in_later_episodes():
     session = Session(SETUPS["foraging"])
     session.apply({"epsilon": 0.25})

@@ -21,8 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
-from taichi_ants.checks import checked_world, refuse_castes
-from taichi_ants.errors import AntsError, listing
+from taichi_ants.checks import checked_world, refuse_castes, refuse_foods
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
@@ -50,11 +49,7 @@ def limits_of(world: World, task: Task | None = None) -> Limits:
     """Return the bounds of a world with the traffic rules of a task; None is the paper's."""
     task = task or Task()
     checked_world(world)
-    if task.foods:
-        raise AntsError(
-            f"`task.foods` has the {listing(task.foods, 'kind')}; the bounds hold without kinds of "
-            "food, so leave them out."
-        )
+    refuse_foods(task, "a bound on deliveries")
     refuse_castes(task, "a bound on deliveries")
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = world.walkable(around)[around]
