@@ -18,6 +18,7 @@ from taichi_ants.errors import (
     count,
     entries_of,
     expect,
+    listing,
     shown,
     whole,
 )
@@ -84,6 +85,15 @@ def check_rewards(task: Task, who: str) -> None:
         )
 
 
+def refuse_foods(task: Task, who: str) -> None:
+    """Raise AntsError if a task has kinds of food, which `who` does not support."""
+    if task.foods:
+        raise AntsError(
+            f"`task.foods` has the {listing(task.foods, 'kind')}; {who} does not support kinds of "
+            "food, so leave them out."
+        )
+
+
 def check_castes(task: Task, sharing: str, is_given_actions: bool) -> None:
     """Raise AntsError if the castes of a task do not fit how the ants of a colony learn."""
     if is_given_actions:
@@ -118,8 +128,8 @@ def refuse_castes(task: Task, who: str) -> None:
     """Raise AntsError if a task has castes, which `who` does not support."""
     if task.castes:  # labour requires castes
         raise AntsError(
-            f"`task.castes` is {', '.join(task.castes)}; {who} does not support castes, so leave "
-            "them out."
+            f"`task.castes` has the {listing(task.castes, 'caste')}; {who} does not support "
+            "castes, so leave them out."
         )
 
 
@@ -133,27 +143,32 @@ def checked_runs_task(task: Task | None) -> Task:
         )
     if task.foods:
         raise AntsError(
-            f"`task.foods` is {', '.join(task.foods)}; only colonies support it, so use a Colony."
+            f"`task.foods` has the {listing(task.foods, 'kind')}; only colonies support kinds of "
+            "food, so use a Colony."
         )
     if task.castes:
         raise AntsError(
-            f"`task.castes` is {', '.join(task.castes)}; only colonies support them, so use a "
-            "Colony."
+            f"`task.castes` has the {listing(task.castes, 'caste')}; only colonies support castes, "
+            "so use a Colony."
         )
     if task.pheromone.dense:
         raise AntsError(
             f"pheromone of the task is {task.pheromone}; runs of one ant support neither "
             "exponential evaporation nor diffusion, so use a Colony."
         )
+    reads = task.sees.reads
     further = [
-        f"{name} of the task is {value}"
-        for name, value, usual in (
-            ("fields", ", ".join(task.fields), ""),
-            ("outbound_cue", task.outbound_cue, TRAIL),
-            ("homing_cue", task.homing_cue, COMPASS),
-            (f"reads of the observation {task.observation!r}", ", ".join(task.sees.reads), ""),
+        text
+        for text, differs in (
+            (f"`task.fields` has the {listing(task.fields, 'field')}", task.fields),
+            (f"`task.outbound_cue` is {task.outbound_cue!r}", task.outbound_cue != TRAIL),
+            (f"`task.homing_cue` is {task.homing_cue!r}", task.homing_cue != COMPASS),
+            (
+                f"the observation {task.observation!r} reads the {listing(reads, 'field')}",
+                reads,
+            ),
         )
-        if value != usual
+        if differs
     ]
     if further:
         raise AntsError(

@@ -65,6 +65,14 @@ def count(number_of: int, noun: str) -> str:
     return f"{number_of} {noun[:-1]}ies" if noun.endswith("y") else f"{number_of} {noun}s"
 
 
+def listing(names: Iterable[str], noun: str) -> str:
+    """Return names after their noun: "field home", "fields home and sum", or "no fields"."""
+    *first, last = names or ("",)
+    if not last:
+        return f"no {noun}s"
+    return f"{noun}s {', '.join(first)} and {last}" if first else f"{noun} {last}"
+
+
 def check_one_of(name: str, value: object, allowed: Sequence[str]) -> None:
     """Raise AntsError if the value called `name` is not one of the allowed words."""
     if not isinstance(value, str) or value not in allowed:

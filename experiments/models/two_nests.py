@@ -2,7 +2,7 @@
 
 The pile lies between two queens, and its cells hold 20 loads each. All ants follow a hand-written
 rule, and the ants of both nests follow and change the same trails. Both nests have as many ants. A
-nest's share is its part of all loads delivered in 2000 ticks. See docs/models.md.
+nest's share is its part of all loads delivered in 500 ticks. See docs/models.md.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from taichi_ants.task import Food
 
 RULES = task.foraging().but(foods={"seed": Food(loads=20)})
 # The distances of the queens from the pile, in cells.
-DISTANCES, TICKS, STEP = ((10, 10), (8, 12), (6, 14)), 2000, 50
+DISTANCES, TICKS, STEP = ((10, 10), (8, 12), (6, 14)), 500, 20
 # The centre of the world and the cells around it, so that neither nest is nearer to an edge.
 PILE = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
 

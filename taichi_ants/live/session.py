@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_ants import files
+from taichi_ants.checks import check_one_nest
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.files.archives import Kind
@@ -130,6 +131,7 @@ class Session:
     def __init__(self, setup: Setup) -> None:
         expect("setup", setup, Setup)
         self.setup, self.colony = setup, setup.build_colony()
+        check_one_nest(self.colony, "the live page")
         self.interventions = Interventions(self.colony)
         self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []

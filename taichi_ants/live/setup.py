@@ -18,7 +18,7 @@ from taichi_ants.checks import (
     refuse_castes,
 )
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, listing, shown
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Task
@@ -40,11 +40,10 @@ def check_cues(task: Task) -> None:
     """Raise AntsError if a task has pheromones or rules that the live page cannot show."""
     check_own_rules(task, "the live page")
     if task.fields or (task.outbound_cue, task.homing_cue) != (TRAIL, COMPASS):
-        names = ", ".join(task.fields) or "no"
         raise AntsError(
-            f"the task has {names} further fields, and its cues are {task.outbound_cue} and "
-            f"{task.homing_cue}; the live page has only the trail and the compass, so draw a "
-            "Colony instead."
+            f"the task has {listing(task.fields, 'further field')}, and its cues are "
+            f"{task.outbound_cue} and {task.homing_cue}; the live page has only the trail and the "
+            "compass, so draw a Colony instead."
         )
 
 

@@ -10,7 +10,7 @@ import math
 import taichi as ti
 from taichi.math import clamp, mix, vec2, vec3
 
-from taichi_ants.rendering.colours import CELL_FOOD, PAGE, Mark
+from taichi_ants.rendering.colours import PAGE, Mark
 
 BAND = 16  # rows of pixels per thread
 _SQRT_3 = math.sqrt(3.0)
@@ -172,8 +172,11 @@ def blend(rgb, colour, distance, opacity):
 
 
 @ti.func
-def draw_mark(rgb, p, radius, shape, colour):
-    """Return the colour of a pixel with a mark over it; `p` is relative to the upright mark."""
+def draw_mark(rgb, p, radius, shape, colour, load):
+    """Return the colour of a pixel with a mark over it; `p` is relative to the upright mark.
+
+    `load` is the colour of the food that an ant carries.
+    """
     # Marks have a halo in the colour of the page; -1 disables it, also at smooth edges.
     distance, halo, opacity = radius * hexagon(p), -1.0, 1.0
     if shape == Mark.OUTLINE:
@@ -197,7 +200,7 @@ def draw_mark(rgb, p, radius, shape, colour):
     if shape == Mark.ANT_WITH_FOOD or shape == Mark.DART_WITH_FOOD:
         scale = ti.select(shape == Mark.DART_WITH_FOOD, 1.5, 1.0)
         crumb = radius * disc(p, 0.0, _CRUMB_AT, scale * _CRUMB_RADIUS)
-        result = blend(blend(result, PAGE, crumb - _HALO, 1.0), CELL_FOOD, crumb, 1.0)
+        result = blend(blend(result, PAGE, crumb - _HALO, 1.0), load, crumb, 1.0)
     return result
 
 
@@ -208,8 +211,9 @@ def draw_marks(
 ):
     """Draw marks over a frame, in the order of the table: later marks cover earlier ones.
 
-    Columns of `table`: x, y (pixels), radius (pixels), heading, mark, opacity, colour. Each thread
-    draws whole bands of pixel rows, so the order does not depend on the number of threads.
+    Columns of `table`: x, y (pixels), radius (pixels), heading, mark, opacity, colour, colour of
+    carried food. Each thread draws whole bands of pixel rows, so the order does not depend on the
+    number of threads.
     """
     ti.loop_config(block_dim=1)
     for band in range((frame.shape[0] + BAND - 1) // BAND):
@@ -217,6 +221,7 @@ def draw_marks(
         for n in range(table.shape[0]):
             x, y, radius = table[n, 0], table[n, 1], table[n, 2]
             shape, colour = ti.cast(table[n, 4], ti.i32), ti.cast(table[n, 6], ti.i32)
+            load = ti.cast(table[n, 7], ti.i32)
             reach = radius + ti.select(shape == Mark.DOT, 0.5, _HALO + 0.5)  # with its smooth edge
             if y + reach >= first and y - reach <= last + 1:
                 angle = table[n, 3] * (math.pi / 3)
@@ -228,5 +233,5 @@ def draw_marks(
                         dx, dy = (i + 0.5 - x) / radius, (j + 0.5 - y) / radius
                         p = vec2(dx * cosine + dy * sine, dy * cosine - dx * sine)
                         rgb = vec3(frame[j, i, 0], frame[j, i, 1], frame[j, i, 2])
-                        drawn = draw_mark(rgb, p, radius, shape, colour)
+                        drawn = draw_mark(rgb, p, radius, shape, colour, load)
                         put(frame, j, i, mix(rgb, drawn, table[n, 5]))

@@ -56,16 +56,17 @@ def marks(
     colour: int | np.ndarray,
     headings: npt.ArrayLike = 0,
     opacity: float = 1.0,
+    load: int | np.ndarray = colours.CELL_FOOD,
 ) -> np.ndarray:
-    """Return a table of marks, float32 (n, 7), centred at `places` (n, 2) in pixels.
+    """Return a table of marks, float32 (n, 8), centred at `places` (n, 2) in pixels.
 
     `mark` is of type `Mark`, `radius` is the radius of the enclosing circle in pixels, and
-    `headings` are directions, 0 to 5.
+    `headings` are directions, 0 to 5. `load` is the colour of the food that ants carry.
     """
     places = np.asarray(places, dtype=np.float32).reshape(-1, 2)
-    table = np.empty((len(places), 7), dtype=np.float32)  # exact for colours, which are below 2^24
+    table = np.empty((len(places), 8), dtype=np.float32)  # exact for colours, which are below 2^24
     table[:, :2] = places
-    for column, value in enumerate((radius, headings, mark, opacity, colour), start=2):
+    for column, value in enumerate((radius, headings, mark, opacity, colour, load), start=2):
         table[:, column] = value
     return table
 
@@ -97,16 +98,19 @@ def ants(
     radius: float | None = None,
     opacity: float = 1.0,
     colour: int | np.ndarray = colours.ANT,
+    load: int | np.ndarray = colours.CELL_FOOD,
 ) -> np.ndarray:
     """Return marks (n,) of ants. The default of `radius` suits cells of the radius `hexagon`."""
     if hexagon < _DOTS_BELOW:
-        colour = np.where(carries, _DOT_WITH_FOOD, colour)
+        # The colour of the first kind of food is too light for a dot of this size.
+        loaded = np.where(load == np.uint32(colours.CELL_FOOD), _DOT_WITH_FOOD, load)
+        colour = np.where(carries, loaded, colour)
         return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)
     without, with_food = Mark.ANT, Mark.ANT_WITH_FOOD
     if hexagon < _DARTS_BELOW:
         without, with_food = Mark.DART, Mark.DART_WITH_FOOD
     look = np.where(carries, with_food, without)
-    return marks(places, radius or _FILL * hexagon, look, colour, headings, opacity)
+    return marks(places, radius or _FILL * hexagon, look, colour, headings, opacity, load)
 
 
 def kernels() -> ModuleType:
@@ -279,5 +283,8 @@ class Rasteriser:
         colour: int | np.ndarray = colours.ANT
         if len(snapshot.ant_nests):
             colour = colours.ANTS[snapshot.ant_nests % len(colours.ANTS)]
+        load: int | np.ndarray = colours.CELL_FOOD
+        if len(snapshot.ant_foods):
+            load = colours.FOODS[np.maximum(snapshot.ant_foods, 0) % len(colours.FOODS)]
         look = snapshot.ant_headings, snapshot.ant_carries, hexagon
-        return ants(places, *look, opacity=opacity, colour=colour)
+        return ants(places, *look, opacity=opacity, colour=colour, load=load)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from dataclasses import fields as dataclass_fields
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, Status, name_parts
 from taichi_ants.task import Observation, Task
-from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS
+from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
 CaptionedSnapshot = tuple[Snapshot, Status]
@@ -189,19 +190,13 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
         return snapshot, Status(tuple(lines))
     # Pictures mark the view of the first ant, so the followed ant must be first.
     order = np.argsort(~followed, kind="stable")
-    snapshot = replace(
-        snapshot,
-        ant_cells=snapshot.ant_cells[order],
-        ant_headings=snapshot.ant_headings[order],
-        ant_carries=snapshot.ant_carries[order],
-    )
+    of_ants = [one.name for one in dataclass_fields(snapshot) if one.name.startswith("ant_")]
+    snapshot = replace(snapshot, **{name: getattr(snapshot, name)[order] for name in of_ants})
     # All lines together do not fit into the panel.
     lines = [lines[0], lines[3], ("ant", str(follow))]
     slot, table = int(slots[order[0]]), colony.q_values[0]
-    if not colony.one_a_slot and colony.n_nests > 1:
-        table = table[colony.nests[0, slot]]
-    state = int(colony.states[0, slot])
-    q_values = (table[slot] if colony.one_a_slot else table)[state]
+    state, rows = int(colony.states[0, slot]), table.reshape(-1, colony.task.n_states, N_ACTIONS)
+    q_values = rows[colony.tables_of_ants[0, slot], state]
     return snapshot, _status_of(colony.task.sees, state, q_values, None, table, lines)
 
 

@@ -41,7 +41,7 @@ SECTIONS = {
     # the previous frame.
     "numbers": "i4",
     "cells": "cell",
-    "poses": "u1",  # the heading, plus 8 with food
+    "poses": "u1",  # the heading, plus 8 with food, plus 16 times the nest
     "states": "state",
     # Actions of the ants of the previous frame; empty unless exactly one tick has passed.
     "acts": "u1",  # the action, plus 16 times the event
@@ -49,9 +49,11 @@ SECTIONS = {
     # Changes since the previous frame: indices and new values.
     "ground_at": "cell",
     "ground": "u1",
+    "queens": "cell",  # cells of the queens by nest; empty if they are those of the previous frame
     "trail_at": "cell",
     "trail": "level",  # expiry clocks, or levels, see `Colony.stored_trail`
-    "table_at": "f8",  # (owner * n_states + state) * 5 + action; the owner is 0, or an ant
+    # (owner * n_states + state) * 5 + action; the owner is an ant, or the nest of ants that share.
+    "table_at": "f8",
     "table": "f4",
     # Points of curves since the previous frame, see `POINT`.
     "progress": "f8",

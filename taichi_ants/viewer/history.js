@@ -127,6 +127,7 @@ class History {
   add(bytes, whole = false) {
     const { header } = this, frame = this.read(bytes), moment = this.length, before = this.frames[moment - 1];
     if (!frame.numbers.length && frame.ants) frame.numbers = before.numbers;
+    if (!frame.queens.length) frame.queens = before.queens;
     frame.number = moment;
     frame.whole = whole;
     frame.passed = before && before.episode === frame.episode ? frame.tick - before.tick : 0;
@@ -306,7 +307,7 @@ class History {
 
   /* An ant at a moment, with its next action; null if it does not live then.
 
-     {number, cell, heading, loaded, state, values, act}; act is null if unknown, else
+     {number, nest, cell, heading, loaded, state, values, act}; act is null if unknown, else
      {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}. why is
      "best", "tie" (of `ties` actions) or "explored", by the values at the time of the choice, one
      tick earlier if it was made `ahead`. tdError is a mean over `sharers`; before and after are
@@ -316,9 +317,10 @@ class History {
     if (i < 0) return null;
     const frame = this.frames[moment];
     const ant = {
-      number, cell: frame.cells[i], heading: frame.poses[i] & 7, loaded: frame.poses[i] >> 3 === 1,
-      state: frame.states[i], values: this.row(moment, number, frame.states[i]), act: null,
+      number, nest: frame.poses[i] >> 4, cell: frame.cells[i], heading: frame.poses[i] & 7,
+      loaded: (frame.poses[i] & 8) > 0, state: frame.states[i], act: null,
     };
+    ant.values = this.row(moment, ant);
     const next = this.frames[moment + 1];
     if (next && next.acts.length) ant.act = this.act(moment, i, ant);
     return ant;
@@ -329,16 +331,16 @@ class History {
     const action = next.acts[i] & 15, event = header.events[next.acts[i] >> 4];
     // Some learners draw an action one tick ahead, from the values at that time.
     const ahead = header.draws_ahead && frame.tick > 0 && frame.passed === 1;
-    const values = ahead ? this.row(moment - 1, ant.number, ant.state) : ant.values;
+    const values = ahead ? this.row(moment - 1, ant) : ant.values;
     const best = Math.max(...values), ties = values.filter((value) => value === best).length;
     const why = values[action] < best ? "explored" : ties > 1 ? "tie" : "best";
-    const after = this.row(moment + 1, ant.number, ant.state)[action];
+    const after = this.row(moment + 1, ant)[action];
     const before = ant.values[action];
     let sharers = 1;
     if (header.learns && !header.own_tables) {
       sharers = 0;
       for (let k = 0; k < next.acts.length; k++) {
-        if (frame.states[k] === ant.state && (next.acts[k] & 15) === action) sharers++;
+        if (frame.states[k] === ant.state && frame.poses[k] >> 4 === ant.nest && (next.acts[k] & 15) === action) sharers++;
       }
     }
     const tdError = next.td_errors.length ? next.td_errors[i] : NaN;
@@ -346,9 +348,9 @@ class History {
     return { action, event, reward, why, ties, ahead, tdError, sharers, before, after, values };
   }
 
-  /* The five action values of a state as they stood at a moment. */
-  row(moment, number, state) {
-    const owner = this.header.own_tables ? number : 0;
+  /* The five action values of an ant's state as they stood at a moment. */
+  row(moment, { number, nest, state }) {
+    const owner = this.header.own_tables ? number : nest;
     const first = (owner * this.header.n_states + state) * N_ACTIONS;
     return Array.from({ length: N_ACTIONS }, (_, action) => this.entry(moment, first + action));
   }
@@ -387,8 +389,8 @@ class History {
     const { offsets } = this.grid;
     const towards = (turn) => ant.cell + offsets[(ant.heading + turn + 6) % 6];
     if (action < 3) return towards(action - 1);
-    const ground = this.world.ground, wanted = action === 3 ? FOOD : QUEEN;
-    const seen = [-1, 0, 1].map(towards).filter((cell) => ground[cell] === wanted);
+    const { ground, moment } = this.world, queen = this.frames[moment].queens[ant.nest];
+    const seen = [-1, 0, 1].map(towards).filter((cell) => (action === 3 ? ground[cell] === FOOD : cell === queen));
     return seen.length ? seen[0] : -1;
   }
 
@@ -400,7 +402,7 @@ class History {
     for (const offset of this.grid.offsets) {
       for (let i = 0; i < frame.cells.length; i++) {
         if (frame.cells[i] !== cell + offset) continue;
-        const ant = { cell: frame.cells[i], heading: frame.poses[i] & 7 };
+        const ant = { nest: frame.poses[i] >> 4, cell: frame.cells[i], heading: frame.poses[i] & 7 };
         const action = next.acts[i] & 15, event = this.header.events[next.acts[i] >> 4];
         if (this.target(ant, action) === cell) found.push({ number: frame.numbers[i], action, event });
       }

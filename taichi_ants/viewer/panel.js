@@ -63,7 +63,7 @@ class Panel {
   showWorld(moment) {
     const frame = this.history.frames[moment];
     let loaded = 0;
-    for (const pose of frame.poses) loaded += pose >> 3;
+    for (const pose of frame.poses) loaded += (pose >> 3) & 1;
     const { length, frames, live } = this.history;
     const episodes = frames[length - 1].episode > (live ? 0 : frames[0].episode);
     const ofOne = this.history.several ? " this episode" : "";

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.checks import check_one_nest, check_progress, check_rewards, refuse_castes
+from taichi_ants.checks import check_progress, check_rewards, refuse_castes, refuse_foods
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, count, expect
@@ -89,7 +89,7 @@ class Recorder:
     ) -> None:
         expect("colony", colony, Colony)
         expect("title", title, str)
-        check_one_nest(colony, "the viewer")
+        refuse_foods(colony.task, "the viewer")
         refuse_castes(colony.task, "the viewer")
         check_rewards(colony.task, "the viewer")
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
@@ -105,10 +105,11 @@ class Recorder:
         self._numbers = np.zeros(0, np.int32)
         self._ground = np.zeros(self.grid.size, np.uint8)
         self._trail = np.zeros(self.grid.size, start.trail.dtype)  # as it is stored
-        owners = colony.capacity if colony.one_a_slot else 1
+        self._queens = np.zeros(0, np.int32)
+        owners = colony.owners
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
         self._table = np.full((owners * self._n_states, N_ACTIONS), np.nan, np.float32)
-        self._owners = np.full(owners, -1 if colony.one_a_slot else 0)
+        self._owners = np.full(owners, -1) if colony.one_a_slot else np.arange(owners)
         self._fixed: np.ndarray | None = None
         self._fixed = None if self._learns else self._tables()  # constant if no ant learns
         self.progress = Progress(colony, world)
@@ -157,11 +158,14 @@ class Recorder:
             "seed": str(colony.seeds[self.world]),
             "observation": f"{colony.task.sees.name}, {self._n_states} states",
         }
+        if colony.n_nests > 1:
+            lines["nests"] = str(colony.n_nests)
         if colony.fields:
             lines["pheromone"] = f"the trail; hidden: {', '.join(colony.fields)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
-            lines["table"] = "one per ant" if colony.one_a_slot else "shared"
+            shared = "one per nest" if colony.n_nests > 1 else "shared"
+            lines["table"] = "one per ant" if colony.one_a_slot else shared
             lines["learning rate"] = f"{config.learning_rate:g}"
             lines["discount"] = f"{config.discount:g}"
         else:
@@ -175,7 +179,7 @@ class Recorder:
     def whole(self) -> bytes:
         """Return the last frame with all data, not only changes, for a page without frames."""
         late = copy.copy(self)
-        late._numbers = self._numbers[:0]
+        late._numbers, late._queens = self._numbers[:0], self._queens[:0]
         late._ground, late._trail = np.zeros_like(self._ground), np.zeros_like(self._trail)
         late._known, late._owners = self._known.copy(), self._owners.copy()
         late._table = np.full_like(self._table, np.nan)
@@ -217,7 +221,7 @@ class Recorder:
 
     def _rows(self, slots: np.ndarray, states: np.ndarray) -> np.ndarray:
         """Return the rows of `_tables` that hold the states of ants."""
-        return slots * self._n_states + states if self.colony.one_a_slot else states
+        return self.colony.tables_of_ants[self.world, slots] * self._n_states + states
 
     def _td_errors(
         self, before: np.ndarray, slots: np.ndarray, states: np.ndarray, actions: np.ndarray
@@ -244,7 +248,9 @@ class Recorder:
             sections["numbers"] = self._numbers = numbers
         sections["cells"] = colony.cells[self.world, slots]
         headings, carrying = colony.headings[self.world], colony.carrying[self.world]
-        sections["poses"] = (headings + 8 * carrying)[slots]
+        sections["poses"] = (headings + 8 * carrying + 16 * colony.nests[self.world])[slots]
+        if not np.array_equal(snapshot.queens, self._queens):
+            sections["queens"] = self._queens = snapshot.queens
         sections["states"] = colony.states[self.world, slots]
         tick = int(outcome.ticks[0, self.world])
         totals = (outcome.deliveries[0, self.world], outcome.returns[0, self.world])

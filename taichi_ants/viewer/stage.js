@@ -42,7 +42,11 @@ class Stage {
     const style = getComputedStyle(document.documentElement);
     const read = (name) => style.getPropertyValue(`--${name}`).trim();
     this.colours = Object.fromEntries(COLOURS.map((name) => [name, read(name)]));
-    this.words = Object.fromEntries(COLOURS.map((name) => [name, word(...bytesOf(this.colours[name]))]));
+    // The colours of further nests: "queen 1", "ant 1", ...
+    for (const name of ["queen", "ant"]) {
+      read(`${name}s`).split(/\s+/).forEach((colour, n) => (this.colours[`${name} ${n + 1}`] = colour));
+    }
+    this.words = Object.fromEntries(Object.keys(this.colours).map((name) => [name, word(...bytesOf(this.colours[name]))]));
     // Colours of trails from just above 0 to the strongest one.
     const samples = read("trail").split(/\s+/).map(bytesOf), last = samples.length - 1;
     this.ramp = Array.from({ length: 256 }, (_, i) => {
@@ -52,6 +56,11 @@ class Stage {
     this.rampWords = Uint32Array.from(this.ramp, (colour) => word(...colour));
     this.sprites = new Map();
     this.shown = this.laidOut = "";
+  }
+
+  /* The name of the colour of the queen on a cell. */
+  queenColour(cell) {
+    return ofNest("queen", this.history.frames[this.moment].queens.indexOf(cell));
   }
 
   /* The colour of a trail, by its share of the strongest one. */
@@ -180,10 +189,11 @@ class Stage {
   }
 
   drawCells(moment) {
+    this.moment = moment;
     const { grid, history, fills, exists, words, rampWords, cells, pixels } = this;
     const { ground, trail } = history.worldAt(moment), small = this.camera.scale < DRAWINGS_FROM;
     const held = { [EMPTY]: words.empty, [OBSTACLE]: words.rock, [FOOD]: words["food-floor"],
-      [QUEEN]: words[small ? "queen" : "queen-floor"] };
+      [QUEEN]: words["queen-floor"] };
     this.foods = [];
     this.queens = [];
     for (let cell = 0; cell < grid.size; cell++) {
@@ -191,6 +201,7 @@ class Stage {
       const holds = ground[cell];
       if (holds === FOOD) this.foods.push(cell);
       else if (holds === QUEEN) this.queens.push(cell);
+      if (small && holds === QUEEN) held[QUEEN] = words[this.queenColour(cell)];
       const marked = holds === EMPTY && trail[cell] >= 1;
       fills[cell] = marked ? rampWords[this.trailColour(trail[cell])] : held[holds];
     }
@@ -256,7 +267,8 @@ class Stage {
   drawThings() {
     const { above, camera, colours, grid } = this;
     if (camera.scale < DRAWINGS_FROM) return;
-    for (const [name, cells, outline] of [["food", this.foods, CRUMBS], ["queen", this.queens, CROWN]]) {
+    const queens = this.queens.map((cell) => [this.queenColour(cell), [cell], CROWN]);
+    for (const [name, cells, outline] of [["food", this.foods, CRUMBS], ...queens]) {
       const { canvas, half } = this.sprite(name, 0.72 * camera.scale, (context) => {
         context.fillStyle = colours[name];
         context.fill(new Path2D(outline));
@@ -279,8 +291,8 @@ class Stage {
     const next = history.frames[moment + 1], moves = share > 0 && next && next.passed === 1;
     const same = moves && next.numbers === frame.numbers, z = grid.ranges[2], root = Math.sqrt(3);
     const radius = this.antRadius(frame.cells.length), dots = radius < DOTS_BELOW;
-    const looks = dots ? [] : [0, 1].map((loaded) => this.antSprite(loaded, radius));
-    const squares = [new Path2D(), new Path2D()], side = Math.max(1.5 * camera.scale, 2 * DOT);
+    const looks = [], squares = []; // by load and nest
+    const side = Math.max(1.5 * camera.scale, 2 * DOT);
     for (let i = 0; i < frame.cells.length; i++) {
       const cell = frame.cells[i];
       let heading = frame.poses[i] & 7, r = Math.floor(cell / grid.width) - z, q = (cell % grid.width) - z;
@@ -295,10 +307,11 @@ class Stage {
       const y = (root * (0.5 * r - q) - camera.y) * camera.scale + this.height / 2;
       if (!this.sees([x, y])) continue;
       if (dots) {
-        squares[frame.poses[i] >> 3].rect(x - side / 2, y - side / 2, side, side);
+        (squares[frame.poses[i] >> 3] ??= new Path2D()).rect(x - side / 2, y - side / 2, side, side);
         continue;
       }
-      const { canvas, half } = looks[frame.poses[i] >> 3], angle = (heading * Math.PI) / 3;
+      const look = (looks[frame.poses[i] >> 3] ??= this.antSprite(frame.poses[i] >> 3, radius));
+      const { canvas, half } = look, angle = (heading * Math.PI) / 3;
       const cos = sharpness * Math.cos(angle), sin = sharpness * Math.sin(angle);
       above.setTransform(cos, sin, -sin, cos, x * sharpness, y * sharpness);
       above.drawImage(canvas, -half, -half, 2 * half, 2 * half);
@@ -308,20 +321,21 @@ class Stage {
     // Crowded dots would hide the world, so they become transparent.
     const covered = (frame.cells.length * side ** 2) / (grid.size * 2.6 * camera.scale ** 2);
     above.globalAlpha = Math.min(1, 0.6 * Math.max(covered, 1e-9) ** -0.5);
-    ["ant", "loaded-dot"].forEach((colour, loaded) => {
-      above.fillStyle = this.colours[colour];
-      above.fill(squares[loaded]);
+    squares.forEach((square, kind) => {
+      above.fillStyle = this.colours[kind & 1 ? "loaded-dot" : ofNest("ant", kind >> 1)];
+      above.fill(square);
     });
     above.globalAlpha = 1;
   }
 
-  antSprite(loaded, radius) {
-    const { colours } = this;
+  /* The drawing of an ant; `kind` is 1 with food, plus 2 times the nest. */
+  antSprite(kind, radius) {
+    const { colours } = this, loaded = kind & 1;
     // A line in the colour of the page separates ants from a dark trail.
     const large = radius >= DRAWN_FROM, edge = large ? Math.min(0.11, 2 / radius) : 2 / radius;
     const crumb = circle(0, -0.7, large ? 0.25 : 0.34), body = new Path2D(large ? BODY : DART);
-    const ink = loaded && !large ? colours["loaded-dot"] : colours.ant; // food alone would be too small to see
-    return this.sprite(`ant ${loaded}`, radius, (context) => {
+    const ink = colours[loaded && !large ? "loaded-dot" : ofNest("ant", kind >> 1)]; // food alone would be too small to see
+    return this.sprite(`ant ${kind}`, radius, (context) => {
       const legs = new Path2D(LIMBS), sides = large ? [1, -1] : [];
       for (const [colour, food, more] of [[colours.halo, colours.halo, edge], [ink, colours.food, 0]]) {
         context.fillStyle = context.strokeStyle = colour;
@@ -365,7 +379,7 @@ class Stage {
     for (const queen of camera.scale < DRAWINGS_FROM ? this.queens : []) {
       this.outline(queen, 9);
       this.stroke("halo", 5);
-      this.stroke("queen", 2.5);
+      this.stroke(this.queenColour(queen), 2.5);
     }
     if (cell >= 0) {
       this.outline(cell, Math.max(camera.scale, 5));
@@ -435,6 +449,11 @@ const disc = (x, y, r) => `M${x - r} ${y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0
 const CRUMBS = disc(0, -0.36, 0.36) + disc(0.4, 0.3, 0.36) + disc(-0.4, 0.3, 0.36);
 const CROWN = "M-.8-.28-.32-.02 0-.5.32-.02.8-.28.6.6h-1.2z"
   + disc(0, -0.6, 0.12) + disc(0.84, -0.38, 0.12) + disc(-0.84, -0.38, 0.12);
+
+/* The name of a colour of a nest. */
+function ofNest(name, nest) {
+  return nest > 0 ? `${name} ${nest}` : name;
+}
 
 function circle(x, y, radius) {
   const path = new Path2D();

@@ -382,13 +382,13 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
         and not path.startswith(("tests/", "docs/lessons/"))  # which others make
     }
     of_benchmarks = ("growth.png", "peers.png")
-    of_guides = (
-        "measures.png",
-        "home_trail.png",
-        "division_of_labour.png",
-    )  # examples of docs/measures.md and docs/models.md
-    drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *of_benchmarks, *of_guides)
+    of_guides = (  # examples of docs/measures.md, models.md, protocol.md and designs.md
+        *("measures", "home_trail", "two_nests", "division_of_labour", "double_bridge"),
+        *("recovery", "design", "sensitivity", "search"),
+    )
+    drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *of_benchmarks)
     figures = {f"docs/figures/{name}" for name in drawn}
+    figures |= {f"docs/figures/{name}.png" for name in of_guides}
     assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
 
 

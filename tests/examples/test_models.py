@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import runpy
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,23 +16,36 @@ from taichi_ants import files
 MODELS = ROOT / "experiments" / "models"
 
 
-def rows_of(name: str, seeds: int, folder, monkeypatch) -> dict[str, dict[str, str]]:
-    """Run a script, and return its table by the first column."""
+def rows_of(name: str, seeds: int, folder, monkeypatch) -> list[dict[str, Any]]:
+    """Run a script, and return the rows of its numbers."""
     arguments = [f"{name}.py", "--seeds", str(seeds), "--out", str(folder)]
     monkeypatch.setattr(sys, "argv", arguments)
     runpy.run_path(str(MODELS / f"{name}.py"), run_name="__main__")
     assert (folder / f"{name}.png").stat().st_size > 10_000
-    with (folder / f"{name}.csv").open(encoding="utf-8") as file:
-        return {row["model"]: row for row in csv.DictReader(file)}
+    return files.read_csv(folder / f"{name}.csv")
 
 
 @pytest.mark.slow
 def test_home_trail(tmp_path, monkeypatch):
     """A second trail replaces most of a compass; without either, hardly any food is delivered."""
-    rows = rows_of("home_trail", 4, tmp_path, monkeypatch)
-    delivered = {name: float(row["deliveries"]) for name, row in rows.items()}
+    delivered = dict.fromkeys(("compass", "home trail", "no cue"), 0)
+    for row in rows_of("home_trail", 4, tmp_path, monkeypatch):
+        delivered[row["model"]] += row["deliveries"] if row["episode"] >= 25 else 0
     assert delivered["compass"] > delivered["home trail"] > 0.6 * delivered["compass"]
     assert delivered["no cue"] < 0.1 * delivered["compass"]
+
+
+@pytest.mark.slow
+def test_two_nests(tmp_path, monkeypatch):
+    """Equal nests share a pile equally; a nearer one gets more of it."""
+    last = [row for row in rows_of("two_nests", 20, tmp_path, monkeypatch) if row["tick"] == 500]
+    assert len(last) == 60
+    share = {}
+    for near in (10, 8, 6):
+        rows = [row for row in last if row["near"] == near]
+        share[near] = np.mean([row["first"] / (row["first"] + row["second"]) for row in rows])
+    assert abs(share[10] - 0.5) < 0.03
+    assert 0.53 < share[8] + 0.02 < share[6] < 0.65
 
 
 @pytest.mark.slow

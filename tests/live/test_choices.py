@@ -31,6 +31,7 @@ def test_the_form_has_every_setting_with_its_bounds():
         "training.learner",
         "task.outbound_cue",
         "task.homing_cue",
+        "task.choice.carriers_follow",  # of a field, which the page does not have
         *(one.path for one in all_of(Labour)),  # without castes, ants have no thresholds
     }
     assert paths < offered.keys()

@@ -23,6 +23,7 @@ from taichi_ants import (
     Pheromone,
     Task,
     TrainingConfig,
+    World,
     load_policy,
 )
 from taichi_ants import task as tasks
@@ -34,6 +35,7 @@ from taichi_ants.live.session import Log, Session, Setup
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.viewer import Recording, recorder
 from taichi_ants.viewer.frames import CLOCK, POINT
+from taichi_ants.worlds import text_map
 
 LEARNS = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 0.9, learning_rate_decay=0.8)
 LIVELY = Task(
@@ -533,6 +535,13 @@ def test_setups_are_json(name):
 def test_a_policy_is_a_training_or_one_table(table):
     with pytest.raises(AntsError, match=r"^(policy|q_values) .*\.$"):
         Setup("paper", Task(), table)
+
+
+def test_several_nests_are_refused():
+    world = World((3, 3, 3), [(0, 0, 0), (2, 0, 0)], foods=[(0, 2, 0)])
+    two = replace(SETUPS["paper"], world=text_map.to_text(world))
+    with pytest.raises(AntsError, match="the live page supports one nest and no"):
+        Session(two)
 
 
 def test_what_a_hand_has_set_stays_in_later_episodes():

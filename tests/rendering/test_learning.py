@@ -10,7 +10,7 @@ import pytest
 from named_states import parse_state
 from PIL import Image
 
-from taichi_ants import AntsError, Colony, TrainingConfig, train
+from taichi_ants import AntsError, Colony, TrainingConfig, World, train
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rendering import (
     Checkpoint,
@@ -27,7 +27,7 @@ from taichi_ants.rendering import (
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.rendering.scene import PAPER
 from taichi_ants.rendering.sheet import clarity, learned, usual_spread
-from taichi_ants.task import Life, Observation, Rewards, Task, observations
+from taichi_ants.task import Caste, Life, Observation, Rewards, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES
 from taichi_ants.worlds import open_world, paper
@@ -404,6 +404,24 @@ def test_one_ant_of_a_colony_is_followed(observation) -> None:
     assert status.state is None
     with pytest.raises(AntsError, match="follow is 20; it must be from 0 to 19"):
         next(colony_snapshots(made, follow=20))
+
+
+def test_a_followed_ant_has_the_colours_and_the_table_of_its_nest_and_caste() -> None:
+    """Each table has its number as its values; the followed ant moves to the front as a whole."""
+    world = World((6, 6, 6), queen=[(0, 0, 0), (3, 0, 0)], foods=[(0, 3, 0)])
+    task = Task(castes={"a": Caste(share=0.5), "b": Caste(share=0.5)})
+    tables = np.broadcast_to(np.arange(4.0).reshape(2, 2, 1, 1), (2, 2, task.n_states, 5))
+    made = Colony(world, task, CONFIG, 0, 8, sharing="frozen", q_values=tables[None])
+    made.begin_episode()
+    before = made.snapshot()
+    for number in range(8):
+        (at,) = np.flatnonzero(before.ant_numbers == number)
+        snapshot, status = next(colony_snapshots(made, follow=number))
+        nest, caste = before.ant_nests[at], before.ant_castes[at]
+        assert (snapshot.ant_nests[0], snapshot.ant_castes[0]) == (nest, caste)
+        assert snapshot.ant_numbers[0] == number
+        assert (status.q_values == 2 * nest + caste).all()
+    assert len({*zip(before.ant_nests.tolist(), before.ant_castes.tolist(), strict=True)}) == 4
 
 
 def test_the_legend_of_learning_tells_the_rewards_of_the_task(monkeypatch) -> None:

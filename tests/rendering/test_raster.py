@@ -14,7 +14,7 @@ from PIL import Image
 
 from taichi_ants import runtime
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering import Scene, Snapshot, at_start, colours
+from taichi_ants.rendering import Scene, Snapshot, at_start, colours, rasteriser
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Field, Task
 from taichi_ants.worlds import World, paper
@@ -234,8 +234,20 @@ def test_nests_and_kinds_of_food_have_colours(hexagon) -> None:
     for several in (colours.QUEENS, colours.FOODS, colours.ANTS):
         for colour in several[:2]:
             assert (frame == colours.channels(colour)).all(axis=2).sum() >= 2, hex(colour)
+    loaded = dataclasses.replace(
+        ants, ant_carries=np.array([True, True]), ant_foods=np.int32([0, 5])
+    )
+    loads = scene.draw(loaded)
+    for colour in colours.FOODS[5:6] if hexagon == "small" else colours.FOODS[[0, 5]]:
+        assert (loads == colours.channels(colour)).all(axis=2).any(), hex(colour)
+        assert colour == colours.CELL_FOOD or not (frame == colours.channels(colour)).all(2).any()
     plain = scene.draw(start)
     assert not (plain == colours.channels(colours.ANTS[1])).all(axis=2).any()
+
+
+def test_ants_that_are_dots_have_the_colour_of_their_food() -> None:
+    dots = rasteriser.ants([[5, 5]] * 3, 0, np.array([1, 1, 0]), 2.0, load=colours.FOODS[[0, 2, 2]])
+    assert dots[:, 6].tolist() == [0x9A3F00, colours.FOODS[2], colours.ANT]
 
 
 def test_fields_have_scales_of_their_own() -> None:

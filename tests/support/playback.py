@@ -80,7 +80,7 @@ def played(recording: Recording) -> Iterator[Played]:
             numbers,
             frame["cells"],
             frame["poses"] & 7,
-            frame["poses"] >> 3 == 1,
+            frame["poses"] & 8 > 0,
             frame["states"],
             frame["acts"] & 15,
             frame["acts"] >> 4,

@@ -68,9 +68,9 @@ def _numbers(rng: np.random.Generator, drawn: RandomColony) -> dict[str, Any]:
             del able[name]
     if rule != "deneubourg":
         del able["k"], able["exponent"]
-    if task.choice.needs_table:
-        if sharing != "independent" and task.observation in FOLLOWED and rng.random() < 0.3:
-            found["policy"] = str(rng.choice(["random", "trail_follower"]))
+    follows = task.choice.needs_table and sharing != "independent"
+    if follows and task.observation in FOLLOWED and rng.random() < 0.3:
+        found["policy"] = str(rng.choice(["random", "trail_follower"]))
     if rule != "softmax":
         del able["temperature"]
     if task.life.lifespan is None and not task.life.births:

@@ -548,6 +548,30 @@ def test_cells_have_the_colours_of_what_they_hold(crowd, colony):
         assert colour == [*expected, 255]
 
 
+def test_nests_have_their_colours_and_their_tables(browser, folder):
+    """The queen and the ants of the second nest, and the values by which a followed ant acts."""
+    world = World((8, 8, 8), [(6, 0, 0), (0, 0, 0)], foods=[(3, 1, 0), (4, 1, 0)])
+    many = Colony(world, None, TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0), 3, ants=8)
+    many.begin_episode()
+    opened = Page(browser, written(folder, "nests", record_colony(many, 40)))
+    opened.read("viewer.player.go(40)")
+    opened.settle()
+    queens = many.grid.index(world.queens).tolist()
+    assert opened.read("cell => viewer.stage.queenColour(cell)", queens[0]) == "queen"
+    assert opened.read("cell => viewer.stage.queenColour(cell)", queens[1]) == "queen 1"
+    assert opened.read("viewer.stage.colours['queen 1']") == "#c1121f"
+    nests, numbers = many.nests[0], many.numbers[0]
+    for slot, number in enumerate(numbers.tolist()):
+        shown = opened.read("number => viewer.history.ant(40, number)", number)
+        assert shown["nest"] == nests[slot]
+        values = many.q_values[0, nests[slot], many.states[0, slot]]
+        assert np.array_equal(np.float32(shown["values"]), values)
+        assert shown["loaded"] == many.carrying[0, slot]
+    drawn = opened.read("[...viewer.stage.sprites.keys()].map((key) => key.split('.')[0])")
+    assert any(key.startswith("ant 2") for key in drawn)
+    opened.close()
+
+
 def test_the_page_works_under_its_policy(browser, colony):
     path, *_ = colony
     assert_policy_holds(browser, path)

@@ -15,10 +15,13 @@ from taichi_ants import (
     Colony,
     Task,
     TrainingConfig,
+    World,
     rollout,
     trace_training,
     worlds,
 )
+from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.interventions import Place
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rendering import Episode
@@ -104,6 +107,37 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
                 assert rewards[moment.events].tolist() == [one.reward for one in did]
                 assert len(moment.td_errors) == (len(did) if sharing != "frozen" else 0)
             before = moment
+
+
+@pytest.mark.parametrize("sharing", ["shared", "independent"])
+def test_a_recording_of_several_nests(sharing):
+    """Frames have the nests of ants, the queens by nest, and the table of each nest."""
+    world = World((8, 8, 8), [(6, 0, 0), (0, 0, 0)], foods=[(3, 1, 0), (4, 1, 0)])
+    config = TrainingConfig("q_learning", 0.1, 0.9, 0.2, 1.0)
+    colony = Colony(world, None, config, 3, ants=12, sharing=sharing)
+    colony.begin_episode()
+    recorder, queens = Recorder(colony), []
+    frames = [recorder.snapshot()]
+    for tick in range(30):
+        queens.append(colony.snapshot().queens.tolist())
+        if tick == 9:
+            Place("queen", [[0, 6, 0]], nest=1).apply(Interventions(colony))
+            frames.append(recorder.snapshot())
+            queens.append(colony.snapshot().queens.tolist())
+        frames.append(recorder.tick())
+    sections = [unpack(recorder.types, frame) for frame in frames]
+    assert sections[0]["queens"].tolist() == queens[0]
+    assert sections[10]["queens"].tolist() == queens[10] != queens[0]
+    assert not any(len(one["queens"]) for n, one in enumerate(sections) if n not in (0, 10))
+    assert unpack(recorder.types, recorder.whole())["queens"].tolist() == queens[-1]
+    nests = colony.nests[0, np.argsort(colony.numbers[0])]
+    assert (sections[-1]["poses"] >> 4 == nests).all()
+    *_, last = played(Recording(recorder.header(), frames))
+    tables, n_states = colony.q_values[0], colony.task.n_states
+    for place, state in enumerate(last.states.tolist()):
+        owner = nests[place] if sharing == "shared" else last.numbers[place]
+        assert np.array_equal(last.row(state, n_states, int(owner)), tables[owner, state])
+    assert ["nests", "2"] in list(map(list, recorder.header()["about"]))
 
 
 @pytest.mark.parametrize("epsilon", [0.0, 0.4])

@@ -21,8 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
-from taichi_ants.checks import checked_world, refuse_castes
-from taichi_ants.errors import AntsError
+from taichi_ants.checks import checked_world, refuse_castes, refuse_foods
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
@@ -50,11 +49,7 @@ def limits_of(world: World, task: Task | None = None) -> Limits:
     """Return the bounds of a world with the traffic rules of a task; None is the paper's."""
     task = task or Task()
     checked_world(world)
-    if task.foods:
-        raise AntsError(
-            f"`task.foods` is {', '.join(task.foods)}; the bounds hold for one kind of food, so "
-            "leave it out."
-        )
+    refuse_foods(task, "a bound on deliveries")
     refuse_castes(task, "a bound on deliveries")
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = world.walkable(around)[around]

@@ -297,8 +297,13 @@ class ColonyState:
     @property
     def _owner_axes(self) -> tuple[int, ...]:
         """The axes of the tables of a world: of slots, or of several nests and castes."""
-        axes = (self.n_nests, self.n_groups // self.n_nests)
-        return (self.capacity,) if self.one_a_slot else tuple(n for n in axes if n > 1)
+        return (self.capacity,) if self.one_a_slot else tuple(self._group_axes.values())
+
+    @property
+    def _group_axes(self) -> dict[str, int]:
+        """The numbers of nests and castes, if there are several."""
+        axes = {"nest": self.n_nests, "caste": self.n_groups // self.n_nests}
+        return {name: n for name, n in axes.items() if n > 1}
 
     @property
     def owners(self) -> int:
@@ -316,6 +321,13 @@ class ColonyState:
     def castes(self) -> np.ndarray:
         """The caste of the last ant in each slot, int32 (W, capacity); 0 without castes."""
         return self._column_or_zeros("caste", np.int32)
+
+    @property
+    def tables_of_ants(self) -> np.ndarray:
+        """The table of `owners` by which the last ant in each slot acts, int32 (W, capacity)."""
+        if self.one_a_slot:
+            return np.tile(np.arange(self.capacity, dtype=np.int32), (len(self.seeds), 1))
+        return self.nests * np.int32(self.n_groups // self.n_nests) + self.castes
 
     @property
     def idle(self) -> np.ndarray:
@@ -758,10 +770,17 @@ class ColonyState:
             leading, form = q_values.shape[:-2], f"{n_states}, {N_ACTIONS}"
             axes = (n_worlds, *self._owner_axes)
             if leading not in ((), (n_worlds,)) and not (own and leading == axes):
+                groups = self._group_axes
+                forms: list[tuple[str, tuple[int, ...]]] = [("world", ())]
+                forms += [(" and ".join(groups), tuple(groups.values()))] if groups else []
+                if self.sharing == "independent" or not (self.learns or self.task.castes):
+                    forms.append(("slot", (self.capacity,)))
+                several = [
+                    f"({', '.join(map(str, (n_worlds, *more)))}, {form}) for one table per {name}"
+                    for name, more in forms
+                ]
                 raise AntsError(
-                    f"q_values has shape {q_values.shape}; give ({form}), ({n_worlds}, {form}) for "
-                    f"one table per world, or ({', '.join(map(str, axes))}, {form}) for one table "
-                    "per slot, or per nest and caste."
+                    f"q_values has shape {q_values.shape}; give ({form}), {', or '.join(several)}."
                 )
             n_given = [] if not leading else [n_worlds, slots if leading == axes and own else 1]
             given = q_values.reshape(*n_given, 1, n_states, N_ACTIONS)

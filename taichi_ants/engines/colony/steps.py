@@ -239,18 +239,13 @@ def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant,
     return view
 
 
-def entry_of(view: Any, name: str) -> Any:
-    """Return a vector of a view by its name, while a kernel compiles."""
-    return getattr(view, name)
-
-
 def set_entry(view: Any, name: str, level: Any) -> None:
     """Set the level of the ant's own cell in a view, while a kernel compiles."""
     getattr(view, f"own_{name}")._assign(level)
 
 
 # Taichi requires this attribute, with any value, of Python functions that kernels call.
-entry_of._is_taichi_function = set_entry._is_taichi_function = False  # type: ignore[attr-defined]
+set_entry._is_taichi_function = False  # type: ignore[attr-defined]
 
 
 @ti.func
@@ -258,7 +253,7 @@ def read_fields(c: ti.template(), v: ti.template(), view: ti.template(), k, plac
     """Set the levels of cell number k of a view in the pheromones that the observation reads."""
     for i in ti.static(range(len(v.reads))):
         level = level_of(ti.static(v.field(c, v.reads[i])), place, tick)
-        entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
+        noise.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
 
 
 @ti.func

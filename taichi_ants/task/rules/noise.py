@@ -5,6 +5,8 @@ slips or the cell is misread. The lower word chooses the executed action among a
 seen among the other three, in ascending order.
 """
 
+from typing import Any
+
 import taichi as ti
 
 from taichi_ants.task.constants import N_ACTIONS
@@ -40,12 +42,22 @@ def misread_percept(percept, random_state, misread_below):
     return state_index(percept >> 6, left, forward, right), last
 
 
+def entry_of(view: Any, name: str) -> Any:
+    """Return a vector of a view by its name, while a kernel compiles."""
+    return getattr(view, name)
+
+
+# Taichi requires this attribute, with any value, of Python functions that kernels call.
+entry_of._is_taichi_function = False  # type: ignore[attr-defined]
+
+
 @ti.func
 def misread_view(view: ti.template(), observation: ti.template(), random_state, misread_below):
     """Misread the cells of a view, and return the stream after a draw for each.
 
-    A misread cell has another code, no ant, no trail, and is not nearer to the queen. The percept
-    of the view consists of the codes seen. The strongest level ahead does not change.
+    A misread cell has another code, no ant, no trail, no further field, and is not nearer to the
+    queen. The percept of the view consists of the codes seen. The strongest level ahead does not
+    change.
     """
     after = random_state
     for k in ti.static(range(len(observation.cells))):
@@ -53,6 +65,8 @@ def misread_view(view: ti.template(), observation: ti.template(), random_state, 
         if code != view.codes[k]:
             view.codes[k], view.levels[k], view.nearer[k] = code, 0, 0
             view.ants[k], view.strangers[k] = 0, 0
+            for i in ti.static(range(len(observation.reads))):
+                entry_of(view, observation.reads[i])[k] = 0
     left, forward, right = ti.static(observation.ahead)
     view.percept = state_index(
         view.carries, view.codes[left], view.codes[forward], view.codes[right]

@@ -14,8 +14,9 @@ from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.observations import OBSERVATIONS, cells_in_view
+from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, cells_in_view
 from taichi_ants.task import Observation, Rewards, Task, observations
+from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import registry
 
 # Each entry takes kernels of its own, so that there are few: learner, sharing, observation, dense,
@@ -323,6 +324,58 @@ def test_every_tick_with_castes_and_division_of_labour(kernel):
             several = len({ant.caste for ant in plain.ants.values()}) == castes
             happened[:4] += [record.births > 0, record.deaths > 0, record.deliveries > 0, several]
     assert (happened >= [1, 3, 2, 5, 20 * labour, 5 * labour]).all(), happened
+
+
+def with_levels(view):
+    """The load, and for each cell ahead whether two further pheromones are there."""
+    index = view.carries
+    for k in range(3):
+        index = 4 * index
+        if view.a[k] >= 1:
+            index += 1
+        if view.B[k] >= 1:
+            index += 2
+    return index
+
+
+def levels_seen(world, ant):
+    """The observation in plain Python; a misread cell has no pheromone."""
+    index = int(ant.carries)
+    for turn, cell in zip(AHEAD, cells_in_view(ant), strict=True):
+        shows = world.ground.get(cell) == EMPTY and turn not in ant.misread
+        index *= 4
+        for number, name in enumerate("aB"):
+            index += (shows and world.fields[name].level(cell) >= 1) << number
+    return index
+
+
+@pytest.mark.parametrize("noise", ["misread", ""])
+def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
+    """Drawn colonies whose ants observe two fields, in every tick."""
+    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+    monkeypatch.setitem(OBSERVATIONS, "levels", levels_seen)
+    monkeypatch.setitem(TURNS, "levels", AHEAD)
+    observations.register(Observation("levels", 128, with_levels, reads=("a", "B")))
+    hidden = shown = 0
+    for seed in range(25):
+        rules = {"sharing": "shared", "learner": "q_learning", "dense": False, "noise": noise}
+        drawn = random_colony(seed, fields="aB", changes=True, **rules)
+        drawn = replace(drawn, task=replace(drawn.task, observation="levels"), q_values=None)
+        colony, plain = both(drawn)
+        colony.begin_episode(20)
+        plain.begin_episode()
+        for tick in range(20):
+            if not plain.over:
+                colony.tick()
+                plain.tick(last=tick == 19)
+                assert_equal(colony, plain)
+                for ant in plain.ants.values():
+                    misread, ant.misread = ant.misread, {}
+                    hidden += levels_seen(plain.world, ant) != ant.state
+                    shown += ant.state % 64 > 0
+                    ant.misread = misread
+    assert shown > 100
+    assert (hidden > 20) == (noise == "misread")
 
 
 def test_each_learner_and_observation_is_compared():

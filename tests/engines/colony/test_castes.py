@@ -200,7 +200,10 @@ GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: train(worlds.paper(), TRAINING, 0, 1, task=CASTES), "only colonies support them"),
+        (
+            lambda: train(worlds.paper(), TRAINING, 0, 1, task=CASTES),
+            "only colonies support castes",
+        ),
         (lambda: limits_of(worlds.paper(), CASTES), "a bound on deliveries does not support"),
         (lambda: Recorder(follows(CASTES)), "the viewer does not support castes"),
         (lambda: record_colony(follows(CASTES), 1, 1), "record_colony does not support castes"),

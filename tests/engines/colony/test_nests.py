@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,12 +13,12 @@ from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, World, tr
 from taichi_ants.analysis.bounds.limits import limits_of
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import AddAnts, Place, RemoveAnts
-from taichi_ants.learners.policies import trail_follower
+from taichi_ants.learners.policies import load_policy, save_policy, trail_follower
 from taichi_ants.offline import record_colony
 from taichi_ants.protocol import At
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rendering import colony_snapshots, frames
-from taichi_ants.task import Food
+from taichi_ants.task import Caste, Food
 from taichi_ants.task.constants import FOOD
 from taichi_ants.task.events import Event
 from taichi_ants.viewer.recorder import Recorder
@@ -170,6 +171,50 @@ def test_each_nest_learns_into_its_own_table():
     assert np.array_equal(frozen.q_values, tables)
 
 
+def test_a_policy_file_has_the_table_of_one_nest(tmp_path):
+    """All ants of another colony can follow it."""
+    colony = Colony(WORLD, Task(foods=KINDS), TRAINING, 1, ants=12)
+    colony.run(1, 100)
+    path, (tables,) = tmp_path / "second.npz", colony.q_values
+    assert tables.shape == (2, 128, 5)
+    with pytest.raises(AntsError) as raised:
+        save_policy(path, tables, {})
+    assert str(raised.value) == (
+        "q_values has shape (2, 128, 5), but a policy file has one table, (128, 5); give one of "
+        "them, for example q_values[0]."
+    )
+    assert not path.exists()
+    save_policy(path, tables[1], {"nest": 1})
+    table = load_policy(path).q_values
+    assert (table == tables[1]).all()
+    frozen = Colony(WORLD, Task(foods=KINDS), TRAINING, 1, 12, sharing="frozen", q_values=table)
+    assert (frozen.q_values == table).all()
+    assert frozen.run(1, 50).nest_deliveries.shape == (1, 1, 2)
+
+
+CASTES = {"a": Caste(share=0.5), "b": Caste(share=0.5)}
+
+
+@pytest.mark.parametrize(
+    ("castes", "sharing", "allowed"),
+    [
+        ({}, "shared", "or (3, 2, 128, 5) for one table per nest."),
+        (CASTES, "shared", "or (3, 2, 2, 128, 5) for one table per nest and caste."),
+        (CASTES, "frozen", "or (3, 2, 2, 128, 5) for one table per nest and caste."),
+        ({}, "independent", "or (3, 20, 128, 5) for one table per slot."),
+        ({}, "frozen", "nest, or (3, 20, 128, 5) for one table per slot."),
+    ],
+)
+def test_tables_of_another_shape_are_refused(castes, sharing, allowed):
+    options = {"ants": 12, "capacity": 20, "sharing": sharing, "q_values": np.zeros((3, 5, 128, 5))}
+    with pytest.raises(AntsError, match=r"^q_values has shape \(3, 5, 128, 5\); give") as raised:
+        Colony(WORLD, Task(foods=KINDS, castes=castes), TRAINING, [1, 2, 3], **options)
+    assert str(raised.value).endswith(allowed)
+    shape = tuple(map(int, re.findall(r"\d+", allowed)))
+    options["q_values"] = np.ones(shape, np.float32)
+    Colony(WORLD, Task(foods=KINDS, castes=castes), TRAINING, [1, 2, 3], **options)
+
+
 def test_changes_by_hand_keep_nests_and_kinds_in_later_episodes():
     colony = two_nests(capacity=20)
     interventions = Interventions(colony)
@@ -199,8 +244,8 @@ def test_pictures_show_every_queen():
         (lambda: train(WORLD, TRAINING, 1, 1), "the world has 2 nests and 2 kinds of food; only"),
         (lambda: limits_of(WORLD), "the world has 2 nests and 2 kinds of food"),
         (lambda: limits_of(replace(WORLD, other_queens=(), food_kinds=()), Task(foods=KINDS)),
-         "`task.foods` is seed, sugar; the bounds hold for one kind of food"),
-        (lambda: Recorder(begun()), "the viewer supports one nest"),
+         "`task.foods` has the kinds seed and sugar; a bound on deliveries does not support kinds"),
+        (lambda: Recorder(begun()), "the viewer does not support kinds of food"),
         (lambda: record_colony(two_nests(), 1, 5), "record_colony supports one nest"),
         (lambda: AddAnts(number=1, nest=2).apply(Interventions(begun())), "nest is 2"),
         (lambda: Place("food", [[1, 0, 0]], kind="wax").apply(Interventions(begun())),
