@@ -195,7 +195,8 @@ def study(settings: argparse.Namespace) -> None:
     asked = study_of(conditions, seeds)
 
     def work(blocks: Path, ready: Path) -> Results | None:
-        with command_line.progress_bar("study") as progress, chosen(settings) as how:
+        bar = command_line.progress_bar
+        with chosen(settings) as how, bar("study", how.get("executor")) as progress:
             outcomes = asked.run(blocks, progress, **how)
         if settings.shard:
             return None

@@ -42,7 +42,8 @@ def sweep(settings: argparse.Namespace) -> None:
     asked = read_sweep(settings.file, settings.text)
 
     def work(blocks: Path, ready: Path) -> None:
-        with command_line.progress_bar("sweep") as progress, chosen(settings) as how:
+        bar = command_line.progress_bar
+        with chosen(settings) as how, bar("sweep", how.get("executor")) as progress:
             values = asked.measured(blocks, progress, **how)
         if settings.shard:
             return

@@ -121,7 +121,7 @@ def measured(
 
     `how` has further arguments of `Study.in_blocks`.
     """
-    with progress_bar("training") as progress:
+    with progress_bar("training", how.get("executor")) as progress:
         # Compile all kernels first; this needs one thread, and the worker process uses another.
         for point in {point.training.learner: point for point in study.points}.values():
             short = replace(point, episodes=1, max_steps=1, rollouts=1)
