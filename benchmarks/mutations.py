@@ -216,7 +216,7 @@ MUTATIONS = [
     ("studies/blocks.py", "if path == self._path(header):", "if header:", STUDIES),
     ("studies/runner.py", "missing[a] |= missing[place] & lacks", "pass", STUDIES),
     ("studies/runner.py", "families[root] for root in roots", "0 for root in roots", STUDIES),
-    ("studies/runner.py", "(a < 0) | ~missing[a]", "True", STUDIES),
+    ("studies/runner.py", "(a < 0) | ~missing[a]", "True", EXECUTORS),
     ("studies/executors.py", "if failures[piece] == TRIES:", "if True:", EXECUTORS),
     ("studies/executors.py", "if versions != _versions():", "if False:", EXECUTORS),
     ("studies/executors.py", "while len(coming) < most:", "while True:", EXECUTORS),

@@ -155,6 +155,16 @@ def test_a_block_that_always_fails_is_named_and_the_others_are_done(tmp_path, mo
     assert len(list(tmp_path.iterdir())) == 3
 
 
+def test_points_whose_training_failed_are_left_out_and_no_others(tmp_path, monkeypatch):
+    monkeypatch.setattr(ColonyPoint, "runs_of_a_block", 1)
+    executor = Fails(
+        lambda work, n: OSError("full") if work.points[0].episodes and 8 in work.seeds else None
+    )
+    with pytest.raises(FailedBlocksError, match=r"^1 block failed: .*, seed 8 \(OSError: full\)"):
+        COLONIES.run(tmp_path, executor=executor)
+    assert len(list(tmp_path.iterdir())) == 3 + 3
+
+
 def test_a_study_of_which_nothing_succeeds_ends_with_the_error(tmp_path, monkeypatch):
     monkeypatch.setattr(RunPoint, "runs_of_a_block", 1)
     executor = Fails(lambda work, n: AntsError("no good"))
