@@ -52,6 +52,7 @@ class RayWorkers:
         self.address, self.finished = address, 0
         self._needs = {"CPU": threads, "GPU": int(arch == "cuda")}
         self._counted, self._workers = -_COUNT_EVERY, 0
+        self._ended = ""  # why there are no workers any more
 
     def __enter__(self) -> RayWorkers:
         for name, value in _ENVIRONMENT.items():
@@ -91,6 +92,8 @@ class RayWorkers:
 
     def submit(self, call: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
         """Run a call in a worker."""
+        if self._ended:
+            raise BrokenExecutor(self._ended)
         given: Future[Any] = Future()
         given.set_running_or_notify_cancel()
         theirs = self._task.remote(pickle.dumps((call, arguments), -1)).future()
@@ -157,8 +160,10 @@ class RayWorkers:
         except self._ray.exceptions.RayTaskError as error:  # its text contains a traceback
             given.set_exception(error.cause or RuntimeError(_last_line(error)))
         except self._ray.exceptions.RayError as error:
-            name = type(error).__name__
-            given.set_exception(BrokenExecutor(f"{name}: {_first_line(error)}"))
+            why = f"{type(error).__name__}: {_first_line(error)}"
+            if isinstance(error, self._ray.exceptions.LocalRayletDiedError):
+                self._ended = "Ray has ended on this machine"
+            given.set_exception(BrokenExecutor(why))
         except Exception as error:  # the outcome cannot be read
             given.set_exception(error)
 
