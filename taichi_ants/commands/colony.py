@@ -185,7 +185,7 @@ def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingCon
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show its results if it is finished."""
     from taichi_ants.studies.colony_study import plan, study_of, write_results
-    from taichi_ants.studies.executors import chosen
+    from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))

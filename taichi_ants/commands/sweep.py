@@ -33,7 +33,7 @@ def parse_arguments(
 def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
     from taichi_ants.files import read_text
-    from taichi_ants.studies.executors import chosen
+    from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.sweep import read_sweep
 

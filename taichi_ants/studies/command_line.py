@@ -126,7 +126,7 @@ def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) 
 
 
 def add_machines(parser: argparse.ArgumentParser) -> None:
-    """Add the options of commands that can spread their work, see `executors.chosen`."""
+    """Add the options of commands that can spread their work, see `machines.chosen`."""
     add = parser.add_argument
     workers = "number of worker processes on this machine (default: all work in this process)"
     add("--workers", type=whole_number(1, 1024), metavar="N", help=workers)

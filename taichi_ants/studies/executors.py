@@ -17,11 +17,10 @@ import signal
 import sys
 import tempfile
 import threading
-from argparse import Namespace
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from multiprocessing.connection import Connection
@@ -35,6 +34,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.studies.command_line import load_plugin
+from taichi_ants.studies.compilation import compile_once
 from taichi_ants.studies.interruption import stop_if_noted
 
 TRIES = 3  # of a block, before it counts as failed
@@ -107,6 +107,7 @@ def do(of_study: tuple[str, str], plugins: Sequence[Plugin], pickled: bytes) -> 
     for name, text in plugins:
         _load(name, text)
     work: Work = pickle.loads(pickled)  # after the plugins, which can define its classes
+    compile_once(work, *plugins)
     return work.do()
 
 
@@ -214,33 +215,6 @@ def _error_of(future: Future[Any]) -> Exception | None:
     if error is None or isinstance(error, Exception):
         return error
     return RuntimeError(f"{type(error).__name__}: {error}")  # a SystemExit, for example
-
-
-@contextmanager
-def chosen(settings: Namespace) -> Iterator[dict[str, Any]]:
-    """Yield the arguments of `Study.in_blocks` that the options of a command determine.
-
-    Workers end with the `with` block. Each has the threads of `--threads`, by default those of this
-    machine divided by the number of workers, or with Ray one.
-    """
-    how: dict[str, Any] = {"threads": settings.threads, "arch": settings.arch}
-    how["shard"] = settings.shard or (1, 1)
-    if not (settings.workers or settings.ray):
-        yield how
-        return
-    how["plugins"] = [read_plugin(settings.plugin)] if settings.plugin else []
-    workers: Any
-    if settings.ray:
-        from taichi_ants.studies.ray_workers import RayWorkers
-
-        how["threads"] = settings.threads or 1
-        address = None if settings.ray is True else settings.ray
-        workers = RayWorkers(address, how["threads"], settings.arch)
-    else:
-        how["threads"] = settings.threads or max(1, available_threads() // settings.workers)
-        workers = LocalWorkers(settings.workers)
-    with workers:
-        yield {**how, "executor": workers}
 
 
 class LocalWorkers:

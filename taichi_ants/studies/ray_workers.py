@@ -91,7 +91,7 @@ class RayWorkers:
         self._ray.shutdown()
 
     def submit(self, call: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
-        """Run a call in a worker."""
+        """Return the future of a call in a worker."""
         if self._ended:
             raise BrokenExecutor(self._ended)
         given: Future[Any] = Future()
@@ -132,7 +132,7 @@ class RayWorkers:
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
         asked = {}
-        look = self._ray.remote(num_cpus=0, max_retries=0)(executors.versions)
+        look = self._ray.remote(num_cpus=0, max_retries=0)(_versions)
         for node in self._alive():
             if self._room(node["Resources"]):
                 on = NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)
@@ -166,6 +166,10 @@ class RayWorkers:
             given.set_exception(BrokenExecutor(why))
         except Exception as error:  # the outcome cannot be read
             given.set_exception(error)
+
+
+def _versions() -> tuple[str, str]:
+    return executors.versions()  # of the worker
 
 
 def _call(pickled: bytes) -> bytes:

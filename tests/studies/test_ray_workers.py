@@ -241,7 +241,7 @@ def test_two_of_eight_machines_die(plain, kernels, cluster, tmp_path):
         cluster.stdin.flush()
         assert cluster.stdout.readline() == "removed\n"
     assert len(blocks_in(tmp_path)) < 8
-    out, err = process.communicate(timeout=500)
+    _, err = process.communicate(timeout=500)
     assert (process.returncode, err) == (0, "")
     assert same(plain, tmp_path / "a")
 
