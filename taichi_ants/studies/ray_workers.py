@@ -143,8 +143,7 @@ class RayWorkers:
                 theirs = self._ray.get(one)
             except self._ray.exceptions.RayTaskError as error:
                 raise AntsError(
-                    f"{asked[one]!r}, a machine of the Ray cluster, cannot import this version of "
-                    f"taichi_ants ({_last_line(error)}); install it there."
+                    f"{asked[one]!r}, a machine of the Ray cluster: {_cause_of(error)}"
                 ) from error
             except self._ray.exceptions.RayError:
                 continue  # it has died
@@ -158,7 +157,7 @@ class RayWorkers:
             self.finished += 1
             given.set_result(outcome)
         except self._ray.exceptions.RayTaskError as error:  # its text contains a traceback
-            given.set_exception(error.cause or RuntimeError(_last_line(error)))
+            given.set_exception(_cause_of(error))
         except self._ray.exceptions.RayError as error:
             why = f"{type(error).__name__}: {_first_line(error)}"
             if isinstance(error, self._ray.exceptions.LocalRayletDiedError):
@@ -214,6 +213,18 @@ def _beginning() -> Iterator[None]:
         os.close(nothing)
         with suppress(ValueError):  # this is not the main thread
             signal.signal(signal.SIGTERM, before)
+
+
+def _cause_of(error: Any) -> Exception:
+    """Return the exception of a call that failed in a worker, without Ray's text."""
+    if error.cause is None:
+        return RuntimeError(_last_line(error))
+    if "failed to import on the worker" in str(error.cause):
+        return AntsError(
+            f"a worker cannot import this version of taichi_ants ({_last_line(error)}); install it "
+            "there."
+        )
+    return error.cause
 
 
 def _first_line(error: BaseException) -> str:
