@@ -33,17 +33,15 @@ def compile_once(work: Work, *others: Any) -> bool:
     if kind in _seen:
         return False
     _seen.add(kind)
-    compiles = False
-    with (
-        suppress(OSError, ImportError),
-        _alone(runtime.cache_folder().parent / "compiled") as folder,
-    ):
-        compiles = not (folder / kind).exists()
+    compiles, place = False, runtime.cache_folder().parent / "compiled"
+    with suppress(OSError, ImportError), _alone(place, kind):
+        compiles = not (place / kind).exists()
         if compiles:
             with suppress(Exception):
                 _shortest(work).do()
-        runtime.refresh()
-        (folder / kind).touch()
+        with _alone(place, "all"):  # Taichi saves nothing while another process saves
+            runtime.refresh()
+        (place / kind).touch()
     return compiles
 
 
@@ -81,11 +79,11 @@ def _shortest(work: Work) -> Work:
 
 
 @contextmanager
-def _alone(folder: Path) -> Iterator[Path]:
-    """Yield a folder, which no other process of this machine uses in this way meanwhile."""
+def _alone(folder: Path, name: str) -> Iterator[None]:
+    """Return a context that one process of this machine at a time enters, by folder and name."""
     import fcntl  # which Windows lacks
 
     folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / "lock", "wb") as lock:
+    with open(folder / f"{name}.lock", "wb") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)  # released when the file is closed, also by a crash
-        yield folder
+        yield
