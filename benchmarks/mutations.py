@@ -37,6 +37,8 @@ FILES = "tests/files/test_files.py"
 RESULTS = "tests/files/test_results.py"
 STUDIES = "tests/studies/test_runner.py"
 EXECUTORS = "tests/studies/test_executors.py"
+RAY = "tests/studies/test_ray_workers.py"
+COMPILATION = "tests/studies/test_compilation.py"
 GROWING = "tests/commands/test_growing.py"
 RECORDING = "tests/viewer/test_recording.py"
 SERVER = "tests/live/test_server.py"
@@ -280,8 +282,18 @@ MUTATIONS = [
     ("studies/runner.py", "families[root] for root in roots", "0 for root in roots", STUDIES),
     ("studies/runner.py", "(a < 0) | ~missing[a]", "True", EXECUTORS),
     ("studies/executors.py", "if failures[piece] == TRIES:", "if True:", EXECUTORS),
-    ("studies/executors.py", "if versions != _versions():", "if False:", EXECUTORS),
-    ("studies/executors.py", "while len(coming) < most:", "while True:", EXECUTORS),
+    ("studies/ray_workers.py", "header[3:4] != bytes([_SETTINGS])", "False", RAY),
+    ("studies/ray_workers.py", "_check_listens(self.address)", "pass", RAY),
+    ("studies/command_line.py", 'for other in ("workers", "shard"):', "for other in ():", RAY),
+    ("studies/compilation.py", "else bool(value)", "else value", COMPILATION),
+    ("studies/compilation.py", "seeds=work.seeds[:1]", "seeds=work.seeds", COMPILATION),
+    ("studies/executors.py", "if own != of_study:", "if False:", EXECUTORS),
+    (
+        "studies/executors.py",
+        "while len(coming) < (in_flight or 2 * workers):",
+        "while True:",
+        EXECUTORS,
+    ),
     ("studies/shards.py", "if name != _OF_TIME", "if False", GROWING),
     ("studies/sweep.py", "values[number, :, n]", "values[0, :, n]", GROWING),
     ("files/results.py", "seeds <= wanted.get(point, nothing)", "True", GROWING),

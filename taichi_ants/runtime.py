@@ -106,6 +106,18 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     return wanted
 
 
+def refresh() -> None:
+    """Save compiled kernels, and read those of other processes at the next start.
+
+    This ends a running Taichi, unless it holds data or the user has started it.
+    """
+    import taichi as ti
+
+    runtime = ti.lang.impl.get_runtime()
+    if runtime.prog is not None and getattr(runtime, "is_ours", False) and not holds_data():
+        ti.reset()
+
+
 def start_for_plugin_check() -> None:
     """Start Taichi with checks of array bounds, in a forked process.
 
@@ -208,7 +220,7 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
         "fast_math": False,  # so that results are the same bits everywhere
         "cpu_max_num_threads": wanted.threads,
         "make_cpu_multithreading_loop": False,  # distribute runs one by one, as they are uneven
-        "offline_cache_file_path": str(_cache_folder()),
+        "offline_cache_file_path": str(cache_folder()),
         **others,
     }
     arch = ti.cuda if wanted.arch == "cuda" else ti.cpu
@@ -226,7 +238,7 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
         raise AntsError("arch is 'cuda', but no CUDA device is usable here; choose 'cpu'.")
 
 
-def _cache_folder() -> Path:
+def cache_folder() -> Path:
     """Return the folder of the kernel cache, or a temporary one if it is not writable."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.environ["HOME"], ".cache")
     chosen = os.environ.get("TI_OFFLINE_CACHE_FILE_PATH")  # Taichi's own variable for it

@@ -185,7 +185,7 @@ def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingCon
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show its results if it is finished."""
     from taichi_ants.studies.colony_study import plan, study_of, write_results
-    from taichi_ants.studies.executors import chosen
+    from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
 
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
@@ -195,7 +195,8 @@ def study(settings: argparse.Namespace) -> None:
     asked = study_of(conditions, seeds)
 
     def work(blocks: Path, ready: Path) -> Results | None:
-        with command_line.progress_bar("study") as progress, chosen(settings) as how:
+        bar = command_line.progress_bar
+        with chosen(settings) as how, bar("study", how.get("executor")) as progress:
             outcomes = asked.run(blocks, progress, **how)
         if settings.shard:
             return None

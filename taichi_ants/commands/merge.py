@@ -37,7 +37,7 @@ def merge(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.shards import join
 
     manifest = join(settings.folders, settings.out)
-    options = {**manifest["options"], "shard": None, "workers": None, "force": False}
+    options = {**manifest["options"], "shard": None, "workers": None, "ray": None, "force": False}
     options |= {name: Path(options[name]) for name in ("file",) if options.get(name)}
     started(manifest["command"], {**options, "out": settings.out})
 

@@ -41,7 +41,7 @@ def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
     from taichi_ants.files import read_text
     from taichi_ants.files.inputs import recorded
-    from taichi_ants.studies.executors import chosen
+    from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.search import Search, read
 
@@ -55,7 +55,8 @@ def sweep(settings: argparse.Namespace) -> None:
         asked.design.check_folder(settings.out)
 
     def work(blocks: Path, ready: Path) -> None:
-        with command_line.progress_bar("sweep") as progress, chosen(settings) as how:
+        bar = command_line.progress_bar
+        with chosen(settings) as how, bar("sweep", how.get("executor")) as progress:
             values = asked.measured(blocks, progress, **how)
         if settings.shard:
             return
@@ -68,7 +69,7 @@ def sweep(settings: argparse.Namespace) -> None:
 
 def _search(settings: argparse.Namespace, asked: Search, inputs: Mapping[str, bytes]) -> None:
     """Run a search, or show its results if it is finished."""
-    from taichi_ants.studies.executors import chosen
+    from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
 
     if settings.shard:
@@ -78,7 +79,8 @@ def _search(settings: argparse.Namespace, asked: Search, inputs: Mapping[str, by
         )
 
     def work(blocks: Path, ready: Path) -> None:
-        with command_line.progress_bar("search") as progress, chosen(settings) as how:
+        bar = command_line.progress_bar
+        with chosen(settings) as how, bar("search", how.get("executor")) as progress:
             found = asked.measured(blocks, progress, **how)
         asked.write(found, ready, draws=not settings.no_figures)
 

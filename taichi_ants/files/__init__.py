@@ -36,6 +36,8 @@ else:
 
 PathLike = str | os.PathLike[str]
 _ABANDONED = 3600.0  # age in seconds at which an unfinished file must be from a killed process
+_LISTED_FOR = 60.0  # seconds, because listing a folder of many files takes long
+_listed: dict[Path, tuple[float, list[Path]]] = {}
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
@@ -61,9 +63,12 @@ def unfinished(target: Path) -> Iterator[Path]:
     """
     # A hash, because the name itself can already have the greatest length allowed.
     name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
-    for left in target.parent.glob(f".{name}.*.tmp"):
+    for left in _left_in(target.parent):
         with suppress(OSError):
-            if time.time() - left.stat().st_mtime > _ABANDONED:
+            if (
+                left.name.startswith(f".{name}.")
+                and time.time() - left.stat().st_mtime > _ABANDONED
+            ):
                 _remove(left)
     place = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
     try:
@@ -71,6 +76,15 @@ def unfinished(target: Path) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             _remove(place)
+
+
+def _left_in(folder: Path) -> list[Path]:
+    """Return the unfinished files that a folder had at most a minute ago."""
+    when, found = _listed.get(folder, (0.0, []))
+    if not when or time.monotonic() - when > _LISTED_FOR:
+        found = list(folder.glob(".*.tmp"))
+        _listed[folder] = time.monotonic(), found
+    return found
 
 
 def _remove(path: Path) -> None:

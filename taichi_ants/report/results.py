@@ -40,7 +40,8 @@ from taichi_ants.report.comparison import (
 from taichi_ants.report.page import made_facts, setting_facts
 from taichi_ants.studies.blocks import Blocks, Outcome
 from taichi_ants.studies.command_line import given_settings, load_plugin, progress_bar
-from taichi_ants.studies.executors import Work, chosen
+from taichi_ants.studies.executors import Work
+from taichi_ants.studies.machines import chosen
 from taichi_ants.studies.runner import VALUE, RunPoint, Study
 from taichi_ants.studies.worker_process import WorkerProcess
 from taichi_ants.task.constants import N_ACTIONS
@@ -121,7 +122,7 @@ def measured(
 
     `how` has further arguments of `Study.in_blocks`.
     """
-    with progress_bar("training") as progress:
+    with progress_bar("training", how.get("executor")) as progress:
         # Compile all kernels first; this needs one thread, and the worker process uses another.
         for point in {point.training.learner: point for point in study.points}.values():
             short = replace(point, episodes=1, max_steps=1, rollouts=1)

@@ -126,15 +126,31 @@ def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) 
 
 
 def add_machines(parser: argparse.ArgumentParser) -> None:
-    """Add the options of commands that can spread their work, see `executors.chosen`."""
+    """Add the options of commands that can spread their work, see `machines.chosen`."""
     add = parser.add_argument
     workers = "number of worker processes on this machine (default: all work in this process)"
     add("--workers", type=whole_number(1, 1024), metavar="N", help=workers)
+    ray = (
+        "spread the work with Ray over this machine, or over the cluster at HOST:PORT that this "
+        "machine belongs to"
+    )
+    add("--ray", nargs="?", const=True, type=_address, metavar="HOST:PORT", help=ray)
     shard = (
         "compute only the I-th of N equal parts, for example of a job array; "
         "`taichi-ants merge` joins the parts"
     )
     add("--shard", type=_shard, metavar="I/N", help=shard)
+
+
+def _address(text: str) -> str:
+    """Return the address of a Ray cluster."""
+    host, _, port = text.rpartition(":")
+    if not (host and "/" not in host and port.isdecimal() and 0 < int(port) < 2**16):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not the address of a Ray cluster; write HOST:PORT, for example "
+            "10.0.0.1:6379, or leave it out and give --ray as the last option"
+        )
+    return text
 
 
 def _shard(text: str) -> tuple[int, int]:
@@ -150,7 +166,17 @@ def _shard(text: str) -> tuple[int, int]:
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """Return the settings with a folder for the results, which --quick and --shard change."""
+    """Return the settings with a folder for the results, which --quick and --shard change.
+
+    Raises:
+        AntsError: Options of `add_machines` exclude each other.
+    """
+    for other in ("workers", "shard"):
+        if getattr(settings, "ray", None) and getattr(settings, other, None):
+            raise AntsError(
+                f"--ray and --{other} cannot be combined, because Ray already spreads all of the "
+                "work; leave one of them out."
+            )
     name = f"{name}-quick" if getattr(settings, "quick", False) else name
     if shard := getattr(settings, "shard", None):
         name = f"{name}-shard-{shard[0]}-of-{shard[1]}"
@@ -266,22 +292,25 @@ def load_plugin(path: str | None) -> None:
 
 
 @contextmanager
-def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
+def progress_bar(title: str, executor: Any = None) -> Iterator[Callable[[float], None]]:
     """Yield a function that shows the finished share of the work, 0 to 1, as a progress bar.
 
-    The bar is on standard error, if that is a terminal. The function raises KeyboardInterrupt if a
-    library has ignored a signal to stop.
+    The bar is on standard error, if that is a terminal. It ends with the text of `executor`, if
+    that has workers which come and go. The function raises KeyboardInterrupt if a library has
+    ignored a signal to stop.
     """
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress, TextColumn
 
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(title, total=1.0)
+    console, state = Console(stderr=True), getattr(executor, "state", lambda: "")
+    columns = *Progress.get_default_columns(), TextColumn("{task.fields[state]}")
+    how: Any = {"console": console, "transient": True, "disable": not console.is_terminal}
+    with Progress(*columns, **how) as bar:
+        task = bar.add_task(title, total=1.0, state=state())
 
         def update(share: float) -> None:
             stop_if_noted()
-            bar.update(task, completed=share)
+            bar.update(task, completed=share, state=state())
 
         stop_if_noted()
         yield update

@@ -17,11 +17,10 @@ import signal
 import sys
 import tempfile
 import threading
-from argparse import Namespace
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from multiprocessing.connection import Connection
@@ -35,6 +34,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.studies.command_line import load_plugin
+from taichi_ants.studies.compilation import compile_once
 from taichi_ants.studies.interruption import stop_if_noted
 
 TRIES = 3  # of a block, before it counts as failed
@@ -83,25 +83,31 @@ def read_plugin(path: str | Path) -> Plugin:
     return Path(path).name, files.read_text(path)
 
 
-def _versions() -> tuple[str, str]:
+def versions() -> tuple[str, str]:
+    """Return the versions of this package and of Python, which all workers must have."""
     return __version__, ".".join(platform.python_version_tuple()[:2])
 
 
-def do(versions: tuple[str, str], plugins: Sequence[Plugin], pickled: bytes) -> Outcome:
+def check_versions(of_study: tuple[str, str], own: tuple[str, str], owner: str) -> None:
+    """Raise AntsError if a worker, which the message calls `owner`, has other `versions`."""
+    if own != of_study:
+        theirs, its = (f"taichi_ants {one} and Python {other}" for one, other in (of_study, own))
+        raise AntsError(
+            f"the study runs with {theirs}, but {owner} has {its}; install the same versions."
+        )
+
+
+def do(of_study: tuple[str, str], plugins: Sequence[Plugin], pickled: bytes) -> Outcome:
     """Return the outcome of a pickled `Work`; this is what workers run.
 
     Raises:
-        AntsError: The worker has another version of the package or of Python.
+        AntsError: The worker has other `versions` than the study.
     """
-    if versions != _versions():
-        pairs = versions, _versions()
-        asked, own = (f"taichi_ants {one} and Python {other}" for one, other in pairs)
-        raise AntsError(
-            f"the study runs with {asked}, but a worker has {own}; install the same versions."
-        )
+    check_versions(of_study, versions(), "a worker")
     for name, text in plugins:
         _load(name, text)
     work: Work = pickle.loads(pickled)  # after the plugins, which can define its classes
+    compile_once(work, *plugins)
     return work.do()
 
 
@@ -141,20 +147,20 @@ def completed(
         work_of: A function that returns the work of a piece.
         executor: The executor.
         in_flight: The number of pieces that the executor has at the same time, by default twice
-            the number of its workers, or of the processors of this machine.
+            the present number of its workers, or of the processors of this machine.
         plugins: Plugins that the workers need.
 
     Raises:
         AntsError: The executor takes no more work.
     """
-    workers = getattr(executor, "num_workers", 0) or available_threads()
-    most, versions = in_flight or 2 * workers, _versions()
+    of_study = versions()
     source, again, alone = iter(pieces), deque[Piece](), deque[Piece]()
     coming: dict[Future[Any], Piece] = {}
     failures: Counter[Piece] = Counter()
 
     def following() -> Iterator[Piece]:
-        while len(coming) < most:
+        workers = getattr(executor, "num_workers", 0) or available_threads()
+        while len(coming) < (in_flight or 2 * workers):
             if again:
                 yield again.popleft()
             elif (new := next(source, None)) is not None:
@@ -170,7 +176,7 @@ def completed(
             for piece in following():
                 pickled = pickle.dumps(work_of(piece), -1)
                 try:
-                    future = executor.submit(do, versions, tuple(plugins), pickled)
+                    future = executor.submit(do, of_study, tuple(plugins), pickled)
                 except (BrokenExecutor, RuntimeError) as refusal:
                     raise AntsError(
                         f"the executor takes no more work ({type(refusal).__name__}: {refusal}); "
@@ -209,24 +215,6 @@ def _error_of(future: Future[Any]) -> Exception | None:
     if error is None or isinstance(error, Exception):
         return error
     return RuntimeError(f"{type(error).__name__}: {error}")  # a SystemExit, for example
-
-
-@contextmanager
-def chosen(settings: Namespace) -> Iterator[dict[str, Any]]:
-    """Yield the arguments of `Study.in_blocks` that the options of a command determine.
-
-    Worker processes end with the `with` block. Each has the threads of `--threads`, by default
-    those of this machine divided by the number of workers.
-    """
-    how: dict[str, Any] = {"threads": settings.threads, "arch": settings.arch}
-    how["shard"] = settings.shard or (1, 1)
-    if not settings.workers:
-        yield how
-        return
-    how["threads"] = settings.threads or max(1, available_threads() // settings.workers)
-    how["plugins"] = [read_plugin(settings.plugin)] if settings.plugin else []
-    with LocalWorkers(settings.workers) as workers:
-        yield {**how, "executor": workers}
 
 
 class LocalWorkers:

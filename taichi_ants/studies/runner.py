@@ -626,8 +626,10 @@ class Study(Generic[PointKind]):
         failed: dict[Piece, Exception] = {}
         succeeded = not missing.all()
 
+        left = weights[missing].sum()
+
         def show(more: float = 0.0) -> None:
-            progress(1.0 - (weights[missing].sum() - more) / total)
+            progress(1.0 - (left - more) / total)
 
         def here(pieces: Iterable[Piece]) -> Iterator[tuple[Piece, Outcome | Exception]]:
             for piece in pieces:
@@ -658,6 +660,7 @@ class Study(Generic[PointKind]):
                 names = self.names[piece.points[0]]
                 saved.add(keys, [names[s] for s in piece.seeds], outcome)
                 missing[np.ix_(*piece)], succeeded = False, True
+                left -= weights[np.ix_(*piece)].sum()
                 show()
                 yield Block(*piece, outcome)
             if failed and not succeeded:

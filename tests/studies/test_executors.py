@@ -206,7 +206,7 @@ def test_a_plugin_travels_as_text(tmp_path, monkeypatch):
     text = "from pathlib import Path\nPath(__file__).with_name('ran').touch()\n"
     plugin = ("plugin_that_travels.py", text)
     work = pickle.dumps(Work(RUNS.points[:1], (0,), None, None, {}))
-    do(executors._versions(), (plugin,), work)
+    do(executors.versions(), (plugin,), work)
     assert Path(executors._folder_of_plugins().name, "ran").exists()
     with pytest.raises(AntsError, match=r"another plugin 'plugin_that_travels\.py'"):
-        do(executors._versions(), ((plugin[0], text + "\n"),), work)
+        do(executors.versions(), ((plugin[0], text + "\n"),), work)
