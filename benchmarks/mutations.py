@@ -161,7 +161,7 @@ MUTATIONS = [
     ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
-    ("engines/colony/life.py", "tick >= taken + c.regrowth", "tick > taken + c.regrowth", COLONY),
+    ("engines/colony/life.py", "tick >= taken + waits", "tick > taken + waits", COLONY),
     ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
     ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),
     (
@@ -177,7 +177,7 @@ MUTATIONS = [
     ("engines/colony/learning.py", "c.initial_q, 0.0)", "0.0, 0.0)", COLONY),
     ("engines/colony/learning.py", "if number > c.sums_of", "if number < c.sums_of", SCHEDULES),
     ("engines/colony/steps.py", "moves & (not enters), ti", "moves & enters, ti", COLONY),
-    ("engines/colony/steps.py", "clock) > level_of", "clock) >= level_of", TRAFFIC),
+    ("engines/colony/steps.py", "tick) > level_of", "tick) >= level_of", TRAFFIC),
     ("engines/colony/steps.py", "c.carried[ant] = 1", "c.carried[ant] = 0", COLONY),
     (
         "engines/colony/interventions.py",
@@ -252,7 +252,7 @@ MUTATIONS = [
     ("studies/sweep.py", "values[number, :, n]", "values[0, :, n]", GROWING),
     ("files/results.py", "seeds <= wanted.get(point, nothing)", "True", GROWING),
     # Recorder and viewer.
-    ("viewer/recorder.py", "actions + 16 *", "actions + 8 *", RECORDING),
+    ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
     ("viewer/recorder.py", "headings + 8 * carrying", "headings + 8 * ~carrying", RECORDING),
     ("viewer/recorder.py", "*rates, *counts, clock)", "*rates, *counts, tick)", RECORDING),
     ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
