@@ -363,17 +363,26 @@ def tried(place: Path, file: Path, old: str, new: str, tests: str) -> str:
     text = file.read_text()
     if text.count(old) != 1:
         return "stale"
-    file.write_text(text.replace(old, new))
+    write(file, text.replace(old, new))
     try:
         return "noticed" if fails(place, tests) else "NOT NOTICED"
     finally:
-        file.write_text(text)
+        write(file, text)
+
+
+def write(file: Path, text: str) -> None:
+    """Write a module, and remove its bytecode.
+
+    Python compares bytecode by size and seconds, so it could reuse that of another mutation.
+    """
+    file.write_text(text)
+    for compiled in file.parent.glob(f"__pycache__/{file.stem}.*.pyc"):
+        compiled.unlink()
 
 
 def fails(place: Path, tests: str) -> bool:
     """Return whether tests fail in a copy of the project, or take too long."""
-    # Python compares byte code by size and seconds, so it could reuse that of another mutation.
-    environment = {**os.environ, "PYTHONPATH": str(place), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(place)}
     command = [sys.executable, "-m", "pytest", "-x", "-n0", "-p", "no:cacheprovider", tests]
     options = {"capture_output": True, "text": True, "timeout": TIMEOUT}
     try:

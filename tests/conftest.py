@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 
 # Test machines are shared and noisy: no time limits, and the same examples in each run.
-settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("repeatable")
 
 
