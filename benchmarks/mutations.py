@@ -197,7 +197,7 @@ MUTATIONS = [
     ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
-    ("engines/colony/life.py", "tick >= taken + c.regrowth", "tick > taken + c.regrowth", COLONY),
+    ("engines/colony/life.py", "tick >= taken + waits", "tick > taken + waits", COLONY),
     ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
     ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),
     (
@@ -298,7 +298,7 @@ MUTATIONS = [
     ("studies/sweep.py", "values[number, :, n]", "values[0, :, n]", GROWING),
     ("files/results.py", "seeds <= wanted.get(point, nothing)", "True", GROWING),
     # Recorder and viewer.
-    ("viewer/recorder.py", "actions + 16 *", "actions + 8 *", RECORDING),
+    ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
     ("viewer/recorder.py", "headings + 8 * carrying", "headings + 8 * ~carrying", RECORDING),
     ("viewer/recorder.py", "*rates, *counts, clock)", "*rates, *counts, tick)", RECORDING),
     ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
@@ -421,17 +421,26 @@ def tried(place: Path, file: Path, old: str, new: str, tests: str) -> str:
     text = file.read_text()
     if text.count(old) != 1:
         return "stale"
-    file.write_text(text.replace(old, new))
+    write(file, text.replace(old, new))
     try:
         return "noticed" if fails(place, tests) else "NOT NOTICED"
     finally:
-        file.write_text(text)
+        write(file, text)
+
+
+def write(file: Path, text: str) -> None:
+    """Write a module, and remove its bytecode.
+
+    Python compares bytecode by size and seconds, so it could reuse that of another mutation.
+    """
+    file.write_text(text)
+    for compiled in file.parent.glob(f"__pycache__/{file.stem}.*.pyc"):
+        compiled.unlink()
 
 
 def fails(place: Path, tests: str) -> bool:
     """Return whether tests fail in a copy of the project, or take too long."""
-    # Python compares byte code by size and seconds, so it could reuse that of another mutation.
-    environment = {**os.environ, "PYTHONPATH": str(place), "PYTHONDONTWRITEBYTECODE": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(place)}
     command = [sys.executable, "-m", "pytest", "-x", "-n0", "-p", "no:cacheprovider", tests]
     options = {"capture_output": True, "text": True, "timeout": TIMEOUT}
     try:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 # Test machines are shared and noisy: no time limits, and the same examples in each run.
-settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=50)
 settings.load_profile("repeatable")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Share compiled kernels among all test processes, and with later runs.
+    """Share compiled kernels and modules among all test processes, and with later runs.
 
     Kernels compile in a third of the time without Taichi's optimisations, with equal results. The
     slow tests, which also compare both engines with the reference, compile kernels as users do.
@@ -22,6 +23,9 @@ def pytest_configure(config: pytest.Config) -> None:
     if config.option.markexpr.startswith("not slow"):
         os.environ.setdefault("TI_CFG_OPTIMIZATION", "0")
         os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")
+    # Otherwise each of the many processes that tests start compiles the package once more.
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     folder = config.rootpath / ".pytest_cache" / "kernels"
     os.environ["XDG_CACHE_HOME"] = str(folder)
     os.environ["TI_OFFLINE_CACHE_MAX_SIZE_OF_FILES"] = str(2**30)

@@ -381,14 +381,10 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
         if Path(path).suffix in (".png", ".gif", ".mp4")
         and not path.startswith(("tests/", "docs/lessons/"))  # which others make
     }
-    of_benchmarks = ("growth.png", "peers.png")
-    of_guides = (  # examples of docs/measures.md, models.md, protocol.md and designs.md
-        *("measures", "home_trail", "two_nests", "division_of_labour", "double_bridge"),
-        *("recovery", "design", "sensitivity", "search"),
-    )
-    drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *of_benchmarks)
+    pages = [page.read_text("utf-8") for page in (ROOT / "docs").rglob("*.md")]
+    shown = [name for page in pages for name in re.findall(r"\]\(figures/([\w.]+)\)", page)]
+    drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *shown)
     figures = {f"docs/figures/{name}" for name in drawn}
-    figures |= {f"docs/figures/{name}.png" for name in of_guides}
     assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
 
 

@@ -330,8 +330,8 @@ def test_memory_does_not_grow_with_environments_that_are_closed():
             env.close()
         return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
-    first = loop(60)
-    assert loop(200) - first < 4000  # kibibytes
+    first = loop(30)
+    assert loop(100) - first < 2000  # kibibytes
 
 
 def test_worlds_with_several_nests_and_kinds_of_food():

@@ -78,7 +78,7 @@ def test_many_ants_equal_single_environments(mode, settings):
     assert_same(first[0], other[0])
     assert_same(first[1], other[1])
     masks, delivered = first[1]["action_mask"], 0
-    for step in range(300):
+    for step in range(200):
         actions = sensible(rng, masks)
         now, then = ours.step(actions), theirs.step(actions)
         for part in range(4):

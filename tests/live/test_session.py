@@ -80,7 +80,7 @@ def replayed(content: bytes) -> Session:
 
 @pytest.fixture(scope="module")
 def edited() -> dict[str, Session]:
-    return {name: with_edits(setup, 90) for name, setup in SETUPS.items()}
+    return {name: with_edits(setup, 60) for name, setup in SETUPS.items()}
 
 
 @pytest.mark.parametrize("name", SETUPS)

@@ -19,7 +19,7 @@ from taichi_ants.reference.numbers import power
 from taichi_ants.task import Choice, Field, Noise, Pheromone
 from taichi_ants.task.constants import LEFT, N_ACTIONS, RIGHT
 
-N, GRID = 40_000, AxialGrid((10, 10, 2))
+N, GRID = 6_000, AxialGrid((10, 10, 2))
 PLAIN = TrainingConfig("q_learning", 0.5, 0.9, 0.0, 1.0)
 GREEDY_VALUES = np.tile(np.float32([0.0, 3.0, 1.0, 2.0, -1.0]), (128, 1))
 
