@@ -28,8 +28,9 @@ def place(tmp_path, monkeypatch):
 
 
 def everything(folder):
-    """All paths below a folder, with what files hold."""
-    return {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")}
+    """All paths below a folder, with what files hold, except bytecode, which Python writes."""
+    paths = [path for path in folder.rglob("*") if "__pycache__" not in path.parts]
+    return {path: path.is_file() and path.read_bytes() for path in paths}
 
 
 def assert_refused(arguments, named, place, capsys):

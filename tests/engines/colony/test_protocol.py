@@ -171,7 +171,7 @@ def test_a_run_leaves_no_trace_of_its_protocol():
 
 def test_half_of_the_ants_are_removed_and_food_is_added_in_each_episode():
     colony = followers(range(3))
-    found = colony.run(2, 50, protocol=[At(20, remove_ants=0.5), At(30, remove_ants=1)])
+    found = colony.run(2, 50, protocol=[At(20, remove_ants=0.5), At(21, remove_ants=1)])
     assert (found.living == 9).all()
     cells = [[1, 2, 0], [1, 3, 0]]
     colony.run(1, 50, protocol=[At(10, place={"what": "food", "cells": cells})])
