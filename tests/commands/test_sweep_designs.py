@@ -73,7 +73,7 @@ def test_a_design_has_rows_of_drawn_values_indices_and_figures(sweep):
     folder = Path("results/sweep-my")
     assert set(contents(folder)) == {
         *("runs.csv", "summary.csv", "sensitivity.csv", "report.txt", "manifest.json"),
-        *("figures/blocked.png", "figures/sensitivity_blocked.png"),
+        *("figures/blocked.png", "figures/sensitivity_blocked.png", "inputs/my.toml"),
     }
     rows = files.read_csv(folder / "runs.csv")
     assert len(rows) == 4 * (3 + 2) * 2
@@ -109,7 +109,7 @@ def test_a_search_has_its_files_and_can_be_shown(sweep):
     folder = Path("results/sweep-my")
     assert set(contents(folder)) == {
         *("trials.csv", "held_out.csv", "best.toml", "optuna.journal", "report.txt"),
-        *("manifest.json", "figures/search.png"),
+        *("manifest.json", "figures/search.png", "inputs/my.toml"),
     }
     assert "12 trials of up to 6 seeds" in out
     before = contents(folder)
