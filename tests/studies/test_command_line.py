@@ -260,7 +260,8 @@ def test_commands_need_no_docstrings(tmp_path):
         "from taichi_ants.commands import COMMANDS\n"
         "for name in COMMANDS:\n"
         "    try:\n"
-        "        import_module('taichi_ants.commands.' + name.replace('-', '_')).parse_arguments(['--help'])\n"
+        "        module = import_module('taichi_ants.commands.' + name.replace('-', '_'))\n"
+        "        module.parse_arguments(['--help'])\n"
         "    except SystemExit:\n"
         "        pass\n"
     )
