@@ -20,7 +20,9 @@ def rows_of(name: str, seeds: int, folder, monkeypatch) -> list[dict[str, Any]]:
     """Run a script, and return the rows of its numbers."""
     arguments = [f"{name}.py", "--seeds", str(seeds), "--out", str(folder)]
     monkeypatch.setattr(sys, "argv", arguments)
-    runpy.run_path(str(MODELS / f"{name}.py"), run_name="__main__")
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(MODELS / f"{name}.py"), run_name="__main__")
+    assert ended.value.code == 0
     assert (folder / f"{name}.png").stat().st_size > 10_000
     return files.read_csv(folder / f"{name}.csv")
 

@@ -121,7 +121,7 @@ def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
             refused += 1
     expected = {"remove_ants", "add_ants", "ants", "clear", "move", "place", "trail", "task"}
     expected |= {"epsilon", "learning_rate" if kernel[1] != "frozen" else "policy"}
-    assert refused < 12
+    assert refused < (16 if several else 12)  # queens of two nests leave less room for changes
     assert expected <= done.keys(), done
 
 
