@@ -19,7 +19,7 @@ _ABOUT = "about"
 
 
 class _Held(NamedTuple):
-    """What a file has of a point: its row, the columns of seeds, and the names of arrays."""
+    """The content of a file for a point: its row, the columns of seeds, the names of arrays."""
 
     path: Path
     row: int

@@ -79,7 +79,7 @@ class Features(NamedTuple):
     reward: str = "by_event"
     deposits: tuple[str, ...] = ()  # the rules of each pheromone, if any is your own
     evaporations: tuple[str, ...] = ()
-    fields: tuple[str, ...] = ()  # the names of all pheromones, if a rule of your own reads them
+    fields: tuple[str, ...] = ()  # the names of all pheromones, if one of your rules reads them
 
 
 class Cues(NamedTuple):
