@@ -31,11 +31,9 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
         assert (mine["percept"], states[slot]) == (ant.percept, ant.state)
         assert int(mine["streams"]) == ant.stream.state
         assert mine["action"] == ant.action
-        if ant.idle:
-            assert mine["event"] == ant.event
+        assert mine["event"] == ant.event
         if ant.action >= 0:
             assert colony.executed[world, slot] == ant.executed
-            assert mine["event"] == ant.event
             assert rewards[slot] == ant.reward
         assert colony.nests[world, slot] == ant.nest
         assert colony.castes[world, slot] == ant.caste

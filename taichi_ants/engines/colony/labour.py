@@ -24,7 +24,6 @@ from taichi_ants.engines.colony.columns import nest_of, of_caste, put, trait
 from taichi_ants.engines.colony.layout import CasteRow, NestRow
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TRAIT
 from taichi_ants.task.caste import DISTRIBUTIONS
-from taichi_ants.task.events import Event
 from taichi_ants.task.rules.numbers import exponential, logarithm, power
 from taichi_ants.task.rules.random_bits import advance, bits_of, high_word, low_word, stream_of
 
@@ -60,7 +59,6 @@ def begin(c: ti.template(), v: ti.template(), w, ant):
                     drawn, waits = value * exponential(spread * z), False
     c.threshold[ant] = ti.cast(drawn, ti.f32)
     put(c.idle, ant, ti.cast(distribution != _NONE, ti.i32))
-    put(c.event, ant, Event.NONE)  # the slot can have one of an ant that died
 
 
 @ti.func

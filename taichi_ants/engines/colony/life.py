@@ -27,6 +27,7 @@ from taichi_ants.engines.colony.learning import forget
 from taichi_ants.engines.colony.steps import tally
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
 from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN
+from taichi_ants.task.events import Event
 from taichi_ants.task.rules.policy import bit_number
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below, high_word, stream_of
 
@@ -150,6 +151,7 @@ def place_newborn(c: ti.template(), v: ti.template(), w, nest, ant, cell, headin
     put(c.carries, ant, 0)
     put(c.stage, ant, Stage.NEWBORN)
     put(c.action, ant, -1)
+    put(c.event, ant, Event.NONE)  # the slot can have one of an ant that died
     if ti.static(v.slips):
         put(c.executed, ant, -1)
     c.age[ant] = 0

@@ -585,7 +585,7 @@ class ColonyState:
         ]
         cells = np.stack([cells for cells, _ in starts])
         ground = self._of_each(World.ground)
-        nests = np.stack([world.nests_of(n) for world in worlds])
+        nests = self._of_each(lambda world: world.nests_of(n))
         marks = (ANT_GROUND - (nests << 4)).astype(np.uint8)
         np.put_along_axis(ground, cells.astype(np.int64), marks, axis=1)
         levels = self._of_each(World.trail_levels)
@@ -596,7 +596,8 @@ class ColonyState:
             rows[row] = n
         rows[WorldRow.FIRST_DELIVERY] = -1
         of_nests = np.zeros((len(NestRow), len(worlds) * self.n_nests), np.int32)
-        of_nests[NestRow.QUEEN_CELL] = [one for w in worlds for one in self.grid.index(w.queens)]
+        queens = self._of_each(lambda world: world.grid.index(world.queens))
+        of_nests[NestRow.QUEEN_CELL] = queens.reshape(-1)
         foods = [food_sources.at_start(world) for world in worlds] if self.n_food_sources else []
         return {
             # The start cells and headings of ants, by world and number.
