@@ -142,7 +142,10 @@ def holds_data() -> bool:
         or runtime.global_vars  # fields that are declared but not placed
         or not root.empty
         or len(runtime.unfinalized_fields_builder) > 1  # one is the root
-        or any(issubclass(type(one), (ti.Ndarray, ti.Texture)) for one in gc.get_objects())
+        # Of half a million objects, there are a few thousand types.
+        or any(
+            issubclass(one, (ti.Ndarray, ti.Texture)) for one in set(map(type, gc.get_objects()))
+        )
     )
 
 

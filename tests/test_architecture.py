@@ -55,12 +55,17 @@ def tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-def imported(path: Path, types_too: bool = False) -> Iterator[str]:
+@cache
+def imported(path: Path, types_too: bool = False) -> tuple[str, ...]:
     """The full names of what a file imports; without what only type checkers see.
 
     What it gives to `import_module` counts: a string names a module, and an f-string all modules of
     the package in front of the first braces.
     """
+    return tuple(_imported(path, types_too))
+
+
+def _imported(path: Path, types_too: bool) -> Iterator[str]:
     for node in _running(tree(path), types_too):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -49,6 +49,8 @@ from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
+NO_CASTE = Caste()  # that of all ants if there are no castes
+
 
 @dataclass
 class EpisodeRecord:
@@ -160,7 +162,7 @@ class ReferenceColony:
 
     def caste_of(self, ant: Ant) -> Caste:
         """Return the caste of an ant, one without settings if there are no castes."""
-        return self.castes[ant.caste] if self.castes else Caste()
+        return self.castes[ant.caste] if self.castes else NO_CASTE
 
     def take_castes(self) -> None:
         """Take the numbers of castes from the task."""
@@ -173,7 +175,7 @@ class ReferenceColony:
         task = self.task
         return [
             (one.outbound_cue or task.outbound_cue, one.homing_cue or task.homing_cue)
-            for one in self.castes or [Caste()]
+            for one in self.castes or [NO_CASTE]
         ]
 
     def _set_up(self) -> None:
@@ -361,7 +363,8 @@ class ReferenceColony:
         """Return the rule of choice with the numbers of the ant's caste."""
         caste = self.caste_of(ant)
         own = {name: getattr(caste, name) for name in ("temperature", "k", "exponent")}
-        return replace(self.task.choice, **{k: one for k, one in own.items() if one is not None})
+        own = {name: number for name, number in own.items() if number is not None}
+        return replace(self.task.choice, **own) if own else self.task.choice
 
     def _epsilon_of(self, ant: Ant) -> float:
         own = self.caste_of(ant).epsilon

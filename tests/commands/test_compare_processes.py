@@ -74,6 +74,7 @@ def test_an_interruption_before_the_first_block_leaves_nothing(kernels, tmp_path
         assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_finished_blocks_are_kept_and_a_damaged_one_is_done_again(kernels, tmp_path):
     folder, arguments = tmp_path / "out", [*MANY, "--out", "out"]
     process = start("compare", arguments, kernels, tmp_path)
@@ -97,6 +98,7 @@ def test_finished_blocks_are_kept_and_a_damaged_one_is_done_again(kernels, tmp_p
     assert kept.items() < blocks_in(folder).items()  # none of the others was done again
 
 
+@pytest.mark.slow
 def test_an_interruption_of_the_pictures_keeps_the_runs(kernels, tmp_path):
     """Ctrl-C on a terminal."""
     arguments = [*PICTURED, "--out", "out"]
@@ -203,6 +205,7 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
     assert "(default:results/compare,with--quickresults/compare-quick)" in told
 
 
+@pytest.mark.slow
 def test_only_the_beginning_is_read(kernels, tmp_path):
     """`| head -1`, and an output that is full."""
     arguments = [*TINY, "--out", "out"]

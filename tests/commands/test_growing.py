@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import shutil
 import signal
 import time
@@ -11,7 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_lines import assert_one_sentence, call, contents, promptly, start
+from command_lines import (
+    assert_one_sentence,
+    assert_same_results,
+    call,
+    contents,
+    promptly,
+    start,
+)
 
 from taichi_ants.files import archives
 from taichi_ants.studies import runner
@@ -72,8 +78,6 @@ FEWER = {
     "colony": COLONY.replace("seeds = 4", "seeds = 2").replace("[1, 0]", "[0]"),
     "drawn": DRAWN.replace("samples = 8", "samples = 4"),
 }
-# What depends on when, where and how a command ran.
-OF_THE_RUN = ("command", "finished", "seconds", "checksum")
 
 
 @pytest.fixture
@@ -87,17 +91,6 @@ def sweep(tmp_path, capsys, monkeypatch):
         return call("sweep", ["my.toml", "--out", out, "--no-figures", *more], capsys)
 
     return called
-
-
-def assert_same(one, other):
-    """Assert that two folders of results have the same bytes, but for what tells of the run."""
-    first, second = contents(Path(one)), contents(Path(other))
-    manifests = [json.loads(files.pop("manifest.json")) for files in (first, second)]
-    for manifest in manifests:
-        for name in OF_THE_RUN:
-            del manifest[name]
-    assert manifests[0] == manifests[1]
-    assert first == second
 
 
 @pytest.mark.parametrize("kind", SWEEPS)
@@ -114,7 +107,7 @@ def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypa
     monkeypatch.setattr(owner, "do", staticmethod(do))
     assert sweep(SWEEPS[kind], "grown")[::2] == (0, "")
     assert len(done) == len(set(done)) == {"runs": 24 - 8, "colony": 8 - 2, "drawn": 32 - 16}[kind]
-    assert_same("plain", "grown")
+    assert_same_results("plain", "grown")
 
 
 def test_unfinished_work_grows_too(sweep, monkeypatch):
@@ -131,7 +124,7 @@ def test_unfinished_work_grows_too(sweep, monkeypatch):
     assert sweep(fewer, "grown")[0] == 130
     monkeypatch.setattr(runner.RunPoint, "do", staticmethod(real))
     assert sweep(RUNS, "grown")[0] == 0
-    assert_same("plain", "grown")
+    assert_same_results("plain", "grown")
 
 
 @pytest.mark.parametrize(
@@ -181,7 +174,7 @@ def test_three_shards_merge_to_the_bytes_of_one_run(kind, sweep, capsys):
     shutil.copytree("s1", "once more")  # overlaps that are the same are allowed
     status, _, err = call("merge", ["s3", "s1", "once more", "s2", "--out", "merged"], capsys)
     assert (status, err) == (0, "")
-    assert_same("plain", "merged")
+    assert_same_results("plain", "merged")
 
 
 def test_shards_in_one_folder_need_no_merge(sweep):
@@ -189,7 +182,7 @@ def test_shards_in_one_folder_need_no_merge(sweep):
     for n in (2, 1):
         assert sweep(RUNS, "all", "--shard", f"{n}/2")[0] == 0
     assert sweep(RUNS, "all")[0] == 0
-    assert_same("plain", "all")
+    assert_same_results("plain", "all")
 
 
 def test_shards_that_do_not_fit_are_refused(sweep, capsys):

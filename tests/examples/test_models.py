@@ -68,6 +68,7 @@ def test_colonies_on_a_double_bridge_choose_the_short_branch_and_keep_a_long_one
     assert (tmp_path / "double_bridge.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_ants_that_misread_cells(kernels: Path, tmp_path: Path) -> None:
     small = ["--seeds", 2, "--episodes", 6, "--ticks", 300, "--out", tmp_path]
     done = run("models/misreading", small, kernels, tmp_path)
@@ -81,6 +82,7 @@ def test_ants_that_misread_cells(kernels: Path, tmp_path: Path) -> None:
     assert (tmp_path / "misreading.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
     done = run("models/no_entry", ["--seeds", 2, "--out", tmp_path], kernels, tmp_path)
     assert done.returncode == 0, done.stderr

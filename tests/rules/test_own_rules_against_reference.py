@@ -34,8 +34,13 @@ MODELS = {
         {"sharing": "independent", "learner": "n_step_sarsa", "fields": "a", "changes": True},
     ),
 }
-QUICK = ("weber", "restless")
-MARKED = [one if one in QUICK else pytest.param(one, marks=pytest.mark.slow) for one in MODELS]
+MARKED = [
+    pytest.param(
+        name,
+        marks=[pytest.mark.slow] * (name != "weber") + [pytest.mark.optimised] * (name == "shaped"),
+    )
+    for name in MODELS
+]
 
 
 @pytest.mark.parametrize("model", MARKED)

@@ -104,6 +104,7 @@ def _die_or_do(marker, arguments):
     return do(*arguments)
 
 
+@pytest.mark.slow
 def test_a_killed_worker_process_costs_its_blocks_only(tmp_path, monkeypatch):
     plain = COLONIES.run(folder(tmp_path / "plain"))
     monkeypatch.setattr(ColonyPoint, "runs_of_a_block", 2)

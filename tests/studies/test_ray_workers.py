@@ -13,7 +13,15 @@ import time
 from pathlib import Path
 
 import pytest
-from command_lines import assert_one_sentence, call, contents, environment, promptly, run, start
+from command_lines import (
+    assert_one_sentence,
+    assert_same_results,
+    call,
+    environment,
+    promptly,
+    run,
+    start,
+)
 
 from taichi_ants import AntsError
 from taichi_ants.studies import executors
@@ -35,8 +43,6 @@ epsilon_decay = 0.99
 training.learning_rate = [0.01, 0.1, 0.2]
 task.rewards.shaping = [1, 0]
 """
-# What depends on when, where and how a command ran.
-OF_THE_RUN = ("command", "finished", "seconds", "checksum")
 
 
 @pytest.fixture
@@ -123,22 +129,6 @@ def plain(tmp_path_factory, kernels):
     return folder / "a"
 
 
-def same(one: Path, other: Path) -> bool:
-    """Assert that two folders contain the same bytes, except for what belongs to the run."""
-    ours, theirs = contents(one), contents(other)
-    assert ours.keys() == theirs.keys()
-    for name in ours:
-        lines = [
-            [line for line in text.splitlines() if line.split(b'"')[1:2] not in IGNORED]
-            for text in (ours[name], theirs[name])
-        ]
-        assert lines[0] == lines[1], name
-    return True
-
-
-IGNORED = [[name.encode()] for name in OF_THE_RUN]
-
-
 def tree(pid: int) -> dict[int, str]:
     """Return the command lines of all descendants of a process, by process."""
     rows = []
@@ -175,7 +165,7 @@ def test_a_killed_worker_costs_its_blocks_only(plain, kernels, tmp_path):
     out, err = process.communicate(timeout=500)
     assert (process.returncode, err) == (0, "")
     assert "all results are in a/" in out
-    assert same(plain, tmp_path / "a")
+    assert_same_results(plain, tmp_path / "a", also=["packages"])
 
 
 @pytest.mark.slow
@@ -195,7 +185,7 @@ def test_ctrl_c_ends_ray_and_the_work_resumes(plain, kernels, tmp_path):
         assert time.monotonic() - began < 2 * promptly()
         time.sleep(0.05)
     assert run("sweep", arguments, kernels, tmp_path).returncode == 0
-    assert same(plain, tmp_path / "a")
+    assert_same_results(plain, tmp_path / "a", also=["packages"])
 
 
 CLUSTER = """
@@ -212,9 +202,12 @@ cluster.shutdown()
 """
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def cluster(kernels):
-    """A Ray cluster of nine machines, simulated on this one; writing a line kills one of them."""
+    """A Ray cluster of nine machines, simulated on this one; writing a line kills one of them.
+
+    Its `address` is that of Ray.
+    """
     pytest.importorskip("ray")
     process = subprocess.Popen(
         [sys.executable, "-c", CLUSTER],
@@ -225,15 +218,26 @@ def cluster(kernels):
         text=True,
     )
     with process:
+        process.address = process.stdout.readline().strip()
         yield process
         process.stdin.close()
 
 
 @pytest.mark.slow
+def test_machines_with_other_versions_or_few_processors_are_refused(cluster, monkeypatch):
+    with pytest.raises(AntsError, match=r"no machine of the Ray cluster has 64 CPUs for a worker"):
+        RayWorkers(cluster.address, threads=64).__enter__()
+    monkeypatch.setattr(executors, "versions", lambda: ("0.0.1", "3.8"))
+    with pytest.raises(
+        AntsError, match=r"runs with taichi_ants 0\.0\.1 and Python 3\.8, but '.*', a m"
+    ):
+        RayWorkers(cluster.address).__enter__()
+
+
+@pytest.mark.slow
 def test_two_of_eight_machines_die(plain, kernels, cluster, tmp_path):
-    address = cluster.stdout.readline().strip()
     (tmp_path / "my.toml").write_text(SWEEP)
-    arguments = ["my.toml", "--out", "a", "--no-figures", "--ray", address]
+    arguments = ["my.toml", "--out", "a", "--no-figures", "--ray", cluster.address]
     process = start("sweep", arguments, kernels, tmp_path)
     wait_for_blocks(process, tmp_path)
     for _ in range(2):
@@ -243,16 +247,4 @@ def test_two_of_eight_machines_die(plain, kernels, cluster, tmp_path):
     assert len(blocks_in(tmp_path)) < 8
     _, err = process.communicate(timeout=500)
     assert (process.returncode, err) == (0, "")
-    assert same(plain, tmp_path / "a")
-
-
-@pytest.mark.slow
-def test_machines_with_other_versions_or_few_processors_are_refused(cluster, monkeypatch):
-    address = cluster.stdout.readline().strip()
-    with pytest.raises(AntsError, match=r"no machine of the Ray cluster has 64 CPUs for a worker"):
-        RayWorkers(address, threads=64).__enter__()
-    monkeypatch.setattr(executors, "versions", lambda: ("0.0.1", "3.8"))
-    with pytest.raises(
-        AntsError, match=r"runs with taichi_ants 0\.0\.1 and Python 3\.8, but '.*', a m"
-    ):
-        RayWorkers(address).__enter__()
+    assert_same_results(plain, tmp_path / "a", also=["packages"])

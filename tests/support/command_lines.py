@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import os
 import runpy
 import subprocess
@@ -111,6 +112,24 @@ def contents(folder: Path) -> dict[str, bytes]:
         for path in sorted(folder.rglob("*"))
         if path.is_file()
     }
+
+
+# The keys of a manifest that depend on when, where and how a command ran.
+OF_THE_RUN = ("command", "finished", "seconds", "checksum")
+
+
+def assert_same_results(one: Path | str, other: Path | str, also: Sequence[str] = ()) -> None:
+    """Assert that two folders of results have the same bytes, except for facts about the run.
+
+    Ignores the manifests' keys `OF_THE_RUN` and those in `also`.
+    """
+    first, second = contents(Path(one)), contents(Path(other))
+    manifests = [json.loads(files.pop("manifest.json")) for files in (first, second)]
+    for manifest in manifests:
+        for name in (*OF_THE_RUN, *also):
+            del manifest[name]
+    assert manifests[0] == manifests[1]
+    assert first == second
 
 
 def assert_one_sentence(stderr: str) -> None:

@@ -136,7 +136,14 @@ def without_rocks(world: World) -> World:
 # The others come later: what they add, the tests of independent runs and of pages have as well.
 QUICK = (0, 1, 7, 10, 11, 13, 14)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
-MARKED = [pytest.param(one, marks=pytest.mark.slow) if one in SLOW else one for one in KERNELS]
+OPTIMISED = ("dyna_q", "independent", "ants_seen", False)
+MARKED = [
+    pytest.param(
+        one,
+        marks=[pytest.mark.slow] * (one in SLOW) + [pytest.mark.optimised] * (one == OPTIMISED),
+    )
+    for one in KERNELS
+]
 
 
 @pytest.mark.parametrize("kernel", MARKED, ids=str)
