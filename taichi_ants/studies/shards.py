@@ -58,8 +58,8 @@ def join(folders: Sequence[Path], out: Path) -> dict[str, Any]:
 
 def _manifest_of(folder: Path) -> dict[str, Any]:
     if not (folder / UNFINISHED / MANIFEST).exists():
-        what = "has finished results" if (folder / MANIFEST).exists() else "is not a folder of work"
-        raise AntsError(f"{str(folder)!r} {what}, not a shard; name folders made with --shard.")
+        what = "finished results" if (folder / MANIFEST).exists() else "no unfinished work"
+        raise AntsError(f"{str(folder)!r} has {what}, not a shard; name folders made with --shard.")
     manifest = read_manifest(folder / UNFINISHED)
     if not manifest.get("runs") or not manifest.get("command"):
         raise AntsError(

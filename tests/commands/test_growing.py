@@ -201,7 +201,7 @@ def test_shards_that_do_not_fit_are_refused(sweep, capsys):
     assert "8 of 24 runs are missing in these folders; give shard 3 of 3 too" in refused("s1", "s2")
     assert "not shards of the same work (seeds differ)" in refused("s1", "s2", "other")
     assert "'finished' has finished results, not a shard" in refused("s1", "finished")
-    assert "'nothing' is not a folder of work" in refused("s1", "nothing")
+    assert "'nothing' has no unfinished work, not a shard" in refused("s1", "nothing")
     assert sweep(RUNS, "s3", "--shard", "3/3")[0] == 0
     shutil.copytree("s1", "wrong")
     for path in Path("wrong/unfinished/blocks").iterdir():

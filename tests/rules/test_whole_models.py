@@ -167,10 +167,10 @@ def steps_compared(drawn: RandomColony, protocol: list[Event], seed: int, seen: 
 @pytest.mark.parametrize(
     ("name", "ant_steps"),
     [
-        *(pytest.param(name, 4_000, marks=pytest.mark.slow) for name in MODELS),
-        # Two million in all: half an hour.
+        *(pytest.param(name, 10_000, marks=pytest.mark.slow) for name in MODELS),
+        # Two million in all, in ten minutes.
         *(pytest.param(name, 340_000, marks=pytest.mark.long) for name in MODELS),
-        pytest.param("softmax", 4_001, marks=pytest.mark.optimised),
+        pytest.param("softmax", 4_000, marks=pytest.mark.optimised),
     ],
 )
 def test_every_tick_of_whole_models(name, ant_steps):
