@@ -223,6 +223,7 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
         "fast_math": False,  # so that results are the same bits everywhere
         "cpu_max_num_threads": wanted.threads,
         "make_cpu_multithreading_loop": False,  # distribute runs one by one, as they are uneven
+        "cfg_optimization": False,  # takes half of the time to compile, and LLVM does it as well
         "offline_cache_file_path": str(cache_folder()),
         **others,
     }

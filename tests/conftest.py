@@ -22,7 +22,6 @@ def pytest_configure(config: pytest.Config) -> None:
     reference once more.
     """
     if config.option.markexpr != "optimised":
-        os.environ.setdefault("TI_CFG_OPTIMIZATION", "0")
         os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")
     # Otherwise each of the many processes that tests start compiles the package once more.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

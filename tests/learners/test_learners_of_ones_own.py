@@ -39,12 +39,6 @@ def _no_learner_stays(monkeypatch):
     monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
 
 
-@pytest.fixture(autouse=True)
-def _plugins_are_those_of_users(monkeypatch):
-    """How the compiler takes what is wrong depends on its passes."""
-    monkeypatch.delenv("TI_CFG_OPTIMIZATION", raising=False)
-
-
 def config(name="mine"):
     return TrainingConfig(name, 0.1, 0.9, 0.3, 0.97)
 
