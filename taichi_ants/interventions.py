@@ -142,7 +142,7 @@ class OfCells(Intervention):
 class OfAnts(OfCells):
     """An intervention on a number of ants, a share of the living ants, or the ants on cells."""
 
-    form = "a number of ants, a share below 1, a list of cells, or a table of settings"
+    form = "a number of ants, a share such as 0.5, a list of cells, or a table of settings"
     number: int | None
     share: float | None
     cells: Sequence | None

@@ -102,14 +102,23 @@ def measure_of(kind: str, name: str) -> Measure:
     known = MEASURES[kind]
     if name in known:
         return known[name]
-    registered = set(measures.names()) - {"occupancy"} if kind == "colony" else set()
-    if not isinstance(name, str) or name.partition(".")[0] not in registered:
-        names = ", ".join([*known, *sorted(registered - known.keys())])
-        more = ", or the name of a measure of a plugin (--plugin FILE)" if registered else ""
-        raise AntsError(f"measures is {shown(name)}; it must be one of {names}{more}.")
+    if not isinstance(name, str) or name.partition(".")[0] not in _registered(kind):
+        raise AntsError(f"measures is {shown(name)}; it must be one of {_names_of(kind)}.")
     one = measures.get(name)
     words = one.summary or name.replace("_", " ")
     return Measure(f"{words} ({one.unit})" if one.unit else words)
+
+
+def _registered(kind: str) -> set[str]:
+    """Return the names of registered measures that sweeps of this kind can have."""
+    return set(measures.names()) - {"occupancy"} if kind == "colony" else set()
+
+
+def _names_of(kind: str) -> str:
+    """Return the names of all measures of this kind, for a message."""
+    registered = _registered(kind)
+    names = ", ".join([*MEASURES[kind], *sorted(registered - MEASURES[kind].keys())])
+    return names + (", or the name of a measure of a plugin (--plugin FILE)" if registered else "")
 
 
 @dataclass(frozen=True)
@@ -382,9 +391,8 @@ class Base(NamedTuple):
         check_one_of("kind", kind, tuple(KINDS))
         wanted = _listed(file.get("measures", []))
         if not wanted:
-            raise AntsError(
-                f"measures is missing; name one or more of {', '.join(MEASURES[kind])}."
-            )
+            what = "empty" if "measures" in file else "missing"
+            raise AntsError(f"measures is {what}; name one or more of {_names_of(kind)}.")
         for name in wanted:
             measure_of(kind, name)
         _check_once("measures", wanted)
