@@ -167,7 +167,7 @@ def steps_compared(drawn: RandomColony, protocol: list[Event], seed: int, seen: 
 @pytest.mark.parametrize(
     ("name", "ant_steps"),
     [
-        *(pytest.param(name, 10_000, marks=pytest.mark.slow) for name in MODELS),
+        *(pytest.param(name, 4_000, marks=pytest.mark.slow) for name in MODELS),
         # Two million in all, in ten minutes.
         *(pytest.param(name, 340_000, marks=pytest.mark.long) for name in MODELS),
         pytest.param("softmax", 4_000, marks=pytest.mark.optimised),

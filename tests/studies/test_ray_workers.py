@@ -117,7 +117,7 @@ def test_ray_is_an_extra(monkeypatch, sweep):
     assert 'Ray is not installed; run pip install "taichi_ants[ray]"' in err
 
 
-# The slow tests, which start Ray.
+# The slow tests, which start Ray, and the long ones, which start a cluster.
 
 
 @pytest.fixture(scope="module")
@@ -223,7 +223,7 @@ def cluster(kernels):
         process.stdin.close()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_machines_with_other_versions_or_few_processors_are_refused(cluster, monkeypatch):
     with pytest.raises(AntsError, match=r"no machine of the Ray cluster has 64 CPUs for a worker"):
         RayWorkers(cluster.address, threads=64).__enter__()
@@ -234,7 +234,7 @@ def test_machines_with_other_versions_or_few_processors_are_refused(cluster, mon
         RayWorkers(cluster.address).__enter__()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_of_eight_machines_die(plain, kernels, cluster, tmp_path):
     (tmp_path / "my.toml").write_text(SWEEP)
     arguments = ["my.toml", "--out", "a", "--no-figures", "--ray", cluster.address]
