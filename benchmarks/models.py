@@ -25,7 +25,7 @@ from taichi_ants.task.constants import EMPTY
 NESTS = "two nests"
 FEATURES: dict[str, dict[str, Any]] = {
     "two pheromones": {
-        "fields": {"from_nest": {"laid": "without_food", "half_life": None}},
+        "fields": {"from_nest": {"laid": "without_food"}},
         "homing_cue": "from_nest",
     },
     NESTS: {},

@@ -142,7 +142,7 @@ def holds_data() -> bool:
         or runtime.global_vars  # fields that are declared but not placed
         or not root.empty
         or len(runtime.unfinalized_fields_builder) > 1  # one is the root
-        # Of half a million objects, there are a few thousand types.
+        # There are half a million objects, but only a few thousand types.
         or any(
             issubclass(one, (ti.Ndarray, ti.Texture)) for one in set(map(type, gc.get_objects()))
         )

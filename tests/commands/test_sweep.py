@@ -165,6 +165,11 @@ WRONG = {
     "no kind": ('kind = "runs"', "", ["kind is missing", "runs, colony"]),
     "measure": ('"return_last50"', '"return_last"', ["'return_last'", "return_last50"]),
     "no measure": (RUNS[RUNS.index("measures") : RUNS.index("seeds")], "", ["measures is missing"]),
+    "empty measures": (
+        RUNS[RUNS.index("measures") : RUNS.index("seeds")],
+        "measures = []\n",
+        ["measures is empty", "return_last50"],
+    ),
     "unknown": (
         "shaping =",
         "shapings =",
