@@ -22,7 +22,7 @@ if TYPE_CHECKING:
         testing,
         worlds,
     )
-    from taichi_ants.analysis.results import compare
+    from taichi_ants.analysis.results import compare, plot
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _NAMES_IN = {
-    "analysis.results": ("compare",),
+    "analysis.results": ("compare", "plot"),
     "engines.colony.colony": ("Colony", "ColonyEpisodes"),
     "engines.colony.interventions": ("Interventions",),
     "engines.runs.results": ("Rollouts", "TrainingResult"),
@@ -105,6 +105,7 @@ __all__ = [
     "load_policy",
     "measures",
     "offline",
+    "plot",
     "record",
     "record_colony",
     "reference",

@@ -207,7 +207,8 @@ class Setting(NamedTuple):
         )
 
     def _refuse(self, value: Any, allowed: str) -> None:
-        or_none = ", or None" if self.optional and self.rule.only is None else ""
+        has_none = self.optional and self.rule.only is None and not self.is_group
+        or_none = ", or None" if has_none else ""
         raise AntsError(f"`{self.path}` is {shown(value)}; it must be {allowed}{or_none}.")
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_ants import rules, runtime, worlds
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.errors import checked_whole
+from taichi_ants.errors import checked_whole, listing
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import ReferenceColony
@@ -29,16 +29,19 @@ class RuleCheck(NamedTuple):
         inputs: The number of drawn inputs that were compared.
         ticks: The number of ticks of drawn colonies that were compared.
         difference: The first difference, or an empty string.
+        fields: The names of the fields that the rule reads, which models that use it must have.
     """
 
     rule: str
     inputs: int
     ticks: int
     difference: str
+    fields: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         compared = f"{self.inputs} drawn inputs and {self.ticks} ticks of {SEEDS} colonies"
-        return f"{self.rule}: {compared}: {self.difference or 'equal'}"
+        reads = f" (reads the {listing(self.fields, 'field')})" if self.fields else ""
+        return f"{self.rule}{reads}: {compared}: {self.difference or 'equal'}"
 
 
 def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
@@ -62,17 +65,17 @@ def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
     runtime.start()
     found = difference(rule, inputs)
     if found:
-        return RuleCheck(name, inputs, 0, found)
+        return RuleCheck(name, inputs, 0, found, rule.fields)
     ticks = 0
     try:
         for seed in range(SEEDS):
             for found in _differences(rule, seed):
                 if found:
-                    return RuleCheck(name, inputs, ticks, found)
+                    return RuleCheck(name, inputs, ticks, found, rule.fields)
                 ticks += 1
     except (ArithmeticError, ValueError, IndexError) as error:
-        return RuleCheck(name, inputs, ticks, f"seed {seed} fails: {error}")
-    return RuleCheck(name, inputs, ticks, "")
+        return RuleCheck(name, inputs, ticks, f"seed {seed} fails: {error}", rule.fields)
+    return RuleCheck(name, inputs, ticks, "", rule.fields)
 
 
 def _task(rule: Rule, seed: int) -> Task:

@@ -225,7 +225,10 @@ def test_cues_are_fields_of_the_task():
     task = Task(fields=home, homing_cue="home")
     assert task == Task().but(fields=home, homing_cue="home") == Task.from_dict(task.as_dict())
     assert task.fields["home"] == Field(laid="without_food")
-    end = "or the name of a field that you add to `task.fields`."
+    end = (
+        "or the name of a field that you add to `task.fields` (for no cue, one with laid = "
+        "'never')."
+    )
     for wrong, cues in (("hoem", "compass, trail, home"), ("", "compass, trail, home")):
         says = f"`task.homing_cue` is {wrong!r}; it must be one of {cues}, {end}"
         assert refused(lambda wrong=wrong: task.but(homing_cue=wrong)) == says

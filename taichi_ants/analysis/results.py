@@ -6,8 +6,9 @@ see `statistics`.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -167,12 +168,35 @@ def summary(result: Tidy, last: int | None = None) -> Summary:
     return Summary(tuple(rows))
 
 
-def plot(result: Tidy, measures: Sequence[str], path: str | Path | None = None) -> Figure:
-    """Return a figure of means over seeds with intervals; see `Tidy.plot`."""
+def plot(
+    results: Tidy | Mapping[str, Tidy], *measures: str, path: str | Path | None = None
+) -> Figure:
+    """Return a figure of means over seeds with 95 % intervals, a panel for each measure.
+
+    The horizontal axis is the tick if episodes have several rows, which are then averaged over
+    episodes; otherwise it is the episode.
+
+    Args:
+        results: A result of `Colony.run`, `train` or `evaluate`, or several by name, with the same
+            seeds and measures, to draw into the same panels.
+        measures: Names of measures; none for the usual ones.
+        path: A PNG file, to which the figure is written as well.
+
+    Raises:
+        AntsError: A result does not have a measure, the seeds differ, or the file cannot be
+            written.
+    """
     if path is not None:
         expect("path", path, str, Path)
         check_one_of("the suffix of path", Path(path).suffix, (".png",))
-    table = result.measured()
+    named = results if isinstance(results, Mapping) else {"": results}
+    for name, result in named.items():
+        if not isinstance(result, Tidy):
+            raise AntsError(
+                f"a result{f' ({name})' if name else ''} is {shown(result)}; give results of "
+                "Colony.run, train or evaluate."
+            )
+    table = _together({name: result.measured() for name, result in named.items()})
     names = [part for name in measures for part in parts_of(table, name)] or list(table.usual)
     if not names:
         raise AntsError(_NO_NUMBERS)
@@ -206,6 +230,39 @@ def plot(result: Tidy, measures: Sequence[str], path: str | Path | None = None) 
     if path is not None:
         style.save(figure, Path(path))
     return figure
+
+
+def _together(tables: Mapping[str, Measured]) -> Measured:
+    """Return named tables as one, whose configurations are those of all tables."""
+    if not tables:
+        raise AntsError("there are no results; give at least one.")
+    first = next(iter(tables.values()))
+    if len(tables) == 1:
+        return first
+    for name, table in tables.items():
+        if table.seeds != first.seeds:
+            raise AntsError(
+                f"the seeds of {name!r} are {shown(table.seeds)}, those of {next(iter(tables))!r} "
+                f"are {shown(first.seeds)}; draw results with the same seeds in the same order."
+            )
+    every = tables.values()
+    common = [name for name in first.values if all(name in table.values for table in every)]
+    groups = [f"{name} {group}".strip() for name, one in tables.items() for group in one.groups]
+    ends = list(itertools.accumulate(len(table.groups) for table in every))
+    of_group = [t.of_group + end - len(t.groups) for t, end in zip(every, ends, strict=True)]
+    return Measured(
+        index={
+            name: np.concatenate([table.index[name] for table in every])
+            for name in ("seed", _EPISODES, _TICKS)
+        },
+        values={name: np.concatenate([t.values[name] for t in every]) for name in common},
+        of_seed=np.concatenate([table.of_seed for table in every]),
+        of_group=np.concatenate(of_group),
+        seeds=first.seeds,
+        groups=tuple(groups),
+        usual=tuple(name for name in first.usual if name in common),
+        units=first.units,
+    )
 
 
 def of_seeds(table: Measured, measure: str, last: int | None = None) -> np.ndarray:

@@ -108,19 +108,8 @@ class Tidy:
         return _presentation().summary(self, last)
 
     def plot(self, *measures: str, path: str | Path | None = None) -> Figure:
-        """Return a figure of means over seeds with 95 % intervals, a panel for each measure.
-
-        The horizontal axis is the tick if episodes have several rows, which are then averaged over
-        episodes; otherwise it is the episode.
-
-        Args:
-            measures: Names of measures; none for the usual ones.
-            path: A PNG file, to which the figure is written as well.
-
-        Raises:
-            AntsError: The result does not have a measure, or the file cannot be written.
-        """
-        return _presentation().plot(self, measures, path)
+        """Return a figure of means over seeds with 95 % intervals; see `taichi_ants.plot`."""
+        return _presentation().plot(self, *measures, path=path)
 
 
 def seed_array(seeds: Any) -> np.ndarray:

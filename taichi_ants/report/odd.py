@@ -127,7 +127,7 @@ class Model:
     @property
     def learns(self) -> bool:
         """Whether ants learn in this study."""
-        return not self.of_colony or self.has("episodes")
+        return self.has("episodes")
 
     def world_settings(self) -> dict[str, list[Any]]:
         """Return the values of the settings of worlds, by their names without "world."."""
@@ -168,12 +168,12 @@ def described(model: Model, command: str) -> str:
 
 
 def _purpose(model: Model) -> Iterator[str]:
-    who, verb = ("colonies of ants", "learn") if model.of_colony else ("one ant", "learns")
-    how = f"{verb} by reinforcement to forage" if model.learns else "forage by a fixed rule"
+    who, end = ("colonies of ants", "") if model.of_colony else ("one ant", "s")
+    how = "learn{} by reinforcement to forage" if model.learns else "forage{} by a fixed rule"
     varied = _varied(model)
     yield (
-        f"The model describes how {who} on a hexagonal grid {how}, with pheromone trails. Its "
-        f"purpose in this study is to measure how {_words(varied) or 'the settings below'} "
+        f"The model describes how {who} on a hexagonal grid {how.format(end)}, with pheromone "
+        f"trails. Its purpose in this study is to measure how {_words(varied) or 'the settings below'} "
         f"{'affects' if len(varied) == 1 else 'affect'} the measures listed here. Each combination "
         f"of settings runs with {count(len(model.seeds), 'seed')}."
     )

@@ -60,15 +60,17 @@ Progress = Callable[[float], None]
 
 @dataclass(frozen=True)
 class RunPoint:
-    """A lone ant that is trained and then follows its final policy greedily.
+    """A lone ant that is trained and then follows its final policy, or another one, greedily.
 
     Outcome: `returns`, `steps` and `deliveries` of training, integer (seeds, episodes);
     `greedy_returns`, `greedy_steps` and `greedy_deliveries` of the rollouts, integer (seeds,
-    rollouts); `q_values`, float32 (seeds, n_states, 5); `seconds` of CPU time for training, float64
-    (seeds,).
+    rollouts). With training also `q_values`, float32 (seeds, n_states, 5), and `seconds` of CPU
+    time for it, float64 (seeds,).
 
     Attributes:
+        episodes: The number of training episodes; 0 with a policy.
         max_steps: The step limit of episodes and rollouts.
+        policy: The policy that the ant follows if there is no training.
 
     Raises:
         AntsError: A value is not allowed.
@@ -80,6 +82,7 @@ class RunPoint:
     episodes: int = EPISODES
     max_steps: int = EPISODE_STEPS
     rollouts: int = 50
+    policy: FixedPolicy | None = None
     ants: ClassVar[int] = 1
     pool: ClassVar[None] = None
     after: ClassVar[None] = None
@@ -88,7 +91,9 @@ class RunPoint:
         (config,) = checks.checked_configs(self.training)
         object.__setattr__(self, "training", config)
         checks.checked_runs_task(checks.checked_task(self.task))
-        checked_whole("episodes", self.episodes)
+        _check_policy(self.policy, self.episodes)
+        more = "" if self.policy else "; 0 requires a policy"
+        checked_whole("episodes", self.episodes, 0 if self.policy else 1, otherwise=more)
         checks.checked_max_steps(self.max_steps, self.task)
         checked_whole("rollouts", self.rollouts)
 
@@ -96,17 +101,18 @@ class RunPoint:
     def alike(self) -> tuple:
         """The settings that all points of a block share."""
         which = self.training.learner, self.training.planning_steps
-        return (self.world, self.task, which, self.episodes, self.max_steps, self.rollouts)
+        lengths = self.episodes, self.max_steps, self.rollouts
+        return (self.world, self.task, which, *lengths, self.policy)
 
     @property
     def runs_of_a_block(self) -> int:
         """The number of runs of a block: many, for speed, but few enough to save often."""
-        return min(max(1, _STEPS_OF_A_BLOCK // (self.episodes * self.max_steps)), _RUNS_OF_A_BLOCK)
+        return min(max(1, _STEPS_OF_A_BLOCK // self.weight), _RUNS_OF_A_BLOCK)
 
     @property
-    def weight(self) -> float:
+    def weight(self) -> int:
         """The approximate work of a seed, for progress."""
-        return self.episodes * self.max_steps
+        return (self.episodes or self.rollouts) * self.max_steps
 
     @property
     def bytes_of_a_run(self) -> int:
@@ -130,15 +136,21 @@ class RunPoint:
 
         first, configs = points[0], [point.training for point in points]
         world, lengths, task = first.world, (first.episodes, first.max_steps), first.task
-        trained = train(world, configs, seeds, *lengths, task, **where, progress=progress)
-        q_values, steps = trained.q_values, trained.steps.sum(axis=2, dtype=float)
+        shape = len(points), len(seeds)
+        if first.policy:
+            q_values = np.broadcast_to(
+                first.policy.q_values, (*shape, *first.policy.q_values.shape)
+            )
+            outcome = {name: np.zeros((*shape, 0), np.int32) for name in _RUN_ARRAYS}
+        else:
+            trained = train(world, configs, seeds, *lengths, task, **where, progress=progress)
+            q_values, steps = trained.q_values, trained.steps.sum(axis=2, dtype=float)
+            outcome = {name: files.smallest(getattr(trained, name)) for name in _RUN_ARRAYS}
+            seconds = trained.seconds * steps / steps.sum()
+            outcome |= {"q_values": q_values, "seconds": seconds}
         greedy = evaluate(world, q_values, first.rollouts, seeds, first.max_steps, task, **where)
-        return {
-            **{name: files.smallest(getattr(trained, name)) for name in _RUN_ARRAYS},
-            **{f"greedy_{name}": files.smallest(getattr(greedy, name)) for name in _RUN_ARRAYS},
-            "q_values": q_values,
-            "seconds": trained.seconds * steps / steps.sum(),
-        }
+        of_rollouts = {f"greedy_{name}": getattr(greedy, name) for name in _RUN_ARRAYS}
+        return outcome | {name: files.smallest(array) for name, array in of_rollouts.items()}
 
 
 @dataclass(frozen=True)
@@ -154,6 +166,15 @@ class FixedPolicy:
         """Return the policy of a name or file (.npz); raises as `policies.frozen_policy` does."""
         q_values = policies.frozen_policy(name_or_path, task.observation)
         return cls(name_or_path, hashlib.sha256(q_values.tobytes()).hexdigest(), q_values)
+
+
+def _check_policy(policy: FixedPolicy | None, episodes: int) -> None:
+    """Raise AntsError if there is a policy, but also training."""
+    if policy and episodes:
+        raise AntsError(
+            f"policy is {policy.name!r}, but episodes is {episodes}; a fixed policy does not "
+            "learn, so set episodes = 0."
+        )
 
 
 @dataclass(frozen=True)
@@ -211,11 +232,7 @@ class ColonyPoint:
         checks.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "independent"))
         checks.check_sharing(learners.get(config.learner), self.sharing)
-        if self.policy and (self.episodes or self.after):
-            raise AntsError(
-                f"policy is {self.policy.name!r}, but episodes is {self.episodes}; a fixed policy "
-                "does not learn, so set episodes = 0."
-            )
+        _check_policy(self.policy, self.episodes)
         rule = self.task.choice
         if not rule.needs_table and (self.episodes or self.policy or self.after):
             given = "a policy is given" if self.policy else f"episodes is {self.episodes}"

@@ -580,11 +580,21 @@ def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
                     f"{shown([values])}."
                 )
             _check_once(name, values)
+            _check_amounts(name, values)
             axes[name] = Choices(tuple(values))
         if declaration:
             for one in values:
                 declaration.checked(one)
     return axes
+
+
+def _check_amounts(name: str, values: Sequence[Any]) -> None:
+    """Raise AntsError if values mix numbers of ants and shares, such as 0 and 0.5."""
+    if name.endswith(("remove_ants", "add_ants")) and {type(one) for one in values} >= {int, float}:
+        raise AntsError(
+            f"{name} in [vary] is {shown(values)}; a whole number is a number of ants, and others "
+            f"are shares, so vary {name}.number or {name}.share."
+        )
 
 
 def _declaration(kind: str, name: str, fixed: Settings) -> Setting | None:
@@ -632,6 +642,7 @@ def _point(
     more = declared(learners.get(str(learner)).hyperparameters) if learner else ()
     known = [
         *_own(kind),
+        "task.preset",
         # A group of settings can be set by a name, if it has names.
         *(one.path for one in all_of(Task) if not one.is_group or one.has_names),
         *(one.path for one in (*declared(TrainingConfig), *more)),
@@ -644,10 +655,12 @@ def _point(
             raise AntsError(f"{shown(name)} is not a setting {_rather(name, kind, known)}.")
     tree = nested(settings)
     world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
-    rules = Task.from_dict(task)
-    if kind == "colony" and "policy" in tree:
+    preset = task.pop("preset", "paper")
+    check_one_of("task.preset", preset, tuple(Task.named()))
+    rules = Task.named()[preset].but(**task)
+    if "policy" in tree:
         tree["policy"] = FixedPolicy.named(tree["policy"], rules)
-    if kind == "colony" and ("policy" in tree or not rules.choice.needs_table):
+    if "policy" in tree or (kind == "colony" and not rules.choice.needs_table):
         training = {**_WITHOUT_LEARNING, **training}
     for name in _OF_LEARNERS[:5]:  # the others have defaults
         if name not in training:

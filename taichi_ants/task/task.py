@@ -354,7 +354,8 @@ class Task(Settings, path="task"):
             if cue not in cues:
                 raise AntsError(
                     f"`task.{setting}` is {shown(cue)}; it must be one of {', '.join(cues)}, or "
-                    "the name of a field that you add to `task.fields`."
+                    "the name of a field that you add to `task.fields` (for no cue, one with laid "
+                    "= 'never')."
                 )
         for name in self.sees.reads:
             if name not in pheromones:

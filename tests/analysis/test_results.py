@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, TrainingConfig, compare, evaluate, train, worlds
+from taichi_ants import AntsError, Colony, TrainingConfig, compare, evaluate, plot, train, worlds
 from taichi_ants.analysis.results import curves, of_seeds
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
@@ -184,6 +184,21 @@ def test_figures_are_drawn(series, trained, tmp_path):
     assert [len(axes.lines) for axes in trained.plot().axes] == [2, 2]
 
 
+def test_several_results_are_drawn_together(series, trained):
+    other = run(ants=12, measures=["deliveries", "activity"], every=20)
+    figure = plot({"few": series, "many": other})
+    assert [axes.get_ylabel() for axes in figure.axes] == ["Deliveries,\nfood items"]
+    (axes,) = figure.axes
+    assert [line.get_label() for line in axes.lines] == ["few", "many"]
+    alone = [one.plot("deliveries").axes[0].lines[0] for one in (series, other)]
+    for line, single in zip(axes.lines, alone, strict=True):
+        assert np.array_equal(line.get_xydata(), single.get_xydata())
+    both = plot({"first": trained, "again": trained}, "steps").axes[0]
+    assert [line.get_label() for line in both.lines] == [
+        f"{name} {group}" for name in ("first", "again") for group in trained.measured().groups
+    ]
+
+
 def test_names_of_measures_are_those_of_run(series, tmp_path):
     """A measure with parts stands for all of them in figures, and for its only one elsewhere."""
     whole, part = series.plot("entropy"), series.plot("entropy.trail")
@@ -215,6 +230,10 @@ def test_results_without_numbers_are_refused():
         (lambda one: one.plot("nothing"), "choose one of deliveries, entropy.trail"),
         (lambda one: one.plot(path="plot.jpg"), "must be one of .png"),
         (lambda one: one.summary(last=0), "last is 0"),
+        (lambda one: plot({"a": one, "b": 3}), r"a result \(b\) is 3; give results of Colony.run"),
+        (lambda one: plot({}), "there are no results"),
+        (lambda one: plot({"a": one, "b": run(seeds=range(1, 6))}), "the seeds of 'b' are"),
+        (lambda one: plot({"a": one, "b": one}, "nothing"), "no measure 'nothing'"),
     ],
 )
 def test_wrong_requests_are_refused(series, attempt, message):

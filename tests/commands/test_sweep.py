@@ -18,11 +18,22 @@ from command_lines import (
     environment,
 )
 
-from taichi_ants import Colony, Life, Pheromone, Rewards, Task, TrainingConfig, train, worlds
+from taichi_ants import (
+    Colony,
+    Life,
+    Pheromone,
+    Rewards,
+    Task,
+    TrainingConfig,
+    evaluate,
+    train,
+    worlds,
+)
 from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies.runner import EVALUATION_SEEDS
 from taichi_ants.studies.sweep import read_sweep
-from taichi_ants.task import observations
+from taichi_ants.task import foraging, observations, paper
 from taichi_ants.worlds import registry
 
 RUNS = """
@@ -254,8 +265,11 @@ WRONG = {
         ["world.ranges in [vary] is [20, 20, 20]", "[[20, 20, 20]]"],
     ),
     "part of a world": ("[vary]", "[vary]\nworld.preset.x = [1]", ["'world.preset.x' is no"]),
-    "unlike any": ("episodes =", "xyz = 1\nepisodes =", ["max_steps, rollouts, world"]),
+    "unlike any": ("episodes =", "xyz = 1\nepisodes =", ["max_steps, rollouts, policy, world"]),
     "no toml": ("[vary]", "[vary", ["is not valid TOML", "correct it"]),
+    "preset": ("[task]", '[task]\npreset = "foragin"', ["task.preset is 'foragin'", "foraging"]),
+    "policy": ("seeds =", 'policy = "random"\nseeds =', ["episodes is 50", "set episodes = 0"]),
+    "no policy": ("episodes = 50", "episodes = 0", ["episodes is 0", "0 requires a policy"]),
     "nothing varies": (RUNS[RUNS.index("[vary]") :], "", ["[vary] is missing"]),
 }
 
@@ -394,6 +408,37 @@ def test_traffic_has_names_and_learners_first_values(tmp_path):
     assert found == [(False, 0), (False, 10), (True, 0), (True, 10)]
 
 
+def test_a_sweep_begins_with_a_preset_of_the_task(sweep):
+    text = FOLLOWING.replace('["trail_follower", "random"]', '["random"]')
+    Path("a.toml").write_text(
+        f'{text}"task.preset" = ["paper", "foraging"]\n[task]\nrewards.deliver = 70\n'
+    )
+    changes = {"rewards": {"deliver": 70}}
+    found = [point.task for point in read_sweep(Path("a.toml")).study.points]
+    assert found == [paper().but(**changes), foraging().but(**changes)]
+
+
+FOLLOWING = """
+kind = "runs"
+measures = ["greedy_return", "greedy_repeats"]
+seeds = 3
+episodes = 0
+max_steps = 60
+rollouts = 4
+[vary]
+policy = ["trail_follower", "random"]
+"""
+
+
+def test_lone_ants_follow_policies_without_learning(sweep):
+    status, _, err = sweep(FOLLOWING)
+    assert (status, err) == (0, "")
+    rows = read_csv("results/sweep-my/runs.csv")
+    follows = evaluate(worlds.paper(), trail_follower(), 4, range(3), 60)
+    assert [float(row["greedy_return"]) for row in rows[:3]] == follows.returns.mean(1).tolist()
+    assert rows[3]["greedy_return"] != rows[0]["greedy_return"]
+
+
 @pytest.mark.parametrize("name", ["crowds", "learning_rates", "observations", "trails"])
 def test_the_examples_can_be_read(name):
     assert len(read_sweep(EXPERIMENTS / "sweeps" / f"{name}.toml").settings) > 4
@@ -476,6 +521,7 @@ WRONG_EVENTS = {
     "tick": ("tick = 20", "tick = 60", ["`at.tick` is 60, but episodes have 60 ticks"]),
     "name": ("trail = 0", "trial = 0", ["in [[at]] number 1, `at.trial` is not a setting"]),
     "share": ("[0.0, 0.5]", "[0.0, 1.5]", ["`remove_ants.share` is 1.5"]),
+    "amounts": ("[0.0, 0.5]", "[0, 0.5]", ["is [0, 0.5]; a whole number is a number of ants"]),
     "cells": ("trail = 0", "clear = [[99, 0, 0]]", ["(99, 0, 0) is outside the world"]),
     "cell": ("trail = 0", "clear = [[9, 0]]", ["`clear.cells` has the cell [9, 0]"]),
     "no cells": ("trail = 0", 'place.what = "rock"', ["`place.cells` is missing; add it"]),

@@ -212,6 +212,9 @@ def test_events_and_fixed_policies_are_described():
     assert "**Learning.** None: ants follow a fixed rule or policy." in text
     assert "- `my map.txt`: a text map or a world of the plugin" in text
     assert "7.6 Learning" not in text
+    alone = text_of(RunPoint(worlds.paper(), Task(), SARSA, 0, 100, policy=policy))
+    assert "one ant on a hexagonal grid forages by a fixed rule" in alone
+    assert "7.6 Learning" not in alone
 
 
 def test_sentences_are_short_and_tables_have_even_rows():

@@ -94,7 +94,8 @@ def _measures() -> Iterator[tuple[str, Measure]]:
             compute = partial(_fluctuation, array, episodes)
             yield f"{name}_fluctuation_{window}", Measure(changes, unit, compute, max(2, least))
         greedy = partial(_mean, f"greedy_{array}", slice(None))
-        yield f"greedy_{name}", Measure(f"mean {words} of the greedy rollouts", unit, greedy)
+        words = f"mean {words} of the greedy rollouts"
+        yield f"greedy_{name}", Measure(words, unit, greedy, episodes=0)
     words = "length of the shortest training episode"
     yield (
         "shortest_episode",
@@ -103,7 +104,7 @@ def _measures() -> Iterator[tuple[str, Measure]]:
     words = "whether the last 50 episodes return more than the first 50"
     yield "improved", Measure(words, _SHARE, _improved, 2 * WINDOW)
     words = "whether all greedy rollouts of a run are equal in return and length"
-    yield "greedy_repeats", Measure(words, _SHARE, _repeats)
+    yield "greedy_repeats", Measure(words, _SHARE, _repeats, episodes=0)
 
 
 MEASURES: dict[str, Measure] = dict(_measures())

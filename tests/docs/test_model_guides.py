@@ -1,0 +1,20 @@
+"""The Python of docs/models.md and docs/rules.md works."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from command_lines import ROOT
+
+
+@pytest.mark.slow  # colonies that learn, and rules that compile
+@pytest.mark.parametrize("page", ["models", "rules"])
+def test_the_examples_of_a_guide_work(page, tmp_path):
+    guide = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
+    parts = [part.split("```")[0] for part in guide.split("```python\n")[1:]]
+    assert len(parts) > 2
+    script = tmp_path / f"{page}.py"  # rules need a file
+    script.write_text("\n\n".join(parts), "utf-8")
+    subprocess.run([sys.executable, str(script)], cwd=tmp_path, check=True, timeout=300)
