@@ -171,11 +171,12 @@ def _purpose(model: Model) -> Iterator[str]:
     who, end = ("colonies of ants", "") if model.of_colony else ("one ant", "s")
     how = "learn{} by reinforcement to forage" if model.learns else "forage{} by a fixed rule"
     varied = _varied(model)
+    verb = "affects" if len(varied) == 1 else "affect"
     yield (
         f"The model describes how {who} on a hexagonal grid {how.format(end)}, with pheromone "
-        f"trails. Its purpose in this study is to measure how {_words(varied) or 'the settings below'} "
-        f"{'affects' if len(varied) == 1 else 'affect'} the measures listed here. Each combination "
-        f"of settings runs with {count(len(model.seeds), 'seed')}."
+        f"trails. Its purpose in this study is to measure how "
+        f"{_words(varied) or 'the settings below'} {verb} the measures listed here. Each "
+        f"combination of settings runs with {count(len(model.seeds), 'seed')}."
     )
     lines = [f"- `{name}`: {words}" for name, words in _measures(model).items()]
     yield "Patterns by which the model is judged:\n\n" + "\n".join(lines)
