@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,6 +38,8 @@ class ResultFolder:
         leading: Settings that determine others; if they differ, messages name only these.
         runs: The result of `Study.runs`, if the work is a study.
         grows: Whether finished results of a part of these runs can become a part of the results.
+        grows_in: The name of a setting, a number, instead of runs: results of a smaller number are
+            a part of those of a larger one.
     """
 
     def __init__(
@@ -46,9 +49,10 @@ class ResultFolder:
         leading: Sequence[str] = (),
         runs: Mapping[str, Any] | None = None,
         grows: bool = False,
+        grows_in: str = "",
     ) -> None:
         self.path = Path(path)
-        self._runs, self._grows = {"runs": runs} if runs else {}, grows
+        self._runs, self._grows, self._grows_in = {"runs": runs} if runs else {}, grows, grows_in
         self.seconds_before = 0.0
         self._leading = leading
         self._settings = json.loads(files.to_json(settings))
@@ -95,7 +99,11 @@ class ResultFolder:
         return None
 
     def _is_part(self, manifest: Mapping[str, Any]) -> bool:
-        """Return whether all runs of a manifest are also runs of this work."""
+        """Return whether all that a manifest has is also a part of this work."""
+        if self._grows_in:
+            smaller, larger = dict(manifest["settings"]), dict(self._settings)
+            size, most = smaller.pop(self._grows_in, math.inf), larger.pop(self._grows_in)
+            return smaller == larger and size <= most
         settings, own, theirs = manifest["settings"], self._runs.get("runs"), manifest.get("runs")
         if any(settings.get(name) != self._settings.get(name) for name in _OF_ALL_RUNS):
             return False

@@ -33,7 +33,7 @@ _OF_THE_RUN = ("out", "force", "shard", "workers", "threads", "ray", "text", "co
 Results = TypeVar("Results")
 # (folder of results, results if just computed, manifest) -> HTML
 Pages = Callable[[Path, Results | None, Mapping[str, Any]], str]
-# (folder of finished results, their `Study.runs`, blocks to which it adds them)
+# (folder of finished results, their `Study.runs` if any, blocks to which it adds them)
 Take = Callable[[Path, Mapping[str, Any], Blocks], None]
 
 
@@ -46,6 +46,7 @@ def work_or_show(
     study: Study[Any] | None = None,
     take: Take | None = None,
     inputs: Mapping[str, bytes] | None = None,
+    grows_in: str = "",
 ) -> None:
     """Compute the results of a command unless its folder has them, and print the report.
 
@@ -59,13 +60,14 @@ def work_or_show(
         take: A function that writes the blocks of finished results that are a part of the study.
         inputs: The contents of the files that the study has read, by path, except the plugin and
             the sweep file. The results contain copies of them.
+        grows_in: The argument of `ResultFolder`.
     """
     given = {**(inputs or {}), **_given(settings)}
     plugin = hashlib.sha256(given[settings.plugin]).hexdigest() if settings.plugin else None
     facts = {**determines, "arch": settings.arch, "plugin": plugin}
     shard = getattr(settings, "shard", None)
     runs = study.runs(shard or (1, 1)) if study else None
-    folder = ResultFolder(settings.out, facts, leading, runs, take is not None)
+    folder = ResultFolder(settings.out, facts, leading, runs, take is not None, grows_in)
     if not settings.force and folder.is_finished():
         _show(settings, folder, page)
     else:
@@ -128,11 +130,11 @@ def _copied(inputs: Mapping[str, bytes], folder: Path) -> dict[str, str]:
 
 def _take(folder: ResultFolder, part: Mapping[str, Any], take: Take, blocks: Path) -> None:
     """Write the blocks of finished results, unless a process that was killed has done that."""
-    saved = Blocks(blocks)
-    runs = seeds_by_point(part["runs"]).items()
-    if not all(saved.has(point, seed) for point, seeds in runs for seed in seeds):
+    saved, runs = Blocks(blocks), part.get("runs", {})
+    wanted = seeds_by_point(runs).items() if runs else ()
+    if not wanted or not all(saved.has(point, seed) for point, seeds in wanted for seed in seeds):
         folder.check()
-        take(folder.path, part["runs"], saved)
+        take(folder.path, runs, saved)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -24,8 +24,9 @@ from taichi_ants.errors import AntsError, checked_flag, checked_whole, shown
 from taichi_ants.files.results import REPORT
 from taichi_ants.settings import flat, nested, not_a_setting
 from taichi_ants.studies import design, sweep
+from taichi_ants.studies.blocks import Blocks
 from taichi_ants.studies.design import Axis, Range
-from taichi_ants.studies.runner import ColonyPoint, Progress, Study
+from taichi_ants.studies.runner import VALUE, ColonyPoint, Progress, Study
 from taichi_ants.studies.sweep import Base, Settings, Sweep
 
 if TYPE_CHECKING:
@@ -138,7 +139,7 @@ class Search:
 
         for number in range(self.trials):
             trial, row = self._asked(study, number)
-            tried.append(self._tried(trial, row, blocks / f"trial-{number:05d}", part, where))
+            tried.append(self._tried(trial, row, blocks, part, where))
             self._tell(study, trial, tried[-1])
         done = [n for n, one in enumerate(tried) if one.state == COMPLETE]
         if not done:
@@ -153,6 +154,35 @@ class Search:
         last = part(total - 2 * len(self.held_out), 2 * len(self.held_out))
         values = self._measures(Study(points, self.held_out), blocks / "held-out", last, where)
         return Found(tried, best, values, study)
+
+    def take(self, folder: Path, runs: Mapping[str, Any], blocks: Blocks) -> None:
+        """Add the trials of finished results to the blocks; `runs` has no effect."""
+        import optuna
+
+        study = self._study()
+        journal = optuna.storages.journal.JournalFileBackend(str(folder / STORAGE))
+        stored = optuna.storages.JournalStorage(journal)
+        for number, one in enumerate(optuna.load_study(study_name=None, storage=stored).trials):
+            trial, row = self._asked(study, number)
+            values = {n: np.array(v, float) for n, v in one.user_attrs["values"].items()}
+            has_run = len(next(iter(values.values()), ()))
+            for at in self._groups() if has_run else ():
+                if at.stop <= has_run:
+                    place = self._place(blocks.folder, number, at)
+                    part = self._part(self.base.point(row, {}), at)
+                    outcome = {f"{VALUE}{n}": array[None, at] for n, array in values.items()}
+                    Blocks(place).add(part.keys, part.names[0], outcome)
+            states = {COMPLETE: COMPLETE, "pruned": PRUNED, "fail": FAILED}
+            self._tell(study, trial, Trial(row, states[one.state.name.lower()], values))
+
+    @staticmethod
+    def _place(blocks: Path, number: int, at: slice) -> Path:
+        """Return the folder of the blocks of a group of seeds of a trial."""
+        return files.check_writable_folder(blocks / f"trial-{number:05d}" / f"{at.start:05d}")
+
+    def _part(self, point: Any, at: slice) -> Study[Any]:
+        """Return the study of a point and a group of seeds."""
+        return Study((_with_worlds(point, at),), self.base.seeds[at])
 
     def _study(self) -> optuna.Study:
         import optuna
@@ -185,7 +215,7 @@ class Search:
         }
 
     def _tried(
-        self, trial: optuna.Trial, row: Settings, folder: Path, part: Any, where: dict[str, Any]
+        self, trial: optuna.Trial, row: Settings, blocks: Path, part: Any, where: dict[str, Any]
     ) -> Trial:
         """Return a trial that has run, until it was pruned."""
         try:
@@ -196,8 +226,7 @@ class Search:
         found: dict[str, list[np.ndarray]] = {name: [] for name in self.base.measures}
         state = COMPLETE
         for at in self._groups():
-            study: Study[Any] = Study((_with_worlds(point, at),), seeds[at])
-            place = folder / f"{at.start:05d}"
+            study, place = self._part(point, at), self._place(blocks, trial.number, at)
             progress = part(trial.number * len(seeds) + at.start, at.stop - at.start)
             for name, array in self._measures(study, place, progress, where).items():
                 found.setdefault(name, []).append(array[0])

@@ -8,6 +8,7 @@ import re
 import numpy as np
 import optuna
 import pytest
+from command_lines import call
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
@@ -248,6 +249,26 @@ def test_a_search_that_was_stopped_resumes_with_the_same_trials(after, tmp_path,
     for one, other in zip(resumed.trials, whole.trials, strict=True):
         assert (one.settings, one.state) == (other.settings, other.state)
         assert one.values["deliveries"].tolist() == other.values["deliveries"].tolist()
+
+
+def test_a_finished_search_continues_with_more_trials(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    few = TEXT.replace("trials = 40", "trials = 5").replace("held_out = 12", "held_out = 4")
+    do, done = search.ColonyPoint.do, []
+    monkeypatch.setattr(search.ColonyPoint, "do", staticmethod(lambda *a: done.append(1) or do(*a)))
+    counts = {}
+    for out, trials in (("grown", 5), ("grown", 9), ("whole", 9), ("grown", 9), ("grown", 4)):
+        done.clear()
+        (tmp_path / "my.toml").write_text(few.replace("trials = 5", f"trials = {trials}"))
+        status, _, err = call("sweep", ["my.toml", "--out", out, "--no-figures"], capsys)
+        assert status == 2 * (trials == 4)
+        counts.setdefault(out, []).append(len(done))
+    assert "search.trials differ" in err  # fewer trials are refused
+    first, then, shown, refused = counts["grown"]
+    assert (shown, refused) == (0, 0)
+    assert first + then == counts["whole"][0] + 2  # the comparison with held-out seeds runs again
+    for name in ("trials.csv", "held_out.csv", "best.toml", "report.txt"):
+        assert (tmp_path / "grown" / name).read_text() == (tmp_path / "whole" / name).read_text()
 
 
 WRONG = {
