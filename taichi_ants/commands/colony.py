@@ -184,7 +184,7 @@ def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingCon
 
 def study(settings: argparse.Namespace) -> None:
     """Run the study, or show its results if it is finished."""
-    from taichi_ants.studies.colony_study import plan, study_of, write_results
+    from taichi_ants.studies.colony_study import do_study, plan, study_of, take_results
     from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
 
@@ -197,14 +197,13 @@ def study(settings: argparse.Namespace) -> None:
     def work(blocks: Path, ready: Path) -> Results | None:
         bar = command_line.progress_bar
         with chosen(settings) as how, bar("study", how.get("executor")) as progress:
-            outcomes = asked.run(blocks, progress, **how)
-        if settings.shard:
-            return None
-        return write_results(conditions, seeds, outcomes, ready, draws=not settings.no_figures)
+            shows = not settings.no_figures
+            return do_study(conditions, asked, blocks, ready, shows, progress, **how)
 
     words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}
     page = partial(make_page, settings, conditions, asked)
-    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page, asked)
+    take = partial(take_results, conditions, asked)
+    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page, asked, take)
 
 
 def make_page(

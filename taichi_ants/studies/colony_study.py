@@ -26,7 +26,8 @@ from taichi_ants.errors import AntsError, check_one_of
 from taichi_ants.files.results import REPORT
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import save_policy
-from taichi_ants.studies.runner import ColonyPoint, Outcome, Study
+from taichi_ants.studies.blocks import Blocks
+from taichi_ants.studies.runner import VALUE, ColonyPoint, Outcome, Progress, Study
 from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
 from taichi_ants.worlds.world import World
 
@@ -163,19 +164,49 @@ def study_of(conditions: Plan, seeds: Sequence[int]) -> Study[ColonyPoint]:
     return Study((*conditions.values(), *map(greedy, conditions.values())), tuple(seeds))
 
 
+def with_measures(points: Sequence[ColonyPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
+    """Return an outcome of one point with its measures."""
+    (point,) = points
+    values = measures_of({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
+    return {**outcome, **{f"{VALUE}{name}": array[None] for name, array in values.items()}}
+
+
+def take_results(
+    conditions: Plan,
+    asked: Study[ColonyPoint],
+    folder: Path,
+    runs: Mapping[str, Any],
+    blocks: Blocks,
+) -> None:
+    """Add finished results, whose `Study.runs` were `runs`, to the blocks of a study."""
+    key_of = dict(zip(asked.in_order, asked.keys, strict=True))
+    names_of = dict(zip(runs["points"], runs["seeds_of"], strict=True))
+    rows: dict[Condition, list[dict[str, str]]] = {}
+    for row in files.read_csv(folder / SEEDS):
+        where = row["world_kind"], row["rules"], row["regime"], int(row["ants"])
+        rows.setdefault(Condition(*where), []).append(row)
+    for condition, several in rows.items():
+        point = conditions[condition]
+        columns = {name: np.array([float(row[name]) for row in several]) for name in study.OF_STUDY}
+        own = {name: columns[name] for name in study.MEASURES}
+        # Only this measure of ants that do not explore is in the results.
+        calm = dict.fromkeys(own, np.full(len(several), np.nan))
+        calm["deliveries"] = columns["greedy"]
+        for one, values in ((point, own), (greedy(point), calm)):
+            seeds = runs["seeds"][names_of[key_of[one]]]
+            blocks.add([key_of[one]], seeds, {f"{VALUE}{n}": a[None] for n, a in values.items()})
+
+
 def measured(
-    conditions: Plan, outcomes: Mapping[Any, Outcome], seeds: Sequence[int]
+    conditions: Plan, values: Mapping[Any, Mapping[str, np.ndarray]], seeds: Sequence[int]
 ) -> dict[Condition, dict[str, np.ndarray]]:
-    """Return all measures, float64 (seeds,), of all conditions from the outcomes of the points."""
+    """Return all measures, float64 (seeds,), of all conditions from those of the points."""
     bounds, found = bounds_of(conditions, len(seeds)), {}
     for condition, point in conditions.items():
-        of_point, without = (
-            measures_of(outcomes[one], one.ants, one.ticks) for one in (point, greedy(point))
-        )
-        bound = bounds[condition]
+        bound, of_point = bounds[condition], values[point]
         share = of_point["deliveries"] / np.where(bound > 0, bound, np.nan)
-        besides = {"greedy": without["deliveries"], "bound": bound, "of_bound": share}
-        found[condition] = {**of_point, **besides}
+        calm = values[greedy(point)]["deliveries"]
+        found[condition] = {**of_point, "greedy": calm, "bound": bound, "of_bound": share}
     return found
 
 
@@ -197,15 +228,25 @@ def bounds_of(conditions: Plan, seeds: int) -> dict[Condition, np.ndarray]:
     return found
 
 
-def write_results(
+def do_study(
     conditions: Plan,
-    seeds: Sequence[int],
-    outcomes: Mapping[Any, Outcome],
+    asked: Study[ColonyPoint],
+    blocks: Path,
     folder: Path,
     draws: bool,
-) -> Results:
-    """Return the results of a plan's outcomes, after writing all of their files."""
-    values = measured(conditions, outcomes, seeds)
+    progress: Progress,
+    **how: Any,
+) -> Results | None:
+    """Return the results of a study, after writing all of their files; None for a shard.
+
+    Computes the blocks that are missing in `blocks`; `how` has further arguments of
+    `Study.in_blocks`.
+    """
+    arrays = asked.reduced(blocks, with_measures, progress, **how)
+    if how.get("shard", (1, 1))[1] > 1:
+        return None
+    of_points = {p: {n: a[row] for n, a in arrays.items()} for row, p in enumerate(asked.points)}
+    values, seeds = measured(conditions, of_points, asked.seeds), asked.seeds
     results = Results.of(values)
     for name, table in (
         (SEEDS, tables.rows_of_seeds(values, seeds)),
@@ -215,8 +256,7 @@ def write_results(
         files.write_csv(folder / name, table, list(table[0]))
     files.write_text(folder / "findings.md", markdown(tables.found(*results)))
     files.write_text(folder / REPORT, plain_text(tables.on_one_screen(*results), _WIDTH))
-    policies = files.check_writable_folder(folder / POLICIES)
-    _save_policies(conditions, seeds, values, outcomes, policies)
+    _save_policies(conditions, asked, values, blocks, folder / POLICIES, **how)
     if draws:
         style.save_all(draw_all(results.rows), folder / FIGURES)
     return results
@@ -224,23 +264,37 @@ def write_results(
 
 def _save_policies(
     conditions: Plan,
-    seeds: Sequence[int],
+    asked: Study[ColonyPoint],
     values: Measured,
-    outcomes: Mapping[Any, Outcome],
+    blocks: Path,
     folder: Path,
+    **how: Any,
 ) -> None:
-    """Save the policy of the median seed of each condition with joint training in `COMPARED`."""
+    """Save the policy of the median seed of each condition with joint training in `COMPARED`.
+
+    Results that were taken over have only measures, so these runs are done again.
+    """
+    files.check_writable_folder(folder)
+    place_of = {point: place for place, point in enumerate(asked.in_order)}
+    median: dict[Condition, tuple[int, int]] = {}  # the point and the seed, by their places
     for condition, point in conditions.items():
-        world_kind, rules, regime, ants = condition
-        if rules not in COMPARED or regime != study.JOINT:
-            continue
-        deliveries = values[condition]["deliveries"]
-        run = int(np.argsort(deliveries, kind="stable")[(len(seeds) - 1) // 2])
+        if condition.rules in COMPARED and condition.regime == study.JOINT:
+            order = np.argsort(values[condition]["deliveries"], kind="stable")
+            run = int(order[(len(asked.seeds) - 1) // 2])
+            median[condition] = place_of[point], run
+    runs = np.zeros((len(asked.in_order), len(asked.seeds)), bool)
+    for at in median.values():
+        runs[at] = True
+    asked.complete(blocks, runs, "q_values", reduce=with_measures, **how)
+    saved = Blocks(blocks)
+    for condition, (place, run) in median.items():
+        point, name = asked.in_order[place], asked.names[place][run]
         metadata = {
             **condition._asdict(),
             **{"task": point.task.as_dict(), "training": point.training.as_dict()},
-            **{"seed": seeds[run], "episodes": point.episodes, "ticks": point.ticks},
-            "deliveries_per_1000_ticks": deliveries[run],
+            **{"seed": asked.seeds[run], "episodes": point.episodes, "ticks": point.ticks},
+            "deliveries_per_1000_ticks": values[condition]["deliveries"][run],
         }
-        path = folder / f"{world_kind}_{rules}_{ants}.npz"
-        save_policy(path, outcomes[point]["q_values"][run], metadata, point.task.observation)
+        path = folder / f"{condition.world_kind}_{condition.rules}_{condition.ants}.npz"
+        (q_values,) = saved.read(asked.keys[place], [name], "q_values")["q_values"]
+        save_policy(path, q_values, metadata, point.task.observation)

@@ -167,6 +167,27 @@ def assert_measured(folder, condition, outcome):
 
 
 @pytest.mark.slow
+def test_a_finished_study_grows(finished, remembered, tmp_path, monkeypatch):
+    """By a kind of world, then by a seed: in the end, results are those of one study."""
+    _, folder = finished
+    monkeypatch.chdir(tmp_path)
+    at = SMALL.index("--seeds") + 1
+    one_seed = [*SMALL[:at], 1, *SMALL[at + 1 :], "--out", "out"]
+    without_small = [one for one in one_seed if one != "small"]
+    for arguments in (without_small, one_seed, [*SMALL, "--out", "out"]):
+        assert faults.run("colony", arguments) == (0, "")
+    grown, whole = contents(Path("out")), contents(folder)
+    for found in (grown, whole):
+        del found["manifest.json"], found["report.html"]  # they have the time of the work
+    assert grown == whole
+    last_size = SMALL.index("--seeds") - 1
+    fewer_sizes = [*SMALL[:last_size], *SMALL[last_size + 1 :]]
+    status, err = faults.run("colony", [*fewer_sizes, "--out", "out"])
+    assert status == 2
+    assert "(sizes differ)" in err
+
+
+@pytest.mark.slow
 def test_policies_say_where_they_come_from(finished):
     _, folder = finished
     policy = load_policy(folder / "policies" / "paper_foraging_3.npz")
@@ -205,7 +226,7 @@ def test_other_arenas_are_the_only_difference_and_their_order_is_none(
         (blocks / "0.npz").touch()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Study, "run", stop)
+    monkeypatch.setattr(Study, "reduced", stop)
     monkeypatch.chdir(tmp_path)
     small = ["study", "--out", "out", "--seeds", 1, "--sizes", 2, "--world-kinds"]
     for world_kinds in (["paper", "small"], ["small", "paper", "small"]):

@@ -87,12 +87,9 @@ def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
     assert bounds[one].tolist() == expected
     assert expected[0] != expected[1]
     assert np.isnan(bounds[elsewhere]).all()  # the limits do not hold where food moves
-    ones = np.ones((len(SEEDS), 1), np.int64)
-    names = ("deliveries", "first_delivery", "moves", "blocked", "returns")
-    counts = {which: dict.fromkeys(names, n * ones) for which, n in (("", 700), ("calm", 800))}
-    outcomes = dict.fromkeys(conditions.values(), counts[""])
-    outcomes |= {greedy(p): counts["calm"] for p in conditions.values()}
-    found = measured(conditions, outcomes, SEEDS)
+    values = {point: {"deliveries": np.array([700.0, 700.0])} for point in conditions.values()}
+    values |= {greedy(p): {"deliveries": np.array([800.0, 800.0])} for p in conditions.values()}
+    found = measured(conditions, values, SEEDS)
     assert found[one]["greedy"].tolist() == [800, 800]
     assert found[one]["of_bound"] == pytest.approx(700 / np.array(expected))
     assert np.isnan(found[elsewhere]["of_bound"]).all()
