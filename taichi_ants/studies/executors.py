@@ -20,7 +20,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from multiprocessing.connection import Connection
@@ -242,17 +242,13 @@ class LocalWorkers:
 
     def submit(self, call: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
         """Return the future of a call in a worker process, which is started if necessary."""
-        # Workers inherit the mask of signals: only this process gets Ctrl-C.
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
-        try:
+        with _without_ctrl_c():
             for _ in range(TRIES):
                 with suppress(BrokenExecutor):
                     if self._pool is not None:
                         return self._pool.submit(call, *arguments)
                 self._pool = self._new()
-            raise BrokenExecutor("worker processes die as soon as they start")
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        raise BrokenExecutor("worker processes die as soon as they start")
 
     def _new(self) -> ProcessPoolExecutor:
         return ProcessPoolExecutor(
@@ -263,8 +259,22 @@ class LocalWorkers:
         )
 
 
+@contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Let processes that are started in the context ignore Ctrl-C, which only this one gets."""
+    if not hasattr(signal, "pthread_sigmask"):  # on Windows, workers ignore it once they run
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))  # processes inherit it
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _end_with(line: Connection) -> None:
-    """End this process when the other end of a line is closed."""
+    """Ignore Ctrl-C, and end this process when the other end of a line is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def wait() -> None:
         with suppress(EOFError, OSError):
