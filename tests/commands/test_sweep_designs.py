@@ -114,7 +114,7 @@ def test_a_search_has_its_files_and_can_be_shown(sweep):
     assert "12 trials of up to 6 seeds" in out
     before = contents(folder)
     assert "already has these results" in sweep(SEARCH)[1]
-    status, out, err = sweep(SEARCH.replace("trials = 12", "trials = 13"))
+    status, out, err = sweep(SEARCH.replace("trials = 12", "trials = 11"))
     assert (status, out) == (2, "")
     assert_one_sentence(err)
     assert "(search.trials differ)" in err
