@@ -249,9 +249,11 @@ def check_room(folder: PathLike, needed: int) -> None:
     with writing(folder):
         free = shutil.disk_usage(folder).free
     if needed > free:
+        from rich.filesize import decimal
+
         raise AntsError(
-            f"this needs {needed / 1e9:.3f} GB on the disk of {named(folder)}, and "
-            f"{free / 1e9:.3f} GB are free; free some space, write less, or choose another place."
+            f"this needs {decimal(needed)} on the disk of {named(folder)}, and {decimal(free)} "
+            "are free; free some space, write less, or choose another place."
         )
 
 

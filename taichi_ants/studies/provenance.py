@@ -27,9 +27,15 @@ _OF_DEVELOPERS = {"test", "dev", "bench", "lessons"}  # extras that no command i
 
 
 def provenance(arguments: Sequence[str]) -> dict[str, Any]:
-    """Return the command, time, source, versions and machine, for the manifest of results."""
+    """Return the command, time, source, versions and machine, for the manifest of results.
+
+    A command with an absolute path, as an installed one has, is recorded by its name alone.
+    """
+    program, *options = arguments
+    if os.path.isabs(program):
+        program = Path(program).name.replace("__main__.py", "taichi-ants")
     return {
-        "command": shlex.join(arguments),
+        "command": shlex.join((program, *options)),
         "finished": datetime.datetime.now(datetime.timezone.utc).isoformat(timespec="seconds"),
         **source(),
         "python": platform.python_version(),

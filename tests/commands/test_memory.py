@@ -141,14 +141,14 @@ def test_a_disk_without_room_is_told_before_the_work(tmp_path, capsys, monkeypat
     Path("my.toml").write_text(SWEEP.replace("SEEDS", "1000"))
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: Usage(10**5))
     for name, arguments, needed in (
-        ("sweep", ["my.toml"], 6000 * 2 * (8 + 2 * 20)),
-        ("compare", [*COMPARE, "--seeds", 1000], 4000 * (2560 + 8 + 110 * 4)),
+        ("sweep", ["my.toml"], "576.0 kB"),  # 6000 runs, 2 measures, 8 + 2 * 20 bytes
+        ("compare", [*COMPARE, "--seeds", 1000], "12.0 MB"),  # 4000 runs, 2560 + 8 + 110 * 4 bytes
     ):
         status, out, err = call(name, [*arguments, "--out", "out"], capsys)
         assert (status, out) == (2, "")
         assert_one_sentence(err)
-        assert f"needs {needed / 1e9:.3f} GB on the disk of 'out" in err
-        assert "0.000 GB are free; free some space" in err
+        assert f"needs {needed} on the disk of 'out" in err
+        assert "100.0 kB are free; free some space" in err
         assert not Path("out").exists()
 
 

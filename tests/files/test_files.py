@@ -387,7 +387,7 @@ def test_a_disk_with_too_little_room_is_named_before_the_work(tmp_path: Path) ->
     with pytest.raises(AntsError) as caught:
         files.check_room(tmp_path, free + 10**12)
     assert str(tmp_path) in str(caught.value)
-    assert "GB are free; free some space, write less" in str(caught.value)
+    assert "are free; free some space, write less" in str(caught.value)
 
 
 # check_writable_folder.

@@ -421,8 +421,10 @@ def test_any_difference_of_worlds_is_told():
 
 
 def test_provenance():
-    facts = provenance(["compare.py", "--out", "a b"])
-    assert facts["command"] == "compare.py --out 'a b'"
+    facts = provenance(["experiments/compare.py", "--out", "a b"])
+    assert facts["command"] == "experiments/compare.py --out 'a b'"
+    for program in ("/home/me/bin/taichi-ants", "/home/me/taichi_ants/__main__.py"):
+        assert provenance([program, "compare"])["command"] == "taichi-ants compare"
     assert facts["packages"]["taichi"] == "1.7.4"
     assert {"kiwisolver", "mdurl"} <= facts["packages"].keys()  # which Matplotlib and Rich need
     assert not {"pytest", "mypy", "pip"} & facts["packages"].keys()
