@@ -11,8 +11,7 @@ from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, files, learners, worlds
 from taichi_ants.protocol import At
-from taichi_ants.report import odd_rules
-from taichi_ants.report.odd import Model, described
+from taichi_ants.report.odd import RULES, Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
 from taichi_ants.studies.runner import ColonyPoint, RunPoint, Study
 from taichi_ants.studies.sweep import read_sweep
@@ -121,19 +120,19 @@ def test_each_rule_of_the_package_has_a_text():
     words = {one.path: one.words for one in all_of(Task)}
     words |= {one.path: one.words for one in declared(Field)}
     for path, texts in {
-        "task.pheromone.evaporation": odd_rules.EVAPORATION,
-        "task.pheromone.deposit": odd_rules.DEPOSIT,
-        "task.pheromone.view": odd_rules.VIEW,
-        "task.fields.NAME.laid": odd_rules.LAID,
-        "task.choice.rule": odd_rules.CHOICE,
-        "task.delivery": odd_rules.DELIVERY,
-        "task.labour.rule": odd_rules.LABOUR,
+        "task.pheromone.evaporation": RULES["evaporation"],
+        "task.pheromone.deposit": RULES["deposit"],
+        "task.pheromone.view": RULES["view"],
+        "task.fields.NAME.laid": RULES["laid"],
+        "task.choice.rule": RULES["choice"],
+        "task.delivery": RULES["delivery"],
+        "task.labour.rule": RULES["labour"],
     }.items():
         assert {*texts} >= {*words[path]}, path
     traffic = {one.name for one in all_of(Task) if one.path.startswith("task.traffic.")}
-    assert {*odd_rules.TRAFFIC} == traffic
-    assert {*odd_rules.LEARNERS} == {*learners.registry.BUILT_IN}
-    assert {*odd_rules.WORLDS} == {*worlds.registry.BUILT_IN}
+    assert {*RULES["traffic"]} == traffic
+    assert {*RULES["learners"]} == {*learners.registry.BUILT_IN}
+    assert {*RULES["worlds"]} == {*worlds.registry.BUILT_IN}
 
 
 @pytest.mark.parametrize(
