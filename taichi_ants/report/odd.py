@@ -22,8 +22,8 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.registry import BUILT_IN as LEARNERS
 from taichi_ants.report.page import text_of
 from taichi_ants.settings import Setting, all_of, declared, flat, named_groups
-from taichi_ants.studies.runner import ColonyPoint, RunPoint
-from taichi_ants.studies.sweep import MEASURES
+from taichi_ants.studies.points import ColonyPoint, RunPoint
+from taichi_ants.studies.sweep_file import MEASURES
 from taichi_ants.task import Task, observations
 from taichi_ants.worlds.registry import BUILT_IN as WORLDS
 

@@ -13,7 +13,8 @@ from taichi_ants import AntsError, TrainingConfig, files, learners, worlds
 from taichi_ants.protocol import At
 from taichi_ants.report.odd import RULES, Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
-from taichi_ants.studies.runner import ColonyPoint, RunPoint, Study
+from taichi_ants.studies.points import ColonyPoint, RunPoint
+from taichi_ants.studies.runner import Study
 from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.task import Field, Food, Pheromone, Task, foraging, queueing
 from taichi_ants.task.choice import Choice
@@ -195,7 +196,7 @@ def test_one_ant_and_its_learner_are_described():
 
 
 def test_events_and_fixed_policies_are_described():
-    from taichi_ants.studies.runner import FixedPolicy
+    from taichi_ants.studies.points import FixedPolicy
 
     policy = FixedPolicy.named("random", Task())
     point = ColonyPoint(

@@ -24,7 +24,8 @@ from taichi_ants import Task, files
 from taichi_ants.analysis.bounds import baselines
 from taichi_ants.files.results import ResultFolder
 from taichi_ants.report import results
-from taichi_ants.studies import colony_study, result_folder, runner
+from taichi_ants.studies import colony_study, result_folder
+from taichi_ants.studies.points import ColonyPoint, RunPoint
 
 KILLED, WENT_ON = 77, 78  # exit statuses
 
@@ -32,7 +33,7 @@ KILLED, WENT_ON = 77, 78  # exit statuses
 def remember(patch: pytest.MonkeyPatch) -> None:
     """Cache the results of the engines, and remove times from results."""
     for owner, name in (
-        *((runner.RunPoint, "do"), (runner.ColonyPoint, "do"), (results, "what_policies_do")),
+        *((RunPoint, "do"), (ColonyPoint, "do"), (results, "what_policies_do")),
         *((baselines, "bound_rows"), (baselines, "policy_rows")),
         *((colony_study, "_drawn"), (colony_study, "limits_of")),
     ):
