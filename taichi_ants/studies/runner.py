@@ -243,15 +243,12 @@ class Study(Generic[PointKind]):
         The other arguments are those of `in_blocks`.
         """
         saved = Blocks(folder)
-        missing = runs & self.share(*shard) & ~self._has(saved, array)
+        rows = zip(self.keys, self.names, strict=True)
+        has = np.array([[saved.has(key, name, array) for name in names] for key, names in rows])
+        missing = runs & self.share(*shard) & ~has
         total = max(self.weights[missing].sum(), 1.0)
         for _ in self._computed(saved, missing, total, progress, **how):
             pass
-
-    def _has(self, saved: Blocks, array: str) -> np.ndarray:
-        """Return whether there is a block with an array for each run, bool as `weights`."""
-        rows = zip(self.keys, self.names, strict=True)
-        return np.array([[saved.has(key, name, array) for name in names] for key, names in rows])
 
     def _computed(
         self,
@@ -339,7 +336,8 @@ class Study(Generic[PointKind]):
             if failed and not succeeded:
                 raise next(iter(failed.values()))
         if failed:
-            raise self._failure(failed)
+            said = [f"{self.named(piece)} ({_said(error)})" for piece, error in failed.items()]
+            raise FailedBlocksError(said)
 
     def _saved(self, saved: Blocks) -> Iterator[Block]:
         """Yield the finished blocks of this study."""
@@ -387,11 +385,6 @@ class Study(Generic[PointKind]):
         saved = Blocks(folder)
         for place in sorted(set(points)):
             yield place, saved.read(self.keys[place], self.names[place], array)
-
-    def _failure(self, failed: Mapping[Piece, Exception]) -> FailedBlocksError:
-        return FailedBlocksError(
-            [f"{self.named(piece)} ({_said(error)})" for piece, error in failed.items()]
-        )
 
     def named(self, piece: Piece) -> str:
         """Return the settings of a block that are not those of all points, and its seeds."""

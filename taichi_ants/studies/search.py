@@ -174,8 +174,8 @@ class Search:
                     part = self._part(self.base.point(row, {}), at)
                     outcome = {f"{VALUE}{n}": array[None, at] for n, array in values.items()}
                     Blocks(place).add(part.keys, part.names[0], outcome)
-            states = {COMPLETE: COMPLETE, "pruned": PRUNED, "fail": FAILED}
-            self._tell(study, trial, Trial(row, states[one.state.name.lower()], values))
+            state = FAILED if one.state.name == "FAIL" else one.state.name.lower()
+            self._tell(study, trial, Trial(row, state, values))
 
     @staticmethod
     def _place(blocks: Path, number: int, at: slice) -> Path:
@@ -210,11 +210,11 @@ class Search:
             warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
             study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True)
         trial = study.ask({name: _distribution(axis) for name, axis in self.axes.items()})
-        return trial, {
-            name: trial.params[name] if isinstance(axis, Range) else _labels(axis)[chosen]
-            for name, axis in self.axes.items()
-            for chosen in (trial.params[name],)
-        }
+        row = dict(trial.params)
+        for name, axis in self.axes.items():
+            if not isinstance(axis, Range):
+                row[name] = _labels(axis)[row[name]]
+        return trial, {name: row[name] for name in self.axes}
 
     def _tried(
         self, trial: optuna.Trial, row: Settings, blocks: Path, part: Any, where: dict[str, Any]

@@ -263,13 +263,13 @@ class Sweep:
             sensitivity.draw(path, indices, words, values.shape[1])
 
 
-def read_sweep(path: Path, text: str | None = None) -> Sweep:
-    """Return the sweep of a file, or of its text.
+def read_sweep(path: Path) -> Sweep:
+    """Return the sweep of a file.
 
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
-    with contents(path, text) as file:
+    with contents(path) as file:
         return sweep_of(file)
 
 

@@ -228,7 +228,7 @@ def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
                 )
         if name in _OF_FILE:
             raise AntsError(f"{name} cannot vary; move it from [vary] to the top of the file.")
-        declaration = _declaration(kind, name, fixed)
+        declaration = _declaration(name, fixed)
         if isinstance(values, dict):
             whole = declaration.kind is int if declaration else name in _whole_numbers(kind)
             axes[name] = axis = Range.of(name, values, whole)
@@ -257,7 +257,7 @@ def _check_amounts(name: str, values: Sequence[Any]) -> None:
         )
 
 
-def _declaration(kind: str, name: str, fixed: Settings) -> Setting | None:
+def _declaration(name: str, fixed: Settings) -> Setting | None:
     """Return the declaration of a setting; None if it is not in the task, training or world."""
     preset = fixed.get("world.preset", "paper")
     of_world = worlds.settings_of(preset) if preset in worlds.names() else ()
