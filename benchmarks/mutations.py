@@ -391,7 +391,7 @@ MUTATIONS = [
     ("files/inputs.py", "return _copies.get(os.fspath(path), path)", "return path", ARCHIVE),
     ("report/odd.py", "if one not in found:", "if not found:", ODD),
     ("report/odd.py", "all(value == usual for value in values)", "values[0] == usual", ODD),
-    ("report/odd_rules.py", "{level} - {slope} · a", "{level} - {cap} · a", ODD),
+    ("report/odd_rules.toml", "{level} - {slope} · a", "{level} - {cap} · a", ODD),
 ]
 
 

@@ -41,7 +41,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
         run_command,
         whole_number,
     )
-    from taichi_ants.studies.runner import EVALUATION_SEEDS
+    from taichi_ants.studies.points import EVALUATION_SEEDS
 
     if TYPE_CHECKING:
         from taichi_ants.engines.colony.colony import ColonyEpisodes

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.sweeps import Settings, report, short
+from taichi_ants.analysis.sweeps import Settings, are_numbers, report, short
 from taichi_ants.analysis.tables import sentence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_ROWS = 10  # in the report
-_COLUMNS = 4  # panels in a row of the figure
+COLUMNS = 4  # panels in a row of the figure
 _PARTS = 8  # of a range, each with a mean
 
 
@@ -47,10 +47,10 @@ def draw(
         AntsError: The file (.png) cannot be written.
     """
     means = values.mean(axis=1)
-    rows = -(-len(names) // _COLUMNS)
+    rows = -(-len(names) // COLUMNS)
     with style.styled():
         figure = style.new_figure(1.2 + 2.0 * rows)
-        panels = figure.subplots(rows, min(_COLUMNS, len(names)), sharey=True, squeeze=False)
+        panels = figure.subplots(rows, min(COLUMNS, len(names)), sharey=True, squeeze=False)
         for axes in panels.flat[len(names) :]:
             axes.set_visible(False)
         for axes, name in zip(panels.flat, names, strict=False):
@@ -93,8 +93,3 @@ def panel(axes: Axes, places: Sequence[Any], means: np.ndarray, logarithmic: boo
 def dots(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
     """Draw dots at (x, y), both float64 (P,); many of them are small."""
     axes.scatter(x, y, s=6 if len(x) > 200 else 14, color=style.SKY, alpha=0.6, linewidths=0)
-
-
-def are_numbers(places: Sequence[Any]) -> bool:
-    """Return whether all values of a setting are numbers, not flags."""
-    return all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in places)

@@ -175,6 +175,12 @@ def seeds_in_words(seeds: int) -> str:
     return count(seeds, "seed") + (", too few for a verdict" if seeds < LEAST_SEEDS else "")
 
 
+def means_in_words(seeds: int) -> str:
+    """Return "Means over 20 seeds with 95 % intervals", for example, for captions."""
+    few = f" (too few for these: use {LEAST_SEEDS} or more)" if seeds < LEAST_SEEDS else ""
+    return f"Means over {seeds} seeds with 95 % intervals{few}" if seeds > 1 else "One seed"
+
+
 def weakest(findings: Sequence[Finding]) -> Finding:
     """Return the finding with the strongest objection; its `by_mean` is chosen in the same way."""
     first = min(findings, key=_strength)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.findings import LEAST_SEEDS
+from taichi_ants.analysis.findings import means_in_words
 from taichi_ants.analysis.statistics import RESAMPLES, bootstrap_interval
 from taichi_ants.analysis.tables import Table, plain_text, sentence
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
@@ -205,7 +205,8 @@ def plot(
             f"the result has {len(table.groups)} configurations; a figure shows at most "
             f"{_MOST_LINES}, so plot the columns of to_pandas()."
         )
-    across = _TICKS if _has_series(table) else _EPISODES
+    # An episode of a seed has several rows if there are series.
+    across = _EPISODES if last_rows(table).all() else _TICKS
     with style.styled():
         figure = style.new_figure(1.2 + 1.8 * len(names))
         panels = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
@@ -223,9 +224,7 @@ def plot(
         panels[-1].set_xlabel(sentence(across))
         several = len(table.groups) > 1
         entries = style.legend_entries([panels[0]]) if several else {}
-        n = len(table.seeds)
-        few = f" (too few for these: use {LEAST_SEEDS} or more)" if n < LEAST_SEEDS else ""
-        caption = f"Means over {n} seeds with 95 % intervals{few}." if n > 1 else "One seed."
+        caption = f"{means_in_words(len(table.seeds))}."
         style.frame(figure, f"Measures by {across}", caption, entries)
     if path is not None:
         style.save(figure, Path(path))
@@ -314,11 +313,6 @@ def curves(table: Measured, measure: str, across: str) -> Iterator[tuple[np.ndar
                 sums[begin:end, seed] += value
                 counts[begin:end, seed] += 1
         yield x, np.divide(sums, counts, out=np.full(sums.shape, math.nan), where=counts > 0)
-
-
-def _has_series(table: Measured) -> bool:
-    """Return whether an episode of a seed has several rows."""
-    return not bool(last_rows(table).all())
 
 
 def _means(values: np.ndarray, resamples: int = RESAMPLES) -> tuple[np.ndarray, ...]:

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.analysis import designs, style
+from taichi_ants.analysis.designs import COLUMNS
 from taichi_ants.analysis.statistics import bootstrap_interval
-from taichi_ants.analysis.sweeps import Settings, short
+from taichi_ants.analysis.sweeps import Settings, are_numbers, short
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence, tally
 
-_COLUMNS = 4  # panels in a row of the figure
 _WIDTH = 120
 
 
@@ -81,11 +81,11 @@ def draw(
     pruned = [row for row in rows if row["state"] == "pruned"]
     means = np.array([row[column] for row in done])
     best = np.maximum.accumulate(means) if maximises else np.minimum.accumulate(means)
-    lines = -(-len(names) // _COLUMNS)
+    lines = -(-len(names) // COLUMNS)
     with style.styled():
         figure = style.new_figure(3.4 + 2.0 * lines)
         heights = [1.3] + [1.0] * lines
-        grid = figure.add_gridspec(1 + lines, min(_COLUMNS, len(names)), height_ratios=heights)
+        grid = figure.add_gridspec(1 + lines, min(COLUMNS, len(names)), height_ratios=heights)
         history = figure.add_subplot(grid[0, :])
         history.scatter(
             *_places(pruned, column), marker="x", s=14, color=style.GREY, label="Pruned trial"
@@ -98,9 +98,9 @@ def draw(
         history.set(xlabel="trial", ylabel=words)
         chosen = done[int(np.argmax(means) if maximises else np.argmin(means))]
         for number, name in enumerate(names):
-            axes = figure.add_subplot(grid[1 + number // _COLUMNS, number % _COLUMNS])
+            axes = figure.add_subplot(grid[1 + number // COLUMNS, number % COLUMNS])
             places = [row[name] for row in done]
-            if designs.are_numbers(places):
+            if are_numbers(places):
                 left_out = [row[name] for row in pruned], [row[column] for row in pruned]
                 axes.scatter(*left_out, marker="x", s=14, color=style.GREY, linewidths=0.8)
                 axes.scatter(places, means, s=14, color=style.BLUE)
@@ -110,7 +110,7 @@ def draw(
             else:
                 designs.panel(axes, places, means, False)
             axes.set_xlabel(short(name, names))
-            if number % _COLUMNS == 0:
+            if number % COLUMNS == 0:
                 axes.set_ylabel(words)
         caption = (
             "Below: the same trials against each setting. A pruned trial has run with fewer seeds."

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.findings import LEAST_SEEDS
+from taichi_ants.analysis.findings import means_in_words
 from taichi_ants.analysis.statistics import Estimator, bootstrap_interval, estimates
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
@@ -84,7 +84,7 @@ def report(
         other = f"{short(against[0], names)} {_shown(against[1])}"
         headers.append(f"{next(iter(values))} against {other}")
         lines = [[*line, note] for line, note in zip(lines, notes, strict=True)]
-    title = _spread(next(iter(values.values())))
+    title = means_in_words(next(iter(values.values())).shape[1])
     return plain_text([Table(title, headers, lines, text_columns=len(headers))], _TERMINAL)
 
 
@@ -110,7 +110,7 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
         axes = figure.subplots()
         draw_lines(axes, lines)
         axes.set(xlabel=names[0], ylabel=words)
-        caption = ", ".join([_spread(values), *alike])
+        caption = ", ".join([means_in_words(values.shape[1]), *alike])
         style.frame(figure, sentence(words), f"{caption}.", style.legend_entries([axes]))
     style.save(figure, path)
 
@@ -121,7 +121,7 @@ def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> No
     If any x is not a number, the points of a label are not joined by a line.
     """
     places = [place for points in lines.values() for place, *_ in points]
-    numbers = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in places)
+    numbers = are_numbers(places)
     ticks = list(dict.fromkeys(map(_shown, places)))
     looks = zip(itertools.cycle(style.COLOURS), itertools.cycle(_MARKERS), strict=False)
     aside = np.linspace(-0.3, 0.3, len(lines)) if len(lines) > 1 else [0.0]
@@ -150,10 +150,9 @@ def _far_apart(numbers: Sequence[float]) -> bool:
     return min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
 
 
-def _spread(values: np.ndarray) -> str:
-    seeds = values.shape[1]
-    few = f" (too few for these: use {LEAST_SEEDS} or more)" if seeds < LEAST_SEEDS else ""
-    return f"Means over {seeds} seeds with 95 % intervals{few}" if seeds > 1 else "One seed"
+def are_numbers(places: Sequence[Any]) -> bool:
+    """Return whether all values of a setting are numbers, not flags."""
+    return all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in places)
 
 
 def short(name: str, names: Sequence[str]) -> str:

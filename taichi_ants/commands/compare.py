@@ -36,7 +36,8 @@ from taichi_ants.task import Task
 
 if TYPE_CHECKING:
     from taichi_ants import World
-    from taichi_ants.studies.runner import RunPoint, Study
+    from taichi_ants.studies.points import RunPoint
+    from taichi_ants.studies.runner import Study
 
 DELIVERIES = ("truncates", "terminates")
 ROLLOUTS = 50
@@ -106,7 +107,7 @@ def variants(settings: argparse.Namespace) -> list[tuple[str, dict[str, Any]]]:
 
 def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
     """Return the points of the grid: tasks and learners with all combinations of settings."""
-    from taichi_ants.studies.runner import RunPoint
+    from taichi_ants.studies.points import RunPoint
 
     deliveries = DELIVERIES if settings.delivery == "both" else (settings.delivery,)
     given = given_settings(settings).get("task", {})

@@ -45,7 +45,7 @@ def reproduce(settings: argparse.Namespace) -> None:
         raise AntsError(f"{str(out)!r} has finished results; choose another --out.")
     with bundles.reading(settings.file) as bundle:
         manifest = reproduction.manifest_of(bundle)
-        if plugins := reproduction.plugins_of(bundle, manifest):
+        if plugins := reproduction.plugins_of(manifest):
             words = reproduction.plugins_in_words(bundle, plugins)
             if not settings.trust_plugins:
                 raise AntsError(

@@ -119,6 +119,12 @@ def to_json(value: Any, indent: int | None = None) -> str:
     return json.dumps(value, indent=indent, ensure_ascii=False, default=_plain)
 
 
+def checksum_of_json(value: Any) -> str:
+    """Return the hexadecimal SHA-256 of a value as `to_json` writes it, with sorted keys."""
+    plain = json.loads(to_json(value))
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()

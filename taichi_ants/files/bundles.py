@@ -47,7 +47,7 @@ def write(path: Path, contents: Mapping[str, Path | str], facts: Mapping[str, An
             for name, content in sorted(contents.items()):
                 listed[name] = _write_file(archive, name, content)
             index = {"kind": _KIND, "format": _FORMAT, **facts, "files": listed}
-            index["checksum"] = _checksum(index)
+            index["checksum"] = files.checksum_of_json(index)
             with archive.open(_entry(INDEX), "w") as entry:
                 entry.write(files.to_json(index, indent=2).encode())
 
@@ -81,11 +81,6 @@ def _entry(name: str) -> zipfile.ZipInfo:
     entry.compress_type, entry.create_system = zipfile.ZIP_DEFLATED, 3
     entry.external_attr = (stat.S_IFREG | 0o644) << 16
     return entry
-
-
-def _checksum(index: Mapping[str, Any]) -> str:
-    plain = json.loads(files.to_json({k: v for k, v in index.items() if k != "checksum"}))
-    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()
 
 
 class Bundle:
@@ -138,7 +133,7 @@ class Bundle:
                 f"{shown(index['kind'])}, and only format {_FORMAT} of {_KIND!r} can be read; use "
                 "the version of the package that wrote it."
             )
-        if index["checksum"] != _checksum(index):
+        if index.pop("checksum") != files.checksum_of_json(index):
             raise ValueError("the index differs from its checksum")
         return index
 

@@ -145,7 +145,7 @@ class ResultFolder:
                 self._clear()
             for folder in (self._blocks, self._ready):
                 files.check_writable_folder(folder, self.path)
-            self.seconds_before = self._seconds_so_far()
+            self.seconds_before = seconds_of(self._unfinished)
             with tempfile.TemporaryDirectory(dir=self._ready) as name:
                 ready = Path(name)
                 contents = {"settings": self._settings, "seconds": self.seconds_before}
@@ -206,10 +206,6 @@ class ResultFolder:
         if not (self._unfinished / MANIFEST).exists():
             self._clear()
 
-    def _seconds_so_far(self) -> float:
-        """Return the time that all processes have worked here, including killed ones."""
-        return seconds_of(self._unfinished)
-
     def _clear(self) -> None:
         """Remove the files of this class in `unfinished`, and the folder if it is then empty."""
         if not self._unfinished.is_dir():
@@ -248,7 +244,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Return the contents of the manifest in a folder; AntsError if it is damaged."""
     try:
         manifest = json.loads(files.read_text(folder / MANIFEST))
-        if manifest.pop("checksum") != _checksum_of_manifest(manifest):
+        if manifest.pop("checksum") != files.checksum_of_json(manifest):
             raise ValueError("the checksum differs")
         return manifest
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
@@ -260,14 +256,9 @@ def read_manifest(folder: Path) -> dict[str, Any]:
 
 def _write_manifest(contents: Mapping[str, Any], folder: Path) -> Path:
     """Write a manifest with its own checksum into a folder; return its path."""
-    plain = json.loads(files.to_json(contents))
-    text = files.to_json({**plain, "checksum": _checksum_of_manifest(plain)}, indent=2)
+    text = files.to_json({**contents, "checksum": files.checksum_of_json(contents)}, indent=2)
     files.write_text(folder / MANIFEST, text + "\n")
     return folder / MANIFEST
-
-
-def _checksum_of_manifest(manifest: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(manifest, sort_keys=True).encode()).hexdigest()
 
 
 def checksum_of(path: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -145,12 +144,12 @@ def checked_measure(table: Measured, name: object) -> np.ndarray:
 
 def last_rows(table: Measured) -> np.ndarray:
     """Return whether each row is the last one of its configuration, seed and episode, bool (R,)."""
-    ticks, last = table.index["tick"].tolist(), dict[tuple, float]()
-    keys = list(zip(table.of_group.tolist(), table.of_seed.tolist(),
-                    table.index["episode"].tolist(), strict=True))  # fmt: skip
-    for key, tick in zip(keys, ticks, strict=True):
-        last[key] = max(tick, last.get(key, -math.inf))
-    return np.array([last[key] == tick for key, tick in zip(keys, ticks, strict=True)], bool)
+    ticks = table.index["tick"]
+    episodes = np.stack([table.of_group, table.of_seed, table.index["episode"]])
+    _, which = np.unique(episodes, axis=1, return_inverse=True)
+    last = np.zeros(len(ticks), ticks.dtype)
+    np.maximum.at(last, which.ravel(), ticks)
+    return ticks == last[which.ravel()]
 
 
 def _presentation() -> Any:

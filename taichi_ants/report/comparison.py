@@ -24,7 +24,8 @@ from taichi_ants.errors import count
 from taichi_ants.learners.policies import load_policy
 from taichi_ants.rendering import Episode, policy_sheet
 from taichi_ants.report.page import Picture, Player, Shown, Statement, Statements, fill
-from taichi_ants.studies.runner import RunPoint, Study
+from taichi_ants.studies.points import RunPoint
+from taichi_ants.studies.runner import Study
 from taichi_ants.task import Task
 from taichi_ants.viewer import record_episode
 

@@ -34,7 +34,7 @@ _SHOWN_PACKAGES = ("taichi_ants", "taichi", "numpy", "scipy", "matplotlib")
 _LETTERS = 58  # characters of a line as wide as the drawing
 
 
-def _text(name: str) -> str:
+def text_of(name: str) -> str:
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
@@ -43,7 +43,7 @@ def _templates() -> Environment:
     from jinja2 import Environment, FunctionLoader, StrictUndefined
 
     how: dict[str, Any] = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
-    loader = FunctionLoader(_text)
+    loader = FunctionLoader(text_of)
     return Environment(loader=loader, finalize=signed, undefined=StrictUndefined, **how)
 
 
@@ -58,8 +58,8 @@ def fill(template: str, **parts: Any) -> str:
     from markupsafe import Markup
 
     shared = {
-        "style": part("colours.css") + _text("report.css"),
-        "script": "\n".join([*map(part, _PLAYING), _text("report.js")]),
+        "style": part("colours.css") + text_of("report.css"),
+        "script": "\n".join([*map(part, _PLAYING), text_of("report.js")]),
     }
     shared["policy"] = content_policy(f"\n{shared['script']}\n", f"\n{shared['style']}\n")
     marked = {name: Markup(text) for name, text in shared.items()}

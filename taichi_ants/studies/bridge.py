@@ -14,7 +14,7 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies.blocks import kept
 from taichi_ants.studies.colony_study import scheduled
-from taichi_ants.studies.runner import ColonyPoint, settings_of
+from taichi_ants.studies.points import ColonyPoint, settings_of
 from taichi_ants.task import Life, Task, foraging, queueing
 from taichi_ants.task.constants import EMPTY, OBSTACLE
 from taichi_ants.worlds import double_bridge

@@ -26,8 +26,9 @@ from taichi_ants.errors import AntsError, check_one_of
 from taichi_ants.files.results import REPORT
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import save_policy
-from taichi_ants.studies.blocks import Blocks
-from taichi_ants.studies.runner import VALUE, ColonyPoint, Outcome, Progress, Study
+from taichi_ants.studies.blocks import Blocks, Outcome
+from taichi_ants.studies.points import ColonyPoint, Progress
+from taichi_ants.studies.runner import VALUE, Study
 from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
 from taichi_ants.worlds.world import World
 

@@ -185,7 +185,10 @@ class Design:
             )
         shares = self.shares(len(drawn)).tolist()
         fixed = {name: axis.at(0.0) for name, axis in axes.items() if name not in drawn}
-        points = [dict(zip(drawn, map(_at, drawn.values(), row), strict=True)) for row in shares]
+        points = [
+            {name: axis.at(share) for (name, axis), share in zip(drawn.items(), row, strict=True)}
+            for row in shares
+        ]
         return [{name: (fixed | point)[name] for name in axes} for point in points]
 
     def shares(self, dimensions: int) -> np.ndarray:
@@ -245,10 +248,6 @@ def check_installed(module: str, extra: str, what: str) -> None:
             f"{what} requires {module}, which is not installed; install it with pip install "
             f"'taichi-ants[{extra}]'."
         )
-
-
-def _at(axis: Axis, share: float) -> Any:
-    return axis.at(share)
 
 
 def _grid_values(name: str, axis: Axis) -> Sequence[Any]:

@@ -97,7 +97,7 @@ this command with the name of this archive:
 {given and f"{chr(10)}The study has read these files:{chr(10)}{chr(10)}{given}"}"""
 
 
-def plugins_of(bundle: bundles.Bundle, manifest: Mapping[str, Any]) -> list[str]:
+def plugins_of(manifest: Mapping[str, Any]) -> list[str]:
     """Return the names in a bundle of the plugins, which are code that its study runs."""
     path = manifest["asked"]["options"].get("plugin")
     return [RESULTS + manifest["inputs"][path]] if path else []

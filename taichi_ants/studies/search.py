@@ -26,8 +26,10 @@ from taichi_ants.settings import flat, nested, not_a_setting
 from taichi_ants.studies import design, sweep
 from taichi_ants.studies.blocks import Blocks
 from taichi_ants.studies.design import Axis, Range
-from taichi_ants.studies.runner import VALUE, ColonyPoint, Progress, Study
-from taichi_ants.studies.sweep import Base, Settings, Sweep
+from taichi_ants.studies.points import ColonyPoint, Progress
+from taichi_ants.studies.runner import VALUE, Study
+from taichi_ants.studies.sweep import Sweep
+from taichi_ants.studies.sweep_file import Base, Settings, axes_of, contents, measure_of
 
 if TYPE_CHECKING:
     import optuna
@@ -172,8 +174,8 @@ class Search:
                     part = self._part(self.base.point(row, {}), at)
                     outcome = {f"{VALUE}{n}": array[None, at] for n, array in values.items()}
                     Blocks(place).add(part.keys, part.names[0], outcome)
-            states = {COMPLETE: COMPLETE, "pruned": PRUNED, "fail": FAILED}
-            self._tell(study, trial, Trial(row, states[one.state.name.lower()], values))
+            state = FAILED if one.state.name == "FAIL" else one.state.name.lower()
+            self._tell(study, trial, Trial(row, state, values))
 
     @staticmethod
     def _place(blocks: Path, number: int, at: slice) -> Path:
@@ -208,11 +210,11 @@ class Search:
             warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
             study.sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True)
         trial = study.ask({name: _distribution(axis) for name, axis in self.axes.items()})
-        return trial, {
-            name: trial.params[name] if isinstance(axis, Range) else _labels(axis)[chosen]
-            for name, axis in self.axes.items()
-            for chosen in (trial.params[name],)
-        }
+        row = dict(trial.params)
+        for name, axis in self.axes.items():
+            if not isinstance(axis, Range):
+                row[name] = _labels(axis)[row[name]]
+        return trial, {name: row[name] for name in self.axes}
 
     def _tried(
         self, trial: optuna.Trial, row: Settings, blocks: Path, part: Any, where: dict[str, Any]
@@ -288,7 +290,7 @@ class Search:
         self._store(found.study, folder / STORAGE)
         files.write_text(folder / REPORT, self._report(found, rows))
         if draws:
-            words = sweep.measure_of(self.base.kind, self.measure).words
+            words = measure_of(self.base.kind, self.measure).words
             names, logs = list(design.varying(self.axes)), design.logarithmic(self.axes)
             path = folder / sweep.FIGURES / "search.png"
             files.check_writable_folder(path.parent)
@@ -335,7 +337,7 @@ def read(path: Path, text: str | None = None) -> Sweep | Search:
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
-    with sweep.contents(path, text) as file:
+    with contents(path, text) as file:
         return Search.of(file) if "search" in file else sweep.sweep_of(file)
 
 
@@ -365,7 +367,7 @@ def _axes(own: Settings, base: Base) -> dict[str, Axis]:
     table = own.get("vary", {})
     names = {name for name, _ in design.axes_of(table)} if isinstance(table, dict) else set()
     fixed = {name: value for name, value in base.fixed.items() if name not in names}
-    axes = sweep.axes_of(base.kind, table, fixed)
+    axes = axes_of(base.kind, table, fixed)
     for name, axis in axes.items():
         if isinstance(axis, Range) and axis.steps:
             raise AntsError(f"{name}.steps is {axis.steps}, but is for grids; leave it out.")

@@ -20,7 +20,7 @@ from command_lines import (
 )
 
 from taichi_ants.files import archives
-from taichi_ants.studies import runner
+from taichi_ants.studies.points import ColonyPoint, RunPoint
 from taichi_ants.studies.state import state
 
 RUNS = """
@@ -83,7 +83,7 @@ FEWER = {
 @pytest.fixture
 def sweep(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for kind in (runner.RunPoint, runner.ColonyPoint):
+    for kind in (RunPoint, ColonyPoint):
         monkeypatch.setattr(kind, "runs_of_a_block", 3)
 
     def called(text, out, *more):
@@ -97,7 +97,7 @@ def sweep(tmp_path, capsys, monkeypatch):
 def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypatch):
     assert sweep(SWEEPS[kind], "plain")[0] == 0
     assert sweep(FEWER[kind], "grown")[0] == 0
-    owner = runner.ColonyPoint if kind == "colony" else runner.RunPoint
+    owner = ColonyPoint if kind == "colony" else RunPoint
     done, real = [], owner.do
 
     def do(points, seeds, *more):
@@ -112,17 +112,17 @@ def test_a_finished_sweep_grows_without_repeating_anything(kind, sweep, monkeypa
 
 def test_unfinished_work_grows_too(sweep, monkeypatch):
     assert sweep(RUNS, "plain")[0] == 0
-    real = runner.RunPoint.do
+    real = RunPoint.do
 
     def stops(points, seeds, *more):
         if 0.2 in (point.training.learning_rate for point in points):
             raise KeyboardInterrupt
         return real(points, seeds, *more)
 
-    monkeypatch.setattr(runner.RunPoint, "do", staticmethod(stops))
+    monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
     fewer = RUNS.replace("[7, 2, 5, 1]", "[7, 2]")
     assert sweep(fewer, "grown")[0] == 130
-    monkeypatch.setattr(runner.RunPoint, "do", staticmethod(real))
+    monkeypatch.setattr(RunPoint, "do", staticmethod(real))
     assert sweep(RUNS, "grown")[0] == 0
     assert_same_results("plain", "grown")
 
@@ -221,7 +221,7 @@ def test_shards_that_do_not_exist_are_refused(shard, sweep):
 
 
 def test_status_and_rows_of_work_in_progress(sweep, capsys, monkeypatch):
-    real, seen = runner.RunPoint.do, []
+    real, seen = RunPoint.do, []
 
     def fails(points, seeds, *more):
         if 0.2 in (point.training.learning_rate for point in points) and 1 in seeds:
@@ -230,7 +230,7 @@ def test_status_and_rows_of_work_in_progress(sweep, capsys, monkeypatch):
         seen[-1] = seen[-1][0], seen[-1][1].read_text() if seen[-1][1].exists() else ""
         return real(points, seeds, *more)
 
-    monkeypatch.setattr(runner.RunPoint, "do", staticmethod(fails))
+    monkeypatch.setattr(RunPoint, "do", staticmethod(fails))
     status, _, err = sweep(RUNS, "a")
     assert status == 1
     assert_one_sentence(err)
@@ -241,7 +241,7 @@ def test_status_and_rows_of_work_in_progress(sweep, capsys, monkeypatch):
     assert status == 0
     assert out.splitlines()[0] == "a"
     assert "unfinished: 19 of 24 runs done (79 % of the work), in 9 blocks" in out
-    monkeypatch.setattr(runner.RunPoint, "do", staticmethod(real))
+    monkeypatch.setattr(RunPoint, "do", staticmethod(real))
     _, out, _ = call("status", ["a"], capsys)
     assert out.count("failed: task.rewards.shaping ") == 2
     assert "22 of 24 runs done" in out

@@ -16,7 +16,7 @@ import pytest
 from command_lines import assert_one_sentence, call, command, contents, environment, load
 
 from taichi_ants.report import results
-from taichi_ants.studies import runner
+from taichi_ants.studies.points import RunPoint
 from taichi_ants.studies.sweep import read_sweep
 
 SWEEP = """
@@ -44,7 +44,7 @@ Usage = namedtuple("Usage", "free")
 
 @pytest.fixture
 def small_blocks(monkeypatch):
-    monkeypatch.setattr(runner.RunPoint, "runs_of_a_block", BLOCK)
+    monkeypatch.setattr(RunPoint, "runs_of_a_block", BLOCK)
 
 
 def sweep_of(seeds, folder):
@@ -104,7 +104,7 @@ def test_blocks_of_any_size_give_the_same(name, size, tmp_path, capsys, monkeypa
     arguments = ["my.toml", "--no-figures"] if name == "sweep" else [*COMPARE, "--seeds", 7]
     found = []
     for runs in (5000, size):
-        monkeypatch.setattr(runner.RunPoint, "runs_of_a_block", runs)
+        monkeypatch.setattr(RunPoint, "runs_of_a_block", runs)
         assert call(name, [*arguments, "--out", "out"], capsys)[0] == 0
         files = contents(Path("out"))
         found.append({n: one for n, one in files.items() if n.endswith((".csv", ".npz", ".txt"))})
@@ -125,9 +125,9 @@ def test_what_is_stopped_goes_on_to_the_same(name, small_blocks, tmp_path, monke
         shutil.copy(path, second)
     damaged = second / done[1].name
     damaged.write_bytes(damaged.read_bytes()[:-100])
-    calls, real = [], runner.RunPoint.do
+    calls, real = [], RunPoint.do
     counted = staticmethod(lambda *given: calls.append(given) or real(*given))
-    monkeypatch.setattr(runner.RunPoint, "do", counted)
+    monkeypatch.setattr(RunPoint, "do", counted)
     found = MEASURED[name](2 * BLOCK, tmp_path)(second)
     blocks = [points for points, *_ in calls if points[0].episodes > 1]  # one compiles kernels
     assert len(blocks) == len(done) - 2

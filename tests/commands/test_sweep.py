@@ -31,7 +31,7 @@ from taichi_ants import (
 )
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies.runner import EVALUATION_SEEDS
+from taichi_ants.studies.points import EVALUATION_SEEDS
 from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.task import foraging, observations, paper
 from taichi_ants.worlds import registry

@@ -12,7 +12,7 @@ from command_lines import assert_one_sentence, call
 from taichi_ants import Colony, TrainingConfig, measures, save_policy, worlds
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.measures import registry
-from taichi_ants.studies.runner import EVALUATION_SEEDS
+from taichi_ants.studies.points import EVALUATION_SEEDS
 from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.task import Pheromone, Task
 

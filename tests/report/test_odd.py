@@ -11,10 +11,10 @@ from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, files, learners, worlds
 from taichi_ants.protocol import At
-from taichi_ants.report import odd_rules
-from taichi_ants.report.odd import Model, described
+from taichi_ants.report.odd import RULES, Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
-from taichi_ants.studies.runner import ColonyPoint, RunPoint, Study
+from taichi_ants.studies.points import ColonyPoint, RunPoint
+from taichi_ants.studies.runner import Study
 from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.task import Field, Food, Pheromone, Task, foraging, queueing
 from taichi_ants.task.choice import Choice
@@ -121,19 +121,19 @@ def test_each_rule_of_the_package_has_a_text():
     words = {one.path: one.words for one in all_of(Task)}
     words |= {one.path: one.words for one in declared(Field)}
     for path, texts in {
-        "task.pheromone.evaporation": odd_rules.EVAPORATION,
-        "task.pheromone.deposit": odd_rules.DEPOSIT,
-        "task.pheromone.view": odd_rules.VIEW,
-        "task.fields.NAME.laid": odd_rules.LAID,
-        "task.choice.rule": odd_rules.CHOICE,
-        "task.delivery": odd_rules.DELIVERY,
-        "task.labour.rule": odd_rules.LABOUR,
+        "task.pheromone.evaporation": RULES["evaporation"],
+        "task.pheromone.deposit": RULES["deposit"],
+        "task.pheromone.view": RULES["view"],
+        "task.fields.NAME.laid": RULES["laid"],
+        "task.choice.rule": RULES["choice"],
+        "task.delivery": RULES["delivery"],
+        "task.labour.rule": RULES["labour"],
     }.items():
         assert {*texts} >= {*words[path]}, path
     traffic = {one.name for one in all_of(Task) if one.path.startswith("task.traffic.")}
-    assert {*odd_rules.TRAFFIC} == traffic
-    assert {*odd_rules.LEARNERS} == {*learners.registry.BUILT_IN}
-    assert {*odd_rules.WORLDS} == {*worlds.registry.BUILT_IN}
+    assert {*RULES["traffic"]} == traffic
+    assert {*RULES["learners"]} == {*learners.registry.BUILT_IN}
+    assert {*RULES["worlds"]} == {*worlds.registry.BUILT_IN}
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_one_ant_and_its_learner_are_described():
 
 
 def test_events_and_fixed_policies_are_described():
-    from taichi_ants.studies.runner import FixedPolicy
+    from taichi_ants.studies.points import FixedPolicy
 
     policy = FixedPolicy.named("random", Task())
     point = ColonyPoint(

@@ -12,7 +12,7 @@ import pytest
 from taichi_ants import Task, TrainingConfig
 from taichi_ants.studies import compilation
 from taichi_ants.studies.executors import Work
-from taichi_ants.studies.runner import ColonyPoint, RunPoint
+from taichi_ants.studies.points import ColonyPoint, RunPoint
 from taichi_ants.task import Noise
 from taichi_ants.worlds import open_world, paper
 

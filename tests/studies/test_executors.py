@@ -15,7 +15,8 @@ import pytest
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.studies import executors
 from taichi_ants.studies.executors import TRIES, LocalWorkers, Work, completed, do
-from taichi_ants.studies.runner import ColonyPoint, FailedBlocksError, RunPoint, Study
+from taichi_ants.studies.points import ColonyPoint, RunPoint
+from taichi_ants.studies.runner import FailedBlocksError, Study
 from taichi_ants.task import Life, Task
 from taichi_ants.worlds import open_world, paper
 

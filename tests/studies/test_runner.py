@@ -10,9 +10,10 @@ import pytest
 
 from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, train
 from taichi_ants.files import archives
-from taichi_ants.studies import runner
+from taichi_ants.studies import points as kinds_of_points
+from taichi_ants.studies.points import EVALUATION_SEEDS, ColonyPoint, RunPoint, world_facts
 from taichi_ants.studies.provenance import provenance, source
-from taichi_ants.studies.runner import EVALUATION_SEEDS, ColonyPoint, RunPoint, Study, world_facts
+from taichi_ants.studies.runner import Study
 from taichi_ants.task import Life, Pheromone, Rewards, Task
 from taichi_ants.worlds import World, open_world, paper
 
@@ -35,7 +36,7 @@ NAMES = ("returns", "steps", "deliveries")
 @pytest.fixture(params=[2, 11], ids=["blocks of some seeds", "blocks of some points"])
 def study(request, monkeypatch):
     """Five points and five seeds, in blocks of so many runs at most."""
-    monkeypatch.setattr(runner, "_STEPS_OF_A_BLOCK", request.param * 6 * 80)
+    monkeypatch.setattr(kinds_of_points, "_STEPS_OF_A_BLOCK", request.param * 6 * 80)
     return Study(POINTS, SEEDS)
 
 
@@ -54,7 +55,7 @@ def same(one, other):
 
 def test_blocks_cover_all_runs_once_with_one_task_and_learner_each(study):
     done = []
-    limit = runner._STEPS_OF_A_BLOCK // (6 * 80)
+    limit = kinds_of_points._STEPS_OF_A_BLOCK // (6 * 80)
     for some, at in study.blocks():
         points, seeds = [POINTS[p] for p in some], [SEEDS[s] for s in at]
         assert len(points) * len(seeds) <= limit
@@ -188,8 +189,8 @@ def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
     points = (each, replace(each, ants=4, after=each), replace(one, ants=3, sharing="independent"))
     points += (replace(one, ants=4, episodes=0, after=one), replace(each, pool=WORLDS))
     study, found = Study(points, seeds), []
-    for size in (runner._NUMBERS_OF_A_BLOCK, 8_000):
-        monkeypatch.setattr(runner, "_NUMBERS_OF_A_BLOCK", size)
+    for size in (kinds_of_points._NUMBERS_OF_A_BLOCK, 8_000):
+        monkeypatch.setattr(kinds_of_points, "_NUMBERS_OF_A_BLOCK", size)
         blocks = [[at for some, at in study.blocks() if some[0] == p] for p in range(6)]
         folder = tmp_path / str(size)
         folder.mkdir()
@@ -201,7 +202,7 @@ def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
 
 def test_a_block_of_colonies_is_limited_in_memory(monkeypatch):
     """To a quarter of a gigabyte, but it has one seed at least."""
-    monkeypatch.setattr(runner, "_WORK_OF_A_BLOCK", 1e12)
+    monkeypatch.setattr(kinds_of_points, "_WORK_OF_A_BLOCK", 1e12)
     many = replace(ALONE, world=WORLDS[0], ants=10_000, start="spread")
     assert 100 < many.runs_of_a_block < 1000
     tables = replace(many, sharing="independent")

@@ -22,9 +22,10 @@ from command_lines import assert_one_sentence, load
 
 from taichi_ants import Task, files
 from taichi_ants.analysis.bounds import baselines
-from taichi_ants.files.results import ResultFolder
+from taichi_ants.files import results as result_files
 from taichi_ants.report import results
-from taichi_ants.studies import colony_study, result_folder, runner
+from taichi_ants.studies import colony_study, result_folder
+from taichi_ants.studies.points import ColonyPoint, RunPoint
 
 KILLED, WENT_ON = 77, 78  # exit statuses
 
@@ -32,7 +33,7 @@ KILLED, WENT_ON = 77, 78  # exit statuses
 def remember(patch: pytest.MonkeyPatch) -> None:
     """Cache the results of the engines, and remove times from results."""
     for owner, name in (
-        *((runner.RunPoint, "do"), (runner.ColonyPoint, "do"), (results, "what_policies_do")),
+        *((RunPoint, "do"), (ColonyPoint, "do"), (results, "what_policies_do")),
         *((baselines, "bound_rows"), (baselines, "policy_rows")),
         *((colony_study, "_drawn"), (colony_study, "limits_of")),
     ):
@@ -41,7 +42,7 @@ def remember(patch: pytest.MonkeyPatch) -> None:
     made = result_folder.provenance(["command"])
     patch.setattr(result_folder, "provenance", lambda arguments: made)
     patch.setattr(result_folder, "time", SimpleNamespace(perf_counter=lambda: 0.0))
-    patch.setattr(ResultFolder, "_seconds_so_far", lambda folder: 0.0)
+    patch.setattr(result_files, "seconds_of", lambda folder: 0.0)
 
 
 def _remembered(function: Callable[..., Any]) -> Callable[..., Any]:

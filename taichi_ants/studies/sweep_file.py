@@ -1,0 +1,374 @@
+"""Sweep files: their settings, seeds and measures, checked, and the points that they describe."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from taichi_ants import checks, files, learners, measures, protocol, worlds
+from taichi_ants.analysis.colony import study as of_colonies
+from taichi_ants.analysis.paper import measures as of_runs
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.settings import Setting, all_of, declared, flat, named_groups, nested
+from taichi_ants.studies import design
+from taichi_ants.studies.design import Axis, Choices, Range
+from taichi_ants.studies.points import ColonyPoint, FixedPolicy, Point, RunPoint
+from taichi_ants.task import Task
+from taichi_ants.task.field import TRAIL
+
+KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
+_OF_FILE = (  # keys that are not settings of points
+    *("kind", "seeds", "measures", "measure_every"),
+    *("margin", "against", "vary", "search", *design.KEYS),
+)
+# Attributes of points that are not settings.
+_PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
+_OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
+# Ants that follow a policy do not learn or explore, unless the file says so.
+_WITHOUT_LEARNING = {
+    **{"learner": "q_learning", "learning_rate": 1.0, "discount": 1.0},
+    **{"epsilon": 0.0, "epsilon_decay": 1.0},
+}
+
+Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
+
+
+class Measure(NamedTuple):
+    """A number for each point and seed: its name for readers, and the fewest episodes it needs."""
+
+    words: str
+    episodes: int = 0
+    uses_iqm: bool = False
+
+
+MEASURES = {
+    "runs": {
+        # With fewer than 50 episodes, the comparison uses all of them; a sweep refuses.
+        name: Measure(
+            one.words, of_runs.WINDOW if name.endswith("_last50") else one.episodes, one.uses_iqm
+        )
+        for name, one in of_runs.MEASURES.items()
+    },
+    "colony": {name: Measure(words) for name, words in of_colonies.MEASURES.items()},
+}
+
+
+def measure_of(kind: str, name: str) -> Measure:
+    """Return a measure of this kind; for colonies also a registered one.
+
+    Raises:
+        AntsError: There is no such measure; the message lists all names.
+    """
+    known = MEASURES[kind]
+    if name in known:
+        return known[name]
+    if not isinstance(name, str) or name.partition(".")[0] not in _registered(kind):
+        raise AntsError(f"measures is {shown(name)}; it must be one of {_names_of(kind)}.")
+    one = measures.get(name)
+    words = one.summary or name.replace("_", " ")
+    return Measure(f"{words} ({one.unit})" if one.unit else words)
+
+
+def _registered(kind: str) -> set[str]:
+    """Return the names of registered measures that sweeps of this kind can have."""
+    return set(measures.names()) - {"occupancy"} if kind == "colony" else set()
+
+
+def _names_of(kind: str) -> str:
+    """Return the names of all measures of this kind, for a message."""
+    registered = _registered(kind)
+    names = ", ".join([*MEASURES[kind], *sorted(registered - MEASURES[kind].keys())])
+    return names + (", or the name of a measure of a plugin (--plugin FILE)" if registered else "")
+
+
+@contextmanager
+def contents(path: Path, text: str | None = None) -> Iterator[Settings]:
+    """Yield the contents of a file (.toml), or of its text; errors in the context name the file.
+
+    Raises:
+        AntsError: The file cannot be read.
+    """
+    text = files.read_text(path) if text is None else text
+    try:
+        file = files.tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise AntsError(f"{str(path)!r} is not valid TOML: {error}; correct it.") from error
+    try:
+        yield file
+    except AntsError as error:
+        raise AntsError(f"in {str(path)!r}, {error}") from error
+
+
+class Base(NamedTuple):
+    """The part of a file that does not depend on how its points are chosen.
+
+    Attributes:
+        fixed: The fixed settings by their full names.
+        reading: The arguments of points that are not settings.
+    """
+
+    kind: str
+    measures: tuple[str, ...]
+    seeds: tuple[int, ...]
+    fixed: Settings
+    reading: dict[str, Any]
+
+    @classmethod
+    def of(cls, file: Settings) -> Base:
+        """Return the part of a file; AntsError if a key or value is not allowed."""
+        kind: Any = file.get("kind")
+        if kind is None:
+            raise AntsError(f"kind is missing; write one of {', '.join(KINDS)}.")
+        check_one_of("kind", kind, tuple(KINDS))
+        wanted = as_list(file.get("measures", []))
+        if not wanted:
+            what = "empty" if "measures" in file else "missing"
+            raise AntsError(f"measures is {what}; name one or more of {_names_of(kind)}.")
+        for name in wanted:
+            measure_of(kind, name)
+        _check_once("measures", wanted)
+        for name in protocol.EVENTS:
+            if isinstance(file.get(name), dict):
+                raise AntsError(f"[{name}] is one table; write [[{name}]] in double brackets.")
+        numbered = {
+            name: {str(n): event for n, event in enumerate(events, start=1)}
+            for name, events in file.items()
+            if name in protocol.EVENTS and _are_tables(events)
+        }
+        if numbered and kind != "colony":
+            raise AntsError(f"[[{next(iter(numbered))}]] is for kind 'colony'; leave it out.")
+        file = {**file, **numbered}  # so that [vary] can name the settings of an event: at.1.tick
+        reading = _reading(kind, wanted, file.get("measure_every"))
+        fixed = flat({name: value for name, value in file.items() if name not in _OF_FILE})
+        seeds = file.get("seeds", 10)
+        if not isinstance(seeds, list):
+            seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
+        return cls(kind, tuple(wanted), checks.checked_seeds(seeds), fixed, reading)
+
+    def point(self, row: Settings, built: dict[str, Any]) -> Point:
+        """Return the point of the fixed settings and a row of others.
+
+        Reuses the worlds in `built`, and adds new ones. Raises AntsError if a setting is not
+        allowed, or there are too few episodes for a measure.
+        """
+        point = _point(self.kind, {**self.fixed, **row}, self.seeds, built, self.reading)
+        for name in self.measures:
+            least = measure_of(self.kind, name).episodes
+            if point.episodes < least:
+                raise AntsError(
+                    f"{name} needs {least} episodes; use more or choose another measure."
+                )
+            whole, _, part = name.partition(".")
+            if whole == "entropy" and part and part not in (TRAIL, *point.task.fields):
+                allowed = ", ".join(f"{whole}.{one}" for one in (TRAIL, *point.task.fields))
+                raise AntsError(f"{name!r} is not a part of {whole}; choose one of {allowed}.")
+        return point
+
+
+def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
+    """Return the arguments of points for the registered measures."""
+    registered = tuple(n for n in wanted if n.partition(".")[0] in measures.names())
+    if kind != "colony":
+        if every is not None:
+            raise AntsError(
+                f"measure_every is {shown(every)}, but is for colonies only; leave it out."
+            )
+        return {}
+    if every is None:
+        return {"measures": tuple(name for name in registered if name not in MEASURES[kind])}
+    if not registered:
+        raise AntsError(
+            f"measure_every is {shown(every)}, but no measure has a series; add one of "
+            f"{', '.join(measures.names())} to measures."
+        )
+    return {"measures": registered, "measure_every": checked_whole("measure_every", every)}
+
+
+def _are_tables(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(one, dict) for one in value) and bool(value)
+
+
+def as_list(value: Any) -> list:
+    return value if isinstance(value, list) else [value]
+
+
+def _check_once(name: str, values: list) -> None:
+    for place, value in enumerate(values):
+        if value in values[:place]:
+            raise AntsError(f"{name} has {shown(value)} more than once; remove one of them.")
+
+
+def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
+    """Return the values or ranges of the settings in a [vary] table, by their full names.
+
+    Raises:
+        AntsError: A value or a range is not allowed, or a setting is in `fixed`, too.
+    """
+    if not isinstance(table, dict) or not table:
+        raise AntsError("[vary] is empty; add lists of values of the settings that vary.")
+    given: dict[str, Any] = {}
+    for name, values in design.axes_of(table):
+        if name in given:
+            raise AntsError(f"{name} is in [vary] twice; remove one of them.")
+        given[name] = values
+    axes: dict[str, Axis] = {}
+    for name, values in given.items():
+        if not values:
+            raise AntsError(f"{name} is an empty list; give at least one value.")
+        for one in fixed:  # a group and one of its settings exclude each other, too
+            if f"{one}.".startswith(f"{name}.") or f"{name}.".startswith(f"{one}."):
+                raise AntsError(
+                    f"{name} is in [vary] and {one} in the fixed settings; remove one of them."
+                )
+        if name in _OF_FILE:
+            raise AntsError(f"{name} cannot vary; move it from [vary] to the top of the file.")
+        declaration = _declaration(name, fixed)
+        if isinstance(values, dict):
+            whole = declaration.kind is int if declaration else name in _whole_numbers(kind)
+            axes[name] = axis = Range.of(name, values, whole)
+            values = [axis.low, axis.high]
+        else:
+            if name == "world.ranges" and not all(isinstance(one, list) for one in values):
+                raise AntsError(
+                    f"{name} in [vary] is {shown(values)}, but must be a list of ranges; write "
+                    f"{shown([values])}."
+                )
+            _check_once(name, values)
+            _check_amounts(name, values)
+            axes[name] = Choices(tuple(values))
+        if declaration:
+            for one in values:
+                declaration.checked(one)
+    return axes
+
+
+def _check_amounts(name: str, values: Sequence[Any]) -> None:
+    """Raise AntsError if values mix numbers of ants and shares, such as 0 and 0.5."""
+    if name.endswith(("remove_ants", "add_ants")) and {type(one) for one in values} >= {int, float}:
+        raise AntsError(
+            f"{name} in [vary] is {shown(values)}; a whole number is a number of ants, and others "
+            f"are shares, so vary {name}.number or {name}.share."
+        )
+
+
+def _declaration(name: str, fixed: Settings) -> Setting | None:
+    """Return the declaration of a setting; None if it is not in the task, training or world."""
+    preset = fixed.get("world.preset", "paper")
+    of_world = worlds.settings_of(preset) if preset in worlds.names() else ()
+    known = (*all_of(Task), *declared(TrainingConfig), *of_world)
+    return next((one for one in known if one.path == name), None)
+
+
+def _whole_numbers(kind: str) -> set[str]:
+    """Return the settings of points that are whole numbers."""
+    return {one.name for one in fields(KINDS[kind]) if str(one.type) in ("int", "int | None")}
+
+
+def check_entries(file: Settings, varied: Iterable[str]) -> None:
+    """Raise AntsError if [vary] names a field or a kind of food for which the file has no table."""
+    for group in named_groups(Task):
+        one: Any = file
+        for key in group.path.split("."):
+            one = one.get(key, {}) if isinstance(one, dict) else {}
+        listed = list(one) if isinstance(one, dict) else []
+        for name in sorted(varied):
+            entry = name.removeprefix(f"{group.path}.").partition(".")[0]
+            if name.startswith(f"{group.path}.") and entry not in listed:
+                path, near = f"{group.path}.{entry}", difflib.get_close_matches(entry, listed, 3)
+                choose = f"choose {', '.join(near or listed)}, or " if listed else ""
+                raise AntsError(
+                    f"`{path}` is in [vary], but the file has no table [{path}]; {choose}add it."
+                )
+
+
+def _point(
+    kind: str,
+    settings: Settings,
+    seeds: tuple[int, ...],
+    built: dict[str, Any],
+    reading: Mapping[str, Any],
+) -> Point:
+    """Return the point of some settings; reuse the worlds in `built`, and add new ones.
+
+    `reading` are the arguments of the point that are not settings.
+    """
+    learner = settings.get("training.learner")
+    more = declared(learners.get(str(learner)).hyperparameters) if learner else ()
+    known = [
+        *_own(kind),
+        "task.preset",
+        # A group of settings can be set by a name, if it has names.
+        *(one.path for one in all_of(Task) if not one.is_group or one.has_names),
+        *(one.path for one in (*declared(TrainingConfig), *more)),
+    ]
+    named = "|".join(re.escape(one.path) for one in named_groups(Task)) or "-"
+    settings, events = _without_events(settings)
+    for name in settings:
+        # The world checks its settings, and named groups check theirs.
+        if name not in known and not re.fullmatch(rf"world\.[^.]*|({named})\..*", name):
+            raise AntsError(f"{shown(name)} is not a setting {_rather(name, kind, known)}.")
+    tree = nested(settings)
+    world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
+    preset = task.pop("preset", "paper")
+    check_one_of("task.preset", preset, tuple(Task.named()))
+    rules = Task.named()[preset].but(**task)
+    if "policy" in tree:
+        tree["policy"] = FixedPolicy.named(tree["policy"], rules)
+    if "policy" in tree or (kind == "colony" and not rules.choice.needs_table):
+        training = {**_WITHOUT_LEARNING, **training}
+    for name in _OF_LEARNERS[:5]:  # the others have defaults
+        if name not in training:
+            raise AntsError(f"training.{name} is missing; add it to [training] or [vary].")
+    key = repr(sorted(world.items()))
+    if key not in built:
+        built[key] = _world(kind, world, seeds)
+    if events:
+        tree["protocol"] = protocol.read(events)
+    return KINDS[kind](built[key], rules, TrainingConfig(**training), **tree, **reading)
+
+
+def _without_events(settings: Settings) -> tuple[Settings, dict[str, list[Any]]]:
+    """Return the settings without those of events, and the tables of the events by kind."""
+    own = {k: v for k, v in settings.items() if re.match(r"(at|every|when)\.\d+\.", k)}
+    tables = {
+        kind: [table for _, table in sorted(events.items(), key=lambda one: int(one[0]))]
+        for kind, events in nested(own).items()
+    }
+    return {k: v for k, v in settings.items() if k not in own}, tables
+
+
+def _own(kind: str) -> list[str]:
+    """Return the settings of a kind that do not belong to a part such as the task."""
+    return [field.name for field in fields(KINDS[kind]) if field.name not in _PARTS]
+
+
+def _rather(name: str, kind: str, known: list[str]) -> str:
+    for other in KINDS:
+        if name in _own(other):
+            return f"of kind {kind!r}, but of {other!r}; leave it out"
+    near = [one for one in known if one.endswith(f".{name}")]
+    part = name if any(one.startswith(f"{name}.") for one in known) else name.rpartition(".")[0]
+    if part and part not in _PARTS:
+        near = near or [one for one in known if one.rpartition(".")[0] == part]
+    near = near or difflib.get_close_matches(name, known, 3)
+    near = near or [*_own(kind), *(f"{one}. ..." for one in _PARTS[:3])]
+    return f"of this sweep; choose one of {', '.join(near)}"
+
+
+def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
+    preset, drawn = given.pop("preset", "paper"), "seed" in given
+    first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
+    if checked_flag("world.per_seed", per_seed) and kind == "runs":
+        raise AntsError('world.per_seed is true, but kind is "runs"; leave it out.')
+    if per_seed or drawn:
+        worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
+    if not per_seed:
+        return worlds.build(preset, first, **given)
+    checked_whole("world.seed", first, -(2**62), 2**62)
+    return tuple(worlds.build(preset, first + seed, **given) for seed in seeds)
