@@ -83,7 +83,7 @@ def drawn_cases(kernel, seed, n_worlds):
 def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
     done, refused = Counter(), 0
     several = len(kernel) > 8
-    for seed in range((8 if several else 7) if kernel in QUICK else 20):
+    for seed in range((8 if several else 7) if kernel in QUICK else 12):
         n_worlds = 1 + 2 * (seed % 3 > 0)
         places, task, training, first, rules, protocol = drawn_cases(kernel, seed, n_worlds)
         if several and places[0].n_nests == 1:
