@@ -84,7 +84,8 @@ def peak(measure, folder):
     return most
 
 
-@pytest.mark.parametrize("name", [pytest.param("sweep", marks=pytest.mark.slow), "compare"])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MEASURED)
 def test_memory_does_not_grow_with_the_runs_but_for_what_is_measured(name, small_blocks, tmp_path):
     MEASURED[name](1, tmp_path)(tmp_path)  # imports and compiles
     few, many = (

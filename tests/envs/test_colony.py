@@ -62,11 +62,14 @@ def compare_step(worlds: ColonyWorlds, world: int, plain: ReferenceColony, actio
     [
         {},
         {"observation": "ants", "traffic": "right_of_way", "view": "strongest"},
-        {
-            "observation": "queues",
-            "traffic": "following",
-            "view": "strongest_under_carriers",
-        },
+        pytest.param(
+            {
+                "observation": "queues",
+                "traffic": "following",
+                "view": "strongest_under_carriers",
+            },
+            marks=pytest.mark.slow,
+        ),
         {"noise": NOISE},
     ],
     ids=["paper", "foraging", "queueing", "noise"],

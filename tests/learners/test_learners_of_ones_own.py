@@ -86,7 +86,7 @@ NATURAL = {
 @pytest.mark.parametrize(
     ("like", "td_error"),
     [
-        pytest.param(*one, marks=[pytest.mark.slow] * (one[0] == "q_learning"))
+        pytest.param(*one, marks=[pytest.mark.slow] * (one[0] != "expected_sarsa"))
         for one in NATURAL.items()
     ],
 )

@@ -77,7 +77,7 @@ def test_measures_equal_the_reference(schedule, threads, changes):
     assert min(happened.values()) > 10, happened
 
 
-@pytest.mark.parametrize("schedule", ["by_world", "by_chunk"])
+@pytest.mark.parametrize("schedule", ["by_chunk", pytest.param("by_world", marks=pytest.mark.slow)])
 def test_reading_changes_nothing(schedule):
     for seed in range(3):
         drawn = random_colony(seed, sharing="shared", learner="q_learning", dense=False)

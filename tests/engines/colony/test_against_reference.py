@@ -134,7 +134,7 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK = (0, 1, 7, 10, 11, 13, 14)
+QUICK = (0, 1, 10, 11, 13, 14)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 OPTIMISED = ("dyna_q", "independent", "ants_seen", False)
 MARKED = [
@@ -287,7 +287,7 @@ CASTES = [
     ("dyna_q", "independent", "paper", False, "blocking", "half", 1, True, 1, SOFT),
 ]
 QUICK_CASTES = [
-    one if k < 4 else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(CASTES)
+    one if 0 < k < 4 else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(CASTES)
 ]
 
 
@@ -358,7 +358,7 @@ def levels_seen(world, ant):
     return index
 
 
-@pytest.mark.parametrize("noise", ["misread", ""])
+@pytest.mark.parametrize("noise", ["misread", pytest.param("", marks=pytest.mark.slow)])
 def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
     """Drawn colonies whose ants observe two fields, in every tick."""
     monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
