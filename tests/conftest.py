@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from pathlib import Path
@@ -32,6 +33,12 @@ def pytest_configure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput"):
         # A process killed while Taichi writes kernels leaves its lock, which blocks all others.
         (folder / "taichi_ants" / "kernels" / "ticache.lock").unlink(missing_ok=True)
+
+
+def pytest_collection_finish() -> None:
+    """Exclude what lives until the end from garbage collection: modules, tests, parameters."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

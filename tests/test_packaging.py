@@ -148,11 +148,11 @@ def test_a_command_by_its_name(kernels, tmp_path):
     tiny = [
         *("--seeds", "1", "--episodes", "2", "--max-steps", "30", "--learners", "q_learning"),
         *("--learning-rates", "0.1", "--discounts", "0.9", "--epsilons", "0.3"),
-        *("--epsilon-decays", "0.9", "--delivery", "terminates"),
+        *("--epsilon-decays", "0.9", "--delivery", "terminates", "--no-figures"),
     ]
     done = call(["compare", *tiny], tmp_path, kernels=kernels)
     assert (done.returncode, done.stderr) == (0, "")
     (folder,) = Path(tmp_path, "results").iterdir()
     assert folder.name == "compare"
-    assert (folder / "figures" / "learning_curves.png").exists()
+    assert (folder / "summary.csv").exists()
     assert '"command": "' in (folder / "manifest.json").read_text()

@@ -99,7 +99,9 @@ assert dict(os.environ) == before
     assert not (tmp_path / "kernels").exists()
 
 
-@pytest.mark.parametrize(("age", "keeps_kernels"), [(3600, True), (0, False)])
+@pytest.mark.parametrize(
+    ("age", "keeps_kernels"), [(3600, True), pytest.param(0, False, marks=pytest.mark.slow)]
+)
 def test_a_lock_that_a_killed_process_left_is_removed(tmp_path, age, keeps_kernels):
     folder = tmp_path / "taichi_ants" / "kernels"
     folder.mkdir(parents=True)

@@ -243,16 +243,20 @@ def _try(rule: Rule) -> None:
     try:
         for inputs, parameters in tries(rule):
             result = rule.function(**inputs, **parameters)
+            is_number = isinstance(result, (bool, int, float))
+            whole = is_number and (
+                not kind.is_whole or (math.isfinite(result) and result == math.floor(result))
+            )
+            if whole and kind.least <= result <= kind.most:
+                continue
             shows = ", ".join(f"{k}={v}" for k, v in {**inputs, **parameters}.items())
-            if not isinstance(result, (bool, int, float)):
+            if not is_number:
                 raise ValueError(f"it returns {shown(result)}, which is not a number, for {shows}")
             form = "a whole number" if kind.is_whole else "a number"
-            whole = not kind.is_whole or (math.isfinite(result) and result == math.floor(result))
-            if not (kind.least <= result <= kind.most and whole):
-                raise ValueError(
-                    f"it returns {result} for {shows}, but must return "
-                    f"{kind.result.split(':')[0]}, {form} from {kind.least} to {kind.most}"
-                )
+            raise ValueError(
+                f"it returns {result} for {shows}, but must return "
+                f"{kind.result.split(':')[0]}, {form} from {kind.least} to {kind.most}"
+            )
     except Exception as error:
         said = str(error) if type(error) is ValueError else f"{type(error).__name__}: {error}"
         raise _unusable(rule.name, said) from error

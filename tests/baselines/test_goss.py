@@ -40,13 +40,13 @@ def test_every_choice_equals_the_reference(short: int, long: int, settings: dict
 
 @pytest.mark.parametrize("ratio", PUBLISHED)
 def test_colonies_divide_as_published(ratio: float) -> None:
-    shares = class_shares(choices(*crossing_steps(ratio), 100_000))
+    shares = class_shares(choices(*crossing_steps(ratio), 30_000))
     assert shares.sum() == pytest.approx(100)
     assert np.abs(shares - PUBLISHED[ratio]).max() < 3
 
 
 def test_colonies_stay_on_the_long_branch_if_the_short_one_opens_late() -> None:
-    took = choices(*crossing_steps(LATE_RATIO), 10_000, ants=2000, opens=1000)
+    took = choices(*crossing_steps(LATE_RATIO), 5000, ants=2000, opens=1000)
     assert not took[:, :1000].any()
     assert 0 < took[:, 1000:].mean() < 0.01
     assert np.abs(class_shares(took, 1501, 2000) - PUBLISHED_LATE).max() < 1

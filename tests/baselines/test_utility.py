@@ -21,7 +21,7 @@ WORLDS = {
     "line": lambda: LINE,
     "bridge": lambda: double_bridge(5, 7),
     "paper": worlds.paper,
-    **{f"drawn {n}": lambda n=n: random_world(n) for n in range(12)},
+    **{f"drawn {n}": lambda n=n: random_world(n) for n in range(5)},
 }
 DEFAULTS = {
     **{"ants": 6, "capacity": 10, "discount": 0.9, "evaporation": 0.001},

@@ -24,7 +24,7 @@ def test_memory_of_what_is_known():
 
         return work
 
-    arrays, process = growth.growth(prepare, 50_000, 150_000)
+    arrays, process = growth.growth(prepare, 20_000, 60_000)
     assert arrays == 1024
     assert np.isnan(process) or 1600 < process < 2500
 

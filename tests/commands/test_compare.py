@@ -308,6 +308,7 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
         assert (path.read_bytes() == shown) == (not evaporation)
 
 
+@pytest.mark.long
 def test_one_process_alone_draws_the_same_and_names_what_is_shown(finished, tmp_path, monkeypatch):
     monkeypatch.setattr(worker_process, "available_threads", lambda: 1)
     lines = []

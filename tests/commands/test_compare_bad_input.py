@@ -183,17 +183,6 @@ LEARNERS = {
         "    return reward + lost - value\n",
         ["'mine'", "lost"],
     ),
-    "a vector": (
-        "@ti.func\n"
-        "def error(value, reward, discount, next_values, next_action, epsilon):\n"
-        "    return next_values - value\n",
-        ["'mine'", "returns a vector"],
-    ),
-    "no Taichi function": (
-        "def error(value, reward, discount, next_values, next_action, epsilon):\n"
-        "    return reward - value\n",
-        ["'mine'", "ti.func"],
-    ),
 }
 
 

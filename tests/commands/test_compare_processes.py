@@ -163,6 +163,7 @@ print(late)
 """
 
 
+@pytest.mark.slow
 def test_what_is_prepared_beside_has_all_kernels_that_drawing_needs(kernels, tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", REHEARSED],
@@ -296,6 +297,7 @@ def test_a_learner_from_a_file_of_ones_own(kernels, tmp_path, monkeypatch):
     assert "plugin" in refused.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("script") is None, reason="needs `script` for a terminal")
 def test_progress_on_a_terminal(kernels, tmp_path):
     line = " ".join(command("compare", [*TINY, "--out", "out"]))

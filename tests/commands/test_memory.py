@@ -84,6 +84,7 @@ def peak(measure, folder):
     return most
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MEASURED)
 def test_memory_does_not_grow_with_the_runs_but_for_what_is_measured(name, small_blocks, tmp_path):
     MEASURED[name](1, tmp_path)(tmp_path)  # imports and compiles
@@ -95,8 +96,7 @@ def test_memory_does_not_grow_with_the_runs_but_for_what_is_measured(name, small
     assert of_a_run < 640  # bytes, what Python cleans up now and then included; a table has 2560
 
 
-@pytest.mark.parametrize("name", MEASURED)
-@pytest.mark.parametrize("size", [3, 11])
+@pytest.mark.parametrize(("name", "size"), [("sweep", 11), ("compare", 3)])
 def test_blocks_of_any_size_give_the_same(name, size, tmp_path, capsys, monkeypatch):
     """To the bytes of all files."""
     monkeypatch.chdir(tmp_path)

@@ -45,6 +45,7 @@ def files_in(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.rglob("*"))
 
 
+@pytest.mark.slow
 def test_an_episode_without_display_and_home(tmp_path, policy, kernels) -> None:
     path = tmp_path / "new" / "a.gif"
     shown = ["episode", "--policy", policy, "--size", "400x330", "--out", path]
@@ -221,7 +222,7 @@ def test_mistakes_are_one_sentence(tmp_path, policy, name, run) -> None:
     ("name", "sent", "status"),
     [
         ("a.gif", signal.SIGINT, 130),
-        ("frames", signal.SIGTERM, 143),
+        pytest.param("frames", signal.SIGTERM, 143, marks=pytest.mark.slow),
     ],
 )
 def test_stopped_midway_it_leaves_nothing_behind(

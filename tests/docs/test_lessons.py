@@ -145,8 +145,14 @@ def test_lessons_tell_what_comes_after_a_delivery():
     assert re.search("Dyna-Q +truncates +{'delivers': 40,", counts)
 
 
-@pytest.mark.slow
-@each_lesson
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=pytest.mark.long if path.stem[0] == "3" else pytest.mark.slow)
+        for path in LESSONS
+    ],
+    ids=lambda path: path.stem,
+)
 def test_run_afresh_it_says_the_same(path, kernels, monkeypatch):
     for name, value in environment(kernels).items():
         monkeypatch.setenv(name, value)

@@ -78,7 +78,7 @@ def test_many_ants_equal_single_environments(mode, settings):
     assert_same(first[0], other[0])
     assert_same(first[1], other[1])
     masks, delivered = first[1]["action_mask"], 0
-    for step in range(200):
+    for step in range(100):
         actions = sensible(rng, masks)
         now, then = ours.step(actions), theirs.step(actions)
         for part in range(4):
@@ -93,7 +93,7 @@ def test_many_ants_equal_single_environments(mode, settings):
             assert_same(now[0], then[0], f"reset after {step}")
             assert_same(now[1], then[1], f"reset after {step}")
             masks = np.where(ended[:, None], now[1]["action_mask"], masks)
-    assert delivered > 5
+    assert delivered > 2
 
 
 @pytest.mark.parametrize("observation_format", FORMATS)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pytest
 from command_lines import ROOT
 
 
+@pytest.mark.slow
 def test_the_guides_examples_work(capsys):
     guide = (ROOT / "docs" / "environments.md").read_text("utf-8")
     code = "\n".join(part.split("```")[0] for part in guide.split("```python\n")[1:])

@@ -114,7 +114,7 @@ CASES = {
 }
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     rules=st.sampled_from(list(TASKS)),
     delivery=st.sampled_from(["terminates", "truncates", "continues"]),
@@ -134,7 +134,7 @@ def test_lone_ants_equal_steps(mode, before, lengths, seed, rules, delivery, eva
     compare(make, before, lengths, seed)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(rules=st.sampled_from(list(COLONY_TASKS)), form=st.sampled_from(FORMATS), **CASES)
 def test_colonies_equal_steps(mode, form, before, lengths, seed, rules):
     if COLONY_TASKS[rules].delivery == "terminates":

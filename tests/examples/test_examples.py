@@ -39,6 +39,7 @@ def test_every_example_is_here() -> None:
     assert names == {"q_learning", *NEEDS}
 
 
+@pytest.mark.slow
 def test_q_learning_reaches_the_best_return_in_40_lines(kernels: Path, tmp_path: Path) -> None:
     said = run("q_learning", ["--seeds", 3], kernels, tmp_path)
     assert "1 of 1 seeds reach 45 in 34 steps" in said

@@ -54,12 +54,12 @@ def test_two_nests(tmp_path, monkeypatch):
 def test_colonies_on_a_double_bridge_choose_the_short_branch_and_keep_a_long_one(
     kernels: Path, tmp_path: Path
 ) -> None:
-    done = run("models/double_bridge", ["--seeds", 16, "--out", tmp_path], kernels, tmp_path)
+    done = run("models/double_bridge", ["--seeds", 8, "--out", tmp_path], kernels, tmp_path)
     assert done.returncode == 0, done.stderr
     shares: dict[tuple[str, str], list[float]] = {}
     for row in files.read_csv(tmp_path / "double_bridge.csv"):
         shares.setdefault((row["marks"], row["bridge"]), []).append(row["short_share"])
-    assert [len(several) for several in shares.values()] == [16] * 6
+    assert [len(several) for several in shares.values()] == [8] * 6
     for marks in ("both ways", "on the return"):
         equal, late = (np.array(shares[marks, bridge]) for bridge in ("equal", "short late"))
         assert (abs(equal - 0.5) >= 0.3).mean() >= 0.75  # of colonies, on one of two branches

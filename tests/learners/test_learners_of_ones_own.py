@@ -83,7 +83,13 @@ NATURAL = {
 
 
 @pytest.mark.parametrize("engine", ONE_ENGINE)
-@pytest.mark.parametrize(("like", "td_error"), NATURAL.items())
+@pytest.mark.parametrize(
+    ("like", "td_error"),
+    [
+        pytest.param(*one, marks=[pytest.mark.slow] * (one[0] != "expected_sarsa"))
+        for one in NATURAL.items()
+    ],
+)
 def test_what_is_natural_works(like, td_error, engine):
     """To the bit what the package's own learners do, which equal the reference."""
     model = registry.get(like)
@@ -228,6 +234,8 @@ def of_a_lost_name(value, reward, discount, next_values, next_action, epsilon):
     return lost  # noqa: F821
 
 
+# As the others, and later.
+SLOW = (of_pythons_max, of_a_tuple, of_one_too_low, of_its_own_value, of_an_expression_in_integers)
 REFUSED = [
     (of_a_vector, "returns a vector"),
     (of_pythons_max, "returns a vector (the largest of next_values is next_values.max())"),
@@ -250,7 +258,10 @@ REFUSED = [
 
 @pytest.mark.parametrize(
     ("td_error", "says", "engine"),
-    [(*refused, engine) for refused, engine in zip(REFUSED, cycle(ENGINES), strict=False)],
+    [
+        pytest.param(*refused, engine, marks=[pytest.mark.slow] * (refused[0] in SLOW))
+        for refused, engine in zip(REFUSED, cycle(ENGINES), strict=False)
+    ],
 )
 def test_what_cannot_work_is_refused_and_the_process_lives(td_error, says, engine, capfd):
     register(td_learner("mine", td_error, draws_next_action=True))
@@ -274,7 +285,7 @@ def that_never_ends(value, reward, discount, next_values, next_action, epsilon):
 
 
 def test_one_that_never_ends_is_stopped(monkeypatch):
-    monkeypatch.setattr(plugin_check, "_SECONDS", 2)
+    monkeypatch.setattr(plugin_check, "_SECONDS", 1)
     register(td_learner("mine", that_never_ends))
     with pytest.raises(AntsError, match="'mine' cannot be used: it does not finish within"):
         in_runs()
@@ -502,24 +513,22 @@ def test_values_that_are_not_finite_are_named(td_error):
     )
     with pytest.raises(AntsError, match=named):
         in_runs()
-    for sharing in ("shared", "independent"):
-        with pytest.raises(AntsError, match=named):
-            in_a_colony(sharing=sharing)
+    with pytest.raises(AntsError, match=named):
+        in_a_colony()
     actions = trace_training(paper(), config(), 0, 3).actions  # a trace shows what happens
     assert (actions.min(), actions.max()) == (0, 4)
 
 
 def test_values_that_are_not_finite_are_named_while_a_colony_is_stepped(tmp_path):
     register(td_learner("mine", of_a_logarithm))
-    for sharing in ("shared", "independent"):
-        colony = Colony(paper(), None, config(), ants=5, sharing=sharing)
-        colony.begin_episode()
-        colony.tick(100)
-        path = tmp_path / "colony.npz"
-        named = "^learner 'mine' computed action values that are not finite"
-        with pytest.raises(AntsError, match=named):
-            colony.outcome()
-        with pytest.raises(AntsError, match=named):
-            colony.save(path)
-        assert not path.exists()
-        assert "ticks: 100" in repr(colony)
+    colony = Colony(paper(), None, config(), ants=5, sharing="independent")
+    colony.begin_episode()
+    colony.tick(100)
+    path = tmp_path / "colony.npz"
+    named = "^learner 'mine' computed action values that are not finite"
+    with pytest.raises(AntsError, match=named):
+        colony.outcome()
+    with pytest.raises(AntsError, match=named):
+        colony.save(path)
+    assert not path.exists()
+    assert "ticks: 100" in repr(colony)

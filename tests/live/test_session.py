@@ -57,6 +57,7 @@ SETUPS = {
     ),
     "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
 }
+MARKED = [pytest.param(one, marks=[pytest.mark.slow] * (one == "queueing")) for one in SETUPS]
 
 
 def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
@@ -83,7 +84,7 @@ def edited() -> dict[str, Session]:
     return {name: with_edits(setup, 60) for name, setup in SETUPS.items()}
 
 
-@pytest.mark.parametrize("name", SETUPS)
+@pytest.mark.parametrize("name", MARKED)
 def test_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     session = edited[name]
     assert session.colony.episode > 2 or not session.setup.ticks_per_episode
@@ -97,7 +98,7 @@ def test_edits_are_replayed_to_the_bit(edited, name, tmp_path):
     assert replayed(again.to_bytes()).interventions.state() == session.interventions.state()
 
 
-@pytest.mark.parametrize("name", SETUPS)
+@pytest.mark.parametrize("name", MARKED)
 def test_changes_are_undone_one_by_one(name):
     """Each time the session is as it was before the change, whatever happened since."""
     session, rng, before = Session(SETUPS[name]), np.random.default_rng(7), []
@@ -123,7 +124,7 @@ def test_changes_are_undone_one_by_one(name):
         session.undone()
 
 
-@pytest.mark.parametrize("name", SETUPS)
+@pytest.mark.parametrize("name", MARKED)
 def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeypatch):
     """Undoing takes no tick, however long the session was, and leaves the session as it is."""
     monkeypatch.setattr(session_module, "_BETWEEN", 0.0)
@@ -218,7 +219,7 @@ def test_pieces_of_time_do_not_matter():
     assert one.interventions.state() == other.interventions.state()
 
 
-@pytest.mark.parametrize("name", SETUPS)
+@pytest.mark.parametrize("name", MARKED)
 def test_a_page_that_joins_late_sees_what_the_others_see(name):
     session, rng = Session(SETUPS[name]), np.random.default_rng(4)
     first, late, header = [session.snapshot()], [], session.header()
@@ -523,7 +524,7 @@ def test_wrong_setups_say_why(changes, said):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", SETUPS)
+@pytest.mark.parametrize("name", MARKED)
 def test_setups_are_json(name):
     setup = SETUPS[name]
     facts = json.loads(json.dumps(setup.to_json()))

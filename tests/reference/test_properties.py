@@ -128,7 +128,7 @@ def test_a_run_depends_on_its_seed_alone(seed):
 def test_the_colonies_drawn_here_do_everything():
     """So that the properties above are not true for want of deeds."""
     total, losses = Counter(), 0
-    for seed in range(120):
+    for seed in range(60):
         for _, colony, _ in colonies_of(seed, episodes=1):
             last = colony.record
         total.update(
@@ -138,5 +138,5 @@ def test_the_colonies_drawn_here_do_everything():
             }
         )
         losses += last.blocked > 0
-    assert losses > 40
-    assert min(total[name] for name in ("deliveries", "births", "deaths", "regrown")) > 50
+    assert losses > 20
+    assert min(total[name] for name in ("deliveries", "births", "deaths", "regrown")) > 25

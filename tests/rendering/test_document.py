@@ -17,6 +17,7 @@ def test_there_is_an_example_for_each_file() -> None:
     assert len(EXAMPLES) == len(WRITTEN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("example", "name"), list(zip(EXAMPLES, WRITTEN, strict=False)))
 def test_examples_run_on_their_own(example, name, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -47,7 +47,7 @@ MARKED = [
 def test_every_tick_with_rules_of_users(model):
     changes, arguments = MODELS[model]
     delivered = 0
-    for seed in range(10):
+    for seed in range(6):
         drawn = random_colony(seed, **arguments)
         task = drawn.task.but(**changes, **({} if arguments.get("changes") else {"life": Life()}))
         needs = task.choice.needs_table

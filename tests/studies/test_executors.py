@@ -66,7 +66,11 @@ def folder(path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("study", [COLONIES, RUNS], ids=["colonies", "runs"])
+@pytest.mark.parametrize(
+    "study",
+    [COLONIES, pytest.param(RUNS, marks=pytest.mark.slow)],
+    ids=["colonies", "runs"],
+)
 def test_pickled_blocks_have_the_same_outcomes(study, tmp_path):
     executor, shares = Here(), []
     plain = study.run(folder(tmp_path / "plain"))

@@ -47,6 +47,7 @@ def test_a_table_has_a_line_for_each_condition():
     assert table(rows[:1]).splitlines()[2] == "a     1"
 
 
+@pytest.mark.slow
 def test_the_python_of_the_docs_runs():
     names: dict = {}
     exec("\n".join(re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL)), names)

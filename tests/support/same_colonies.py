@@ -17,30 +17,24 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     of_world = slice(world * colony.capacity, (world + 1) * colony.capacity)
     (slots,) = np.nonzero(colony.living[world])
     assert slots.tolist() == sorted(plain.ants)
-    cells, states = grid.cells(colony.cells[world, slots]).tolist(), colony.states[world]
-    rewards = colony.rewards[world]
-    ants = {name: arrays[name][of_world] for name in colony.columns()}
-    for slot, cell in zip(slots.tolist(), cells, strict=True):
-        ant = plain.ants[slot]
-        mine = {name: column[slot] for name, column in ants.items()}
-        assert tuple(cell) == ant.cell
-        assert (mine["heading"], mine["carries"]) == (ant.heading, ant.carries)
-        assert mine["number"] == ant.number
-        if colony.ants_change:
-            assert mine["age"] == ant.age
-        assert (mine["percept"], states[slot]) == (ant.percept, ant.state)
-        assert int(mine["streams"]) == ant.stream.state
-        assert mine["action"] == ant.action
-        assert mine["event"] == ant.event
-        if ant.action >= 0:
-            assert colony.executed[world, slot] == ant.executed
-            assert rewards[slot] == ant.reward
-        assert colony.nests[world, slot] == ant.nest
-        assert colony.castes[world, slot] == ant.caste
-        assert colony.idle[world, slot] == ant.idle
-        assert colony.thresholds[world, slot] == ant.threshold
-        if colony.n_kinds > 1 and ant.carries:
-            assert mine["kind"] == ant.kind
+    theirs = [plain.ants[slot] for slot in slots.tolist()]
+    mine = {name: arrays[name][of_world][slots].tolist() for name in colony.columns()}
+    assert grid.cells(colony.cells[world, slots]).tolist() == [list(ant.cell) for ant in theirs]
+    for name in ("heading", "carries", "number", "percept", "action", "event"):
+        assert mine[name] == [getattr(ant, name) for ant in theirs], name
+    if colony.ants_change:
+        assert mine["age"] == [ant.age for ant in theirs]
+    assert mine["streams"] == [ant.stream.state for ant in theirs]
+    for name in ("state", "nest", "caste", "idle", "threshold"):
+        column = getattr(colony, f"{name}s" if name != "idle" else name)[world, slots]
+        expected = np.array([getattr(ant, name) for ant in theirs], column.dtype)
+        assert np.array_equal(column, expected), name
+    executed, rewards = colony.executed[world, slots], colony.rewards[world, slots]
+    for action, reward, ant in zip(executed.tolist(), rewards.tolist(), theirs, strict=True):
+        assert ant.action < 0 or (action, reward) == (ant.executed, ant.reward)
+    if colony.n_kinds > 1:
+        for kind, ant in zip(mine["kind"], theirs, strict=True):
+            assert not ant.carries or kind == ant.kind
     existing = np.array(list(plain.world.ground), dtype=np.int64).reshape(-1, 3)
     places = grid.index(existing)
     assert ours.ground[places].tolist() == list(plain.world.ground.values())
@@ -87,7 +81,7 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert food_sources[FoodSourceRow.TAKEN].tolist() == [
         -1 if source.waiting_since is None else source.waiting_since for source in theirs
     ]
-    cells = colony.snapshot(world).grid.cells(food_sources[FoodSourceRow.CELL]).tolist()
+    cells = colony.grid.cells(food_sources[FoodSourceRow.CELL]).tolist()
     assert cells == [list(source.cell) for source in theirs]
     assert food_sources[FoodSourceRow.KIND].tolist() == [source.kind for source in theirs]
     if colony.sharing == "shared" and colony.training.learner == "dyna_q":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import pytest
 from synthetic_colony_study import Truth, build, proportional
 
@@ -31,10 +33,14 @@ ADDS, TRAIL, MORE, TRAINING, ELSEWHERE = QUESTIONS
 
 def answer(question: str, truth: Truth = proportional, **settings: object) -> list[list[str]]:
     """The lines of the table that answers a question, without the world."""
-    study = build(truth, **settings)
-    tables = [table for table in found(*Results.of(study)) if isinstance(table, Table)]
-    (rows,) = [table.rows for table in tables if table.title == question]
+    (rows,) = [table.rows for table in tables(truth, **settings) if table.title == question]
     return [list(row[1:]) for row in rows]
+
+
+@cache
+def tables(truth: Truth, **settings: object) -> list[Table]:
+    """The tables of all questions."""
+    return [one for one in found(*Results.of(build(truth, **settings))) if isinstance(one, Table)]
 
 
 def of_each(each: dict[int, float]) -> Truth:
@@ -42,6 +48,7 @@ def of_each(each: dict[int, float]) -> Truth:
     return lambda rules, regime, ants: each[ants] * ants
 
 
+@cache
 def scaled(factor: float, *, rules: str | None = None, regime: str | None = None) -> Truth:
     """Twenty for each ant, but `factor` times as much for some, from two ants on."""
 

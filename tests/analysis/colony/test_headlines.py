@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import pytest
 from synthetic_colony_study import Truth, build, proportional
 
@@ -10,10 +12,12 @@ from taichi_ants.analysis.colony.tables import Results, headlines, on_one_screen
 from taichi_ants.analysis.tables import plain_text
 
 
+@cache
 def told(truth: Truth = proportional, **settings: object) -> list[list[str]]:
     return [list(row) for row in headlines(*Results.of(build(truth, **settings))).rows]
 
 
+@cache
 def times(factor: float, rules: str, regime: str = JOINT) -> Truth:
     """Twenty for each ant, but so many times as much for one design."""
 

@@ -50,7 +50,7 @@ def two_nests(**options) -> Colony:
     return Colony(WORLD, Task(foods=KINDS), TRAINING, **given)
 
 
-def drawn_nests(sharing: str = "frozen", most: int = 12):
+def drawn_nests(sharing: str = "frozen", most: int = 24):
     """Yield random colonies of two nests and two kinds of food with several loads."""
     for seed in range(most):
         one = random_colony(seed, sharing=sharing, learner="q_learning", dense=False, changes=True)
@@ -101,7 +101,6 @@ def test_loads_are_conserved():
     delivered = regrown = 0
     for drawn in drawn_nests():
         colony = made(drawn)
-        grows = any(food.regrowth is not None for food in drawn.task.foods.values())
         colony.begin_episode()
         start = [loads_of(colony, world) for world in range(2)]
         for _ in range(30):
@@ -110,7 +109,6 @@ def test_loads_are_conserved():
             for world in range(2):
                 there = loads_of(colony, world) + outcome.food_deliveries[0, world]
                 assert there.sum() == start[world].sum() + outcome.regrown[0, world]
-                assert grows or (there == start[world]).all()
                 births = outcome.births[0, world]
                 stored = colony.arrays["nests"][1].reshape(2, 2)[world].sum()
                 assert births + stored == outcome.deliveries[0, world] * drawn.task.life.births
@@ -139,9 +137,8 @@ def test_ants_deliver_to_their_own_queen_alone():
     assert happened.min() > 3
 
 
-@pytest.mark.parametrize("sharing", ["shared", "frozen"])
-def test_schedules_threads_and_files_change_nothing(sharing, tmp_path):
-    drawn = next(drawn_nests(sharing))
+def test_schedules_threads_and_files_change_nothing(tmp_path):
+    drawn = next(drawn_nests("shared"))
     results = []
     for schedule, threads in (("by_world", 1), ("by_chunk", 1), ("by_chunk", 2), ("by_world", 2)):
         colony = made(drawn, schedule=schedule, threads=threads)

@@ -136,7 +136,7 @@ def test_every_step_in_random_worlds(learner, observation, deposit):
     """Several foods, rocks, trails of all strengths; deliveries and choices among foods occur."""
     delivered = 0
     n_states = observations.get(observation).n_states
-    for seed in range(24 if n_states < 1000 else 10):
+    for seed in range(12 if n_states < 1000 else 8):
         task = random_task(seed, observation, deposit)
         config, world = random_config(seed, learner), random_world(seed)
         plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
@@ -148,7 +148,7 @@ def test_every_step_in_random_worlds(learner, observation, deposit):
 def test_every_step_with_rules_of_choice_and_noise(learner, observation, deposit, choice, noise):
     """Actions that slip, and cells that are misread, in training and in rollouts."""
     slipped = misread = 0
-    for seed in range(16 if observations.get(observation).n_states < 1000 else 8):
+    for seed in range(10 if observations.get(observation).n_states < 1000 else 6):
         task = random_task(seed, observation, deposit, choice, noise)
         config, world = random_config(seed, learner), random_world(seed)
         plain = assert_equal_steps(world, config, seed - 7, 4, 25, task)
@@ -204,7 +204,7 @@ def test_whole_trainings_of_a_mixed_sweep():
 def test_rollouts(observation, deposit):
     """Every step of rollouts, with ties, and the outcomes of `evaluate`."""
     rng = np.random.default_rng(0)
-    for seed in range(20):
+    for seed in range(10):
         world = random_world(seed + 1000) if seed else paper()
         task = random_task(seed, observation, deposit)
         table = rng.integers(0, 3, (task.n_states, 5)).astype(np.float32)
