@@ -135,14 +135,18 @@ def bootstrap_interval(
     Both ends are float64 (rows,), for values (rows, seeds). They are nan for fewer than two seeds
     and for rows with a nan, and equal if all seeds of a row are.
     """
-    values = _rows(values)
+    # Rows often repeat, for example where all runs of two configurations deliver equally often.
+    bits = np.ascontiguousarray(_rows(values)).view(np.int64)
+    distinct, place = np.unique(bits, axis=0, return_inverse=True)
+    values = distinct.view(float)
     rows, n = values.shape
     ends = np.full((rows, 2), np.nan)
     interval = _percentile if iqm else _bca
     for start in range(0, rows if n > 1 else 0, _BLOCK_ROWS):  # bounds the memory of the means
         block = slice(start, start + _BLOCK_ROWS)
         ends[block] = interval(values[block], level, resamples)
-    return ends[:, 0], ends[:, 1]
+    low, high = ends[place.ravel()].T
+    return low, high
 
 
 def _rows(values: np.ndarray) -> np.ndarray:

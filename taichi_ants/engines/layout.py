@@ -46,6 +46,9 @@ class Command(IntEnum):
     WAIT = auto()
 
 
+# The result of a step in a rollout is one byte: its event, and these bits if the episode ends.
+TRUNCATED, TERMINATED = 1 << 6, 1 << 7
+
 _OCCUPIED = 16
 
 

@@ -12,7 +12,7 @@ from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode
 
 from taichi_ants import checks
-from taichi_ants.engines.layout import Command
+from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
@@ -87,16 +87,18 @@ class LoneAnts(Ants):
         waiting: np.ndarray,
         choices: Choices | None,
     ) -> None:
+        policy = choices and (choices.masks(), choices.streams, choices.epsilon)
         rows = {
             "taken": into.actions,
             "seen": into.observations[1:],
             "paid": into.rewards,
-            "terminated": into.terminated.view(np.uint8),
-            "truncated": into.truncated.view(np.uint8),
-            "event_rows": into.events,
+            "results": into.events,
             "finals": finals,
         }
-        self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[mode], choices)
+        self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[mode], policy)
+        np.not_equal(into.events & TERMINATED, 0, out=into.terminated)
+        np.not_equal(into.events & TRUNCATED, 0, out=into.truncated)
+        np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
 
     def states(self) -> np.ndarray:
         return self.batched.arrays["states"]

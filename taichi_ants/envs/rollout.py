@@ -128,7 +128,8 @@ def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
             f"the actions are {shown(actions)}; they must be an array of an integer type and of "
             f"shape {shape}."
         )
-    if given.min() < 0 or given.max() >= N_ACTIONS:
+    # A negative number is a large one without its sign.
+    if given.view(given.dtype.str.replace("i", "u")).max() >= N_ACTIONS:
         wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
         raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
     return given

@@ -57,6 +57,7 @@ from taichi_ants.task.constants import (
 from taichi_ants.task.events import Event
 from taichi_ants.task.rules import conflicts, noise, vision
 from taichi_ants.task.rules.actions import (
+    MOVES,
     is_open,
     move_event,
     step_around,
@@ -74,8 +75,6 @@ from taichi_ants.task.rules.policy import (
     lowest_bit_number,
 )
 from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
-
-MOVES = 1 << LEFT | 1 << FORWARD | 1 << RIGHT  # a bit for each action that moves an ant
 
 
 @ti.func

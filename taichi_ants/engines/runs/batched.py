@@ -15,12 +15,11 @@ from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.task import Task
-from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 _PER_CHUNK = 256  # ants that one thread steps in a row
 _STEPS_OF_LAUNCH = 1 << 23  # of all ants in a rollout; a launch cannot be interrupted
-_NO_POLICY = np.zeros((1, N_ACTIONS), np.float32), np.zeros(1, np.uint64), 0.0
+_NO_POLICY = np.zeros(1, np.int64), np.zeros(1, np.uint64), 0.0
 # The arrays with one value per ant.
 _OF_ANTS: dict[type, tuple[str, ...]] = {
     np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
@@ -112,16 +111,16 @@ class BatchedEnvironments:
         Args:
             rows: Arrays (steps, n, ...) by name. `taken`, int64, are the actions: given ones or,
                 with a policy, those it chose. The results are `seen`, observations of the dtype of
-                `shown`; `paid`, float64; `terminated`, `truncated` and `event_rows`, uint8; and if
-                the next episode begins in the step that ends one, `finals`, int32, the last states.
+                `shown`; `paid`, float64; `results`, uint8, see `layout.TERMINATED`; and if the next
+                episode begins in the step that ends one, `finals`, int32, the last states.
             shown: The observation of each state, int64 or float32 (n_states, ...).
             begins: True for ants that start an episode in the first step, bool (n,).
             after_end: The command after the last step of an episode; STEP if the next episode
                 begins in the same step.
-            policy: Action values, float32 (n_states, 5), a random stream for each ant, uint64 (n,),
-                and epsilon; or None.
+            policy: The best actions in each state, as bits, int64 (n_states,), a random stream for
+                each ant, uint64 (n,), and epsilon; or None.
         """
-        table, choices, epsilon = policy or _NO_POLICY
+        best, choices, epsilon = policy or _NO_POLICY
         with runtime.alone:
             launch = self._rollout_launch(policy is not None, shown[0].size)
             self.arrays["commands"][:] = np.where(begins, after_end, Command.STEP)
@@ -129,7 +128,7 @@ class BatchedEnvironments:
                 **self.arrays,
                 "after_end": int(after_end),
                 "shown": shown.reshape(-1),
-                "q": np.pad(table, ((0, 0), (0, ROW - N_ACTIONS))).reshape(-1),
+                "best": best,
                 "choices": choices,
                 "explore_below": np.uint64(epsilon * 4294967296.0),
             }
@@ -144,9 +143,9 @@ class BatchedEnvironments:
             runtime.start()
             from taichi_ants.engines.arguments import Launch
             from taichi_ants.engines.runs.kernels import failures_of
-            from taichi_ants.engines.runs.rollout_kernel import LENGTH, WIDTH, rollout_kernel
+            from taichi_ants.engines.runs.rollout_kernel import rollout_kernel, size_of_codes
 
-            codes = np.empty(-(-self.n // WIDTH) * WIDTH * LENGTH, np.int64)
+            codes = np.empty(size_of_codes(self.n), np.int64)
             half = self.task.pheromone.view == "half"
             rules = self.task.sees, self.arrays["deposits"], half, failures_of(self.task)
             launch = Launch(partial(rollout_kernel, *rules, follows, width))

@@ -184,7 +184,7 @@ def run_kernel(
                     if ti.static(failures.slips):
                         executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
                     before = ant
-                    ant = act(deposit, a, base, ant, percept, executed, clock)
+                    ant = act(deposit, True, a, base, ant, percept, executed, clock)
                     clock += a.evaporates
                     reward = a.rewards[ant.event]
                     total += reward
@@ -326,7 +326,7 @@ def step_kernel(
         changed = ti.cast(a.changed[i], ti.i32)
         base = ti.select((changed == 1) | (action == PICK_UP), own, origin)
         clock, percept = a.steps[i] * a.evaporates, ti.cast(a.percepts[i], ti.i32)
-        after = act(deposit, a, base, before, percept, action, clock)
+        after = act(deposit, False, a, base, before, percept, action, clock)
         a.events[i] = ti.cast(after.event, ti.u8)
         a.reasons[i] = ti.cast(reason_of(a, base, before, after, action), ti.u8)
         if after.event == Event.PICKED_UP:

@@ -12,23 +12,30 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_ants.engines.layout import Command
+from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.kernels import Failures
 from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, percept_of, restore, state_seen
-from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.delivery import step_end
 from taichi_ants.task.rules.noise import slipped
 from taichi_ants.task.rules.pheromone import FADING
-from taichi_ants.task.rules.policy import choose
+from taichi_ants.task.rules.policy import choose_from_masks
 from taichi_ants.task.rules.random_bits import advance, bits_of
 
 WIDTH, LENGTH = 512, 64
-# A code is an i64, with the state in bits 0 to 31. The lowest bits of its other parts:
-_RESULT = 32
-_EVENT, _ACTION, _TERMINATED, _TRUNCATED = _RESULT, _RESULT + 8, _RESULT + 16, _RESULT + 17
+# Codes between the steps of an ant: with a power of two, all of them would compete for the same
+# lines of the cache.
+_STRIDE = WIDTH + 8
+# A code is an i64: the state, and from these bits on the result of the step (`layout.TERMINATED`)
+# and the action.
+_RESULT, _ACTION = 32, 40
+
+
+def size_of_codes(n: int) -> int:
+    """Return the number of codes that the kernel needs for n ants."""
+    return -(-n // WIDTH) * LENGTH * _STRIDE
 
 
 @cache
@@ -74,16 +81,18 @@ def rollout_kernel(
             action, event, terminated, truncated = 0, ti.cast(Event.NONE, ti.i32), 0, 0
             if ti.static(follows):
                 choices = advance(choices)
-                action = choose(values_of(a.q, 0, state), bits_of(choices), a.explore_below)
+                action = choose_from_masks(
+                    a.compass, a.best, state, bits_of(choices), a.explore_below
+                )
             else:
-                action = ti.cast(a.codes[place + t * WIDTH], ti.i32)
+                action = ti.cast(a.codes[place + t * _STRIDE], ti.i32)
             begins = ti.cast(command == Command.BEGIN, ti.i32)
             if command == Command.STEP:
                 executed = action
                 if ti.static(failures.slips):
                     executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
                 into = ti.select(executed == PICK_UP, own, base)
-                ant = act(deposit, a, into, ant, percept, executed, steps * a.evaporates)
+                ant = act(deposit, False, a, into, ant, percept, executed, steps * a.evaporates)
                 event = ant.event
                 if event == Event.PICKED_UP:  # the store keeps this a branch, which is faster
                     a.changed[i] = ti.cast(1, ti.u8)
@@ -110,8 +119,9 @@ def rollout_kernel(
                 steps, base, command = 0, origin, Command.STEP
                 percept, state, ant.random_state = observe(a, origin, ant, 0)
                 seen = state
-            result = event | action << 8 | terminated << 16 | truncated << 17
-            a.codes[place + t * WIDTH] = ti.cast(seen, ti.i64) | ti.cast(result, ti.i64) << _RESULT
+            result = event | terminated * TERMINATED | truncated * TRUNCATED | action << 8
+            code = ti.cast(seen, ti.i64) | ti.cast(result, ti.i64) << _RESULT
+            a.codes[place + t * _STRIDE] = code
         a.ant_cells[i], a.headings[i] = ant.cell, ti.cast(ant.heading, ti.u8)
         a.carries[i], a.random_states[i] = ti.cast(ant.carries, ti.u8), ant.random_state
         if ti.static(deposit == FADING):
@@ -124,13 +134,11 @@ def rollout_kernel(
     @ti.func
     def record(a: ti.template(), row, code):
         """Write the results of a step."""
-        state, event = ti.cast(code, ti.i32), ti.cast(code >> _EVENT, ti.i32) & 255
+        state, result = ti.cast(code, ti.i32), ti.cast(code >> _RESULT, ti.i32)
         if ti.static(follows):
             a.taken[row] = code >> _ACTION & 7
-        a.paid[row] = a.rewards[event]
-        a.event_rows[row] = ti.cast(event, ti.u8)
-        a.terminated[row] = ti.cast(code >> _TERMINATED & 1, ti.u8)
-        a.truncated[row] = ti.cast(code >> _TRUNCATED & 1, ti.u8)
+        a.paid[row] = a.rewards[result & (TRUNCATED - 1)]
+        a.results[row] = ti.cast(result & 255, ti.u8)
         for k in ti.static(range(width)):
             a.seen[row * width + k] = a.shown[state * width + k]
 
@@ -139,19 +147,20 @@ def rollout_kernel(
         ti.loop_config(block_dim=1)
         for chunk in range((a.n + WIDTH - 1) // WIDTH):
             ant, ants = chunk * WIDTH, ti.min(WIDTH, a.n - chunk * WIDTH)
-            place, first = chunk * WIDTH * LENGTH, 0
+            place, first = chunk * _STRIDE * LENGTH, 0
             while first < a.n_steps:
                 length = ti.min(LENGTH, a.n_steps - first)
                 if ti.static(not follows):
                     for t in range(length):
+                        row, line = (first + t) * a.n + ant, place + t * _STRIDE
                         for j in range(ants):
-                            a.codes[place + t * WIDTH + j] = a.taken[(first + t) * a.n + ant + j]
+                            a.codes[line + j] = a.taken[row + j]
                 for j in range(ants):
                     take_steps(a, ant + j, first, length, place + j)
                 for t in range(length):
+                    row, line = (first + t) * a.n + ant, place + t * _STRIDE
                     for j in range(ants):
-                        code = a.codes[place + t * WIDTH + j]
-                        record(a, (first + t) * a.n + ant + j, code)
+                        record(a, row + j, a.codes[line + j])
                 first += length
 
     return rollout

@@ -13,7 +13,15 @@ from taichi_ants.task.constants import FORWARD, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.events import Event
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules import noise, vision
-from taichi_ants.task.rules.actions import is_open, move_event, step_towards, turn, turn_round
+from taichi_ants.task.rules.actions import (
+    MOVES,
+    is_open,
+    move_event,
+    step_towards,
+    turn,
+    turn_round,
+    turned_by,
+)
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.pheromone import FADING, NONE, level_after_deposit, level_left
 from taichi_ants.task.rules.policy import bit_number, lowest_bit_number
@@ -139,38 +147,74 @@ def _percept_misread(a: ti.template(), base, ant, clock, percept):
 
 
 @ti.func
-def act(deposit: ti.template(), a: ti.template(), base, ant, percept, action, clock):
-    """Return the ant after its action, with the event, and change the cells."""
+def act(
+    deposit: ti.template(),
+    predictable: ti.template(),
+    a: ti.template(),
+    base,
+    ant,
+    percept,
+    action,
+    clock,
+):
+    """Return the ant after its action, with the event, and change the cells.
+
+    Branches are faster if the actions are `predictable`, as those of a learned policy.
+    """
     after = ant
     after.event = Event.FAILED
-    if action <= RIGHT:
-        after.heading = turn(a.compass, ant.heading, action)
-        code = vision.code_in_view(percept, action)
-        after.event = move_event(code)
-        if is_open(code):
-            after.cell += step_towards(a.compass, after.heading, FORWARD)
-            if ant.carries == 1:
-                if ti.static(deposit != NONE):
-                    before = a.cells[base + after.cell]
-                    lay(deposit, a, base, after.cell, clock, before, ant.carried)
+    code = vision.code_in_view(percept, action)
+    if ti.static(predictable):
+        if action <= RIGHT:
+            after.heading = turn(a.compass, ant.heading, action)
+            after.event = move_event(code)
+            if is_open(code):
+                after.cell += step_towards(a.compass, after.heading, FORWARD)
+                if ant.carries == 1:
+                    lay_behind(deposit, a, base, after.cell, clock, ant.carried)
+        else:
+            after = pick_up_or_give(deposit, a, base, ant, percept, action, clock)
     else:
-        goals = vision.goals_in_view(percept)
-        if goals != 0 and action == PICK_UP and ant.carries == 0:
-            position = lowest_bit_number(goals)
-            if goals & (goals - 1) != 0:  # several food items in view
-                k, after.random_state = draw_below(ant.random_state, popcnt(goals))
-                position = bit_number(goals, k)
-            food = ant.cell + step_towards(a.compass, ant.heading, position)
-            if a.regrows == 0:  # else the food grows back before an ant sees the trail under it
-                lay(deposit, a, base, food, clock, a.trails[ant.origin + food], 0)
-            lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell], 0)
-            after.heading = turn_round(ant.heading)
-            after.carries = 1
-            after.event = Event.PICKED_UP
-        elif ant.carries == 1 and can_give(action, percept):
-            after.carries = 0
-            after.heading = heading_after_delivery(ant.heading, a.turns_at_queen)
-            after.event = Event.DELIVERED
+        moves = MOVES >> action & 1
+        enters = moves & ti.cast(is_open(code), ti.i32)
+        after.heading = turned_by(a.compass, ant.heading, action)
+        after.event = ti.select(moves == 1, move_event(code), Event.FAILED)
+        after.cell += enters * step_towards(a.compass, after.heading, FORWARD)
+        if enters & ant.carries == 1:
+            lay_behind(deposit, a, base, after.cell, clock, ant.carried)
+        if (moves == 0) & vision.sees_goal(percept):
+            after = pick_up_or_give(deposit, a, base, ant, percept, action, clock)
     if ti.static(deposit == FADING):
         after.carried = (ant.carried + 1) * after.carries
+    return after
+
+
+@ti.func
+def lay_behind(deposit: ti.template(), a: ti.template(), base, cell, clock, carried):
+    """Deposit on the cell that an ant with food has entered."""
+    if ti.static(deposit != NONE):
+        lay(deposit, a, base, cell, clock, a.cells[base + cell], carried)
+
+
+@ti.func
+def pick_up_or_give(deposit: ti.template(), a: ti.template(), base, ant, percept, action, clock):
+    """Return the ant after an action that is not a move, with the event; see `act`."""
+    after, goals = ant, vision.goals_in_view(percept)
+    after.event = Event.FAILED
+    if goals != 0 and action == PICK_UP and ant.carries == 0:
+        position = lowest_bit_number(goals)
+        if goals & (goals - 1) != 0:  # several food items in view
+            k, after.random_state = draw_below(ant.random_state, popcnt(goals))
+            position = bit_number(goals, k)
+        food = ant.cell + step_towards(a.compass, ant.heading, position)
+        if a.regrows == 0:  # else the food grows back before an ant sees the trail under it
+            lay(deposit, a, base, food, clock, a.trails[ant.origin + food], 0)
+        lay(deposit, a, base, ant.cell, clock, a.cells[base + ant.cell], 0)
+        after.heading = turn_round(ant.heading)
+        after.carries = 1
+        after.event = Event.PICKED_UP
+    elif ant.carries == 1 and can_give(action, percept):
+        after.carries = 0
+        after.heading = heading_after_delivery(ant.heading, a.turns_at_queen)
+        after.event = Event.DELIVERED
     return after

@@ -3,7 +3,7 @@
 import taichi as ti
 
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import LEFT, RIGHT
+from taichi_ants.task.constants import FORWARD, LEFT, RIGHT
 from taichi_ants.task.events import Event
 
 # A compass is an i32 array of 294 entries. First, at h, h + 1 and h + 2, are the index steps to the
@@ -11,6 +11,8 @@ from taichi_ants.task.events import Event
 # and heading; picking up counts as no turn, because it turns only if it succeeds. Last, in rows of
 # eight, is the number of the k-th set bit of each mask of five bits, by mask and k.
 _TURNS_AT, _BITS_AT = 8, 38
+
+MOVES = 1 << LEFT | 1 << FORWARD | 1 << RIGHT  # a bit for each action that moves an ant
 
 
 @ti.func

@@ -99,6 +99,12 @@ def code_in_view(state, position):
 
 
 @ti.func
+def sees_goal(state):
+    """Return whether a cell in view is food or queen."""
+    return state & (state >> 1) & 21 != 0
+
+
+@ti.func
 def goals_in_view(state):
     """Return a bit for each cell in view that is food or queen: 0 left, 1 forward, 2 right."""
     both = state & (state >> 1)  # bits 4, 2 and 0 are set where a code is 3
