@@ -66,6 +66,7 @@ class Is:
             requires; with other values it must have its default.
         usual: The value that replaces None where the setting has an effect.
         choices: A function that returns the allowed words, if plugins can register more.
+        or_region: Whether the name of a region can replace a list of cells.
     """
 
     help: str = ""
@@ -76,6 +77,7 @@ class Is:
     only: tuple[Any, ...] | None = None
     usual: Any = None
     choices: Callable[[], tuple[str, ...]] | None = None
+    or_region: bool = False
 
     def but(self, other: Is) -> Is:
         """Return the combination of both; where `other` declares something, it takes precedence."""
@@ -173,7 +175,7 @@ class Setting(NamedTuple):
             fits = isinstance(value, str) and (not allowed or value in allowed)
             return value if fits else None
         if self.kind is list:  # the code that uses the list checks its entries
-            return entries_of(value)
+            return value if self.rule.or_region and isinstance(value, str) else entries_of(value)
         if self.kind is Named:
             return self._named(value, {}) if isinstance(value, Mapping) else None
         if issubclass(self.kind, Settings):
@@ -228,6 +230,8 @@ class Setting(NamedTuple):
             words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
             form = self.kind.form or f"a {self.kind.__name__}"  # type: ignore[attr-defined]
             return form + (f", or one of {words}" if words else "")
+        if self.rule.or_region:
+            return "a list of cells, or the name of a region"
         return _KINDS[self.kind]
 
     @property
