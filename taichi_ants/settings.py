@@ -26,7 +26,7 @@ import math
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
-from functools import partial, wraps
+from functools import cache, partial, wraps
 from inspect import signature
 from numbers import Real
 from types import NoneType, UnionType
@@ -195,9 +195,9 @@ class Setting(NamedTuple):
                 kind = entry.entry_named(name)  # type: ignore[attr-defined]
                 entries[name] = one if isinstance(one, kind) else _entry(kind, one, start, name)
             except AntsError as error:
-                raise AntsError(
-                    str(error).replace(f"{self.path}.NAME", f"{self.path}.{name}")
-                ) from None
+                text = str(error).replace(f"{self.path}.NAME", f"{self.path}.{name}")
+                text = text.replace(f"`{entry.__name__}.", f"`{self.path}.{name}.")
+                raise AntsError(text) from None
         return Named(entries)
 
     def _in_range(self, value: float) -> bool:
@@ -247,7 +247,36 @@ class Setting(NamedTuple):
         return "" if rule.most is None else f"at most {_plain(rule.most)}"
 
 
-class Settings:
+class _Checked(type):
+    """The class of classes of settings, which refuses unknown names of settings.
+
+    An entry of a `Named` does not know its name. Until it gets one, messages call it by its class.
+    """
+
+    def __call__(cls, *values: Any, **named: Any) -> Any:
+        known = _arguments(cls)
+        path = cls.path  # type: ignore[attr-defined]
+        try:
+            for name in named:
+                if known and name not in known:
+                    raise AntsError(f"`{_below(path, name)}` {not_a_setting(name, known)}")
+            return super().__call__(*values, **named)
+        except AntsError as error:
+            if not path.endswith(".NAME"):
+                raise
+            raise AntsError(str(error).replace(f"`{path}.", f"`{cls.__name__}.")) from None
+
+
+@cache
+def _arguments(cls: type) -> tuple[str, ...]:
+    """Return the names of the arguments of a class; none if it takes any name."""
+    every = signature(cls.__init__).parameters.values()  # type: ignore[misc]
+    if any(one.kind is one.VAR_KEYWORD for one in every):
+        return ()
+    return tuple(one.name for one in every)[1:]
+
+
+class Settings(metaclass=_Checked):
     """Base of the classes of settings, which are frozen dataclasses.
 
     `path` is the full name of the settings in sweep files and messages. If the class is a setting
