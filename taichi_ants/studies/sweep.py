@@ -697,7 +697,7 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
     part = name if any(one.startswith(f"{name}.") for one in known) else name.rpartition(".")[0]
     if part and part not in _PARTS:
         near = near or [one for one in known if one.rpartition(".")[0] == part]
-    near = near or difflib.get_close_matches(name, known, 3)
+    near = near or difflib.get_close_matches(name, [*known, *_OF_FILE], 3)
     near = near or [*_own(kind), *(f"{one}. ..." for one in _PARTS[:3])]
     return f"of this sweep; choose one of {', '.join(near)}"
 

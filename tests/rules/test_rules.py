@@ -168,6 +168,10 @@ def after_loop(level):
     return i
 
 
+def square(level):
+    return level**2
+
+
 def half(random):
     return random * 4
 
@@ -193,6 +197,7 @@ WRONG = [
     ("choice", whole_vector, "is a vector; use its entries"),
     ("choice", outside, "must have an index from 0 to 2"),
     ("choice", far_entry, "IndexError: there is no entry 3"),
+    ("evaporation", square, r"`level ** 2`, is not allowed; write power(x, y), of"),
     ("choice", half, "an action, a whole number from 0 to 4"),
     ("evaporation", tuples, "assign to one name at a time"),
     ("deposit", starred, "use plain arguments"),
