@@ -43,7 +43,7 @@ def check_cues(task: Task) -> None:
         raise AntsError(
             f"the task has {listing(task.fields, 'further field')}, and its cues are "
             f"{task.outbound_cue} and {task.homing_cue}; the live page has only the trail and the "
-            "compass, so draw a Colony instead."
+            "compass, so make a Colony, and draw it or record it with record_colony."
         )
 
 

@@ -91,10 +91,21 @@ class Tools {
   }
 
   up() {
-    if (this.name === "queen" && this.last >= 0) this.edit("place", { what: "queen" }, [this.last]);
+    if (this.name === "queen" && this.last >= 0) this.edit("place", { what: "queen", ...this.nest(this.last) }, [this.last]);
     this.send();
     this.last = -1;
     if (this.aside) this.live.controls.say(`${this.aside} ${this.aside > 1 ? "ants" : "ant"} moved aside.`);
+  }
+
+  /* The nest of the queen nearest to a cell, as {nest}; {} for the first nest. */
+  nest(cell) {
+    const { history } = this.live.viewer, [x, y] = history.grid.centre(cell);
+    const far = [...history.frames[history.length - 1].queens].map((queen) => {
+      const [across, down] = history.grid.centre(queen);
+      return Math.hypot(across - x, down - y);
+    });
+    const nest = far.indexOf(Math.min(...far));
+    return nest > 0 ? { nest } : {};
   }
 
   /* Extend the stroke to a cell, with all cells on the way. */
