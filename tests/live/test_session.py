@@ -44,6 +44,9 @@ LIVELY = Task(
     life=Life(births=True, lifespan=60, regrowth=2, wander=9),
 )
 SMALL = {"ranges": (9, 8, 7)}
+HOMING = tasks.foraging().but(
+    fields={"home": {"laid": "without_food", "evaporation": "exponential"}}, homing_cue="home"
+)
 TWO_NESTS = text_map.to_text(
     World((7, 7, 7), [(0, 6, 0), (6, 0, 3)], [(0, 0, 5), (1, 0, 5), (5, 5, 0)], [(0, 3, 0)])
 )
@@ -60,6 +63,7 @@ SETUPS = {
     ),
     "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
     "nests": Setup(TWO_NESTS, tasks.foraging(), LEARNS, 20, 40, 3, 25),
+    "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL, pheromone="home"),
 }
 
 
@@ -147,7 +151,7 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     for one in (undone, again):
         one.advance(10)
         (seen,) = played(Recording(one.header(), [one.snapshot()]))
-        assert np.array_equal(seen.trail, one.colony.snapshot().trail)
+        assert np.array_equal(seen.trail, one.colony.snapshot().fields[session.setup.pheromone])
     assert undone.same(again)
     assert session.interventions.state() == stands
 
@@ -254,7 +258,7 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
         assert set((owners * n_states + b.states).tolist()) <= known
     snapshot = session.colony.snapshot()
     assert np.array_equal(joined[-1].ground, snapshot.ground)
-    assert np.array_equal(joined[-1].trail, snapshot.trail)
+    assert np.array_equal(joined[-1].trail, snapshot.fields[session.setup.pheromone])
 
 
 def test_states_have_names_before_they_are_seen_on_pages():
