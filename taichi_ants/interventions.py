@@ -6,7 +6,8 @@ page and its session files use the same names and settings:
     interventions.from_dict({"remove_ants": {"share": 0.5}}) == RemoveAnts(share=0.5)
 
 A cell is a triple (x, y, z) in any form of cube coordinates, or the flat index of a cell in the
-grid of the world, see `taichi_ants.grid.hexgrid`.
+grid of the world, see `taichi_ants.grid.hexgrid`. The name of a region of the world stands for its
+cells, which can differ between the worlds of a colony.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
 One = TypeVar("One", bound="Record")
 _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
 _MOST = 2**24  # ants, see `checks.MAX_ANTS`
-_CELLS = Is("cells, each [x, y, z]")
+_CELLS = Is("cells, each [x, y, z], or the name of a region", or_region=True)
 _NAMED = {one.name: one for one in named_groups(Task)}
 
 
@@ -111,7 +112,11 @@ class Intervention(Record):
 
     def check_in(self, world: World, task: Task) -> None:
         """Raise an AntsError if the change is impossible in worlds like this one."""
-        indices(world.grid, getattr(self, "cells", None) or ())
+        cells = getattr(self, "cells", None) or ()
+        if isinstance(cells, str):
+            world.region(cells)
+        else:
+            indices(world.grid, cells)
         if (nest := getattr(self, "nest", None)) is not None and nest >= world.n_nests:
             raise AntsError(
                 f"`{self.path}.nest` is {nest}, but the world has {count(world.n_nests, 'nest')}, "
@@ -126,23 +131,26 @@ class Intervention(Record):
 class OfCells(Intervention):
     """An intervention on some cells, of which a list is the short form."""
 
-    form = "a list of cells, or a table of settings"
+    form = "a list of cells, the name of a region, or a table of settings"
 
     def check(self) -> None:
         super().check()
-        if getattr(self, "cells", None) is not None:
+        if not isinstance(getattr(self, "cells", None), str | None):
             object.__setattr__(self, "cells", _checked_cells(f"{self.path}.cells", self.cells))  # type: ignore[attr-defined]
 
     @classmethod
     def short(cls, value: Any) -> dict[str, Any] | None:
-        cells = entries_of(value)
+        cells = value if isinstance(value, str) else entries_of(value)
         return None if cells is None else {"cells": cells}
 
 
 class OfAnts(OfCells):
     """An intervention on a number of ants, a share of the living ants, or the ants on cells."""
 
-    form = "a number of ants, a share such as 0.5, a list of cells, or a table of settings"
+    form = (
+        "a number of ants, a share such as 0.5, a list of cells, the name of a region, or a table "
+        "of settings"
+    )
     number: int | None
     share: float | None
     cells: Sequence | None
@@ -220,10 +228,11 @@ class Place(OfCells, path="place"):
 
     def check(self) -> None:
         super().check()
-        if self.what == "queen" and len(self.cells) != 1:
-            raise AntsError(
-                f"`place.cells` has {len(self.cells)} cells; give a single cell for the queen."
-            )
+        if self.what == "queen" and (isinstance(self.cells, str) or len(self.cells) != 1):
+            has = f"is {self.cells!r}"
+            if not isinstance(self.cells, str):
+                has = f"has {len(self.cells)} cells"
+            raise AntsError(f"`place.cells` {has}; give a list of a single cell for the queen.")
         for name, of in (("nest", "queen"), ("kind", "food")):
             if getattr(self, name) is not None and self.what != of:
                 raise AntsError(
@@ -256,10 +265,12 @@ class Move(OfCells, path="move"):
 
     def check(self) -> None:
         super().check()
-        if len(self.cells) != 2:
+        if isinstance(self.cells, str) or len(self.cells) != 2:
+            has = f"is {self.cells!r}"
+            if not isinstance(self.cells, str):
+                has = f"has {len(self.cells)} cells"
             raise AntsError(
-                f"`move.cells` has {len(self.cells)} cells; give the cell to move from, then the "
-                "cell to move to."
+                f"`move.cells` {has}; give the cell to move from, then the cell to move to."
             )
 
     def apply(self, to: Interventions) -> None:
@@ -282,7 +293,7 @@ class Trail(OfCells, path="trail"):
     """Set the trail, or a further field, of cells without rock; level 0 clears it."""
 
     level: Annotated[int, Is("trail level", least=0, most=MAX_DEPOSIT)]
-    cells: Annotated[Sequence | None, Is("cells, each [x, y, z]; all cells if left out")] = None
+    cells: Annotated[Sequence | None, _CELLS.but(Is("cells, or a region; all if left out"))] = None
     field: Annotated[str, Is("name of the field")] = TRAIL
 
     @classmethod

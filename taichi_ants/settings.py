@@ -26,7 +26,7 @@ import math
 import operator
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
-from functools import partial, wraps
+from functools import cache, partial, wraps
 from inspect import signature
 from numbers import Real
 from types import NoneType, UnionType
@@ -66,6 +66,7 @@ class Is:
             requires; with other values it must have its default.
         usual: The value that replaces None where the setting has an effect.
         choices: A function that returns the allowed words, if plugins can register more.
+        or_region: Whether the name of a region can replace a list of cells.
     """
 
     help: str = ""
@@ -76,6 +77,7 @@ class Is:
     only: tuple[Any, ...] | None = None
     usual: Any = None
     choices: Callable[[], tuple[str, ...]] | None = None
+    or_region: bool = False
 
     def but(self, other: Is) -> Is:
         """Return the combination of both; where `other` declares something, it takes precedence."""
@@ -173,7 +175,7 @@ class Setting(NamedTuple):
             fits = isinstance(value, str) and (not allowed or value in allowed)
             return value if fits else None
         if self.kind is list:  # the code that uses the list checks its entries
-            return entries_of(value)
+            return value if self.rule.or_region and isinstance(value, str) else entries_of(value)
         if self.kind is Named:
             return self._named(value, {}) if isinstance(value, Mapping) else None
         if issubclass(self.kind, Settings):
@@ -193,9 +195,9 @@ class Setting(NamedTuple):
                 kind = entry.entry_named(name)  # type: ignore[attr-defined]
                 entries[name] = one if isinstance(one, kind) else _entry(kind, one, start, name)
             except AntsError as error:
-                raise AntsError(
-                    str(error).replace(f"{self.path}.NAME", f"{self.path}.{name}")
-                ) from None
+                text = str(error).replace(f"{self.path}.NAME", f"{self.path}.{name}")
+                text = text.replace(f"`{entry.__name__}.", f"`{self.path}.{name}.")
+                raise AntsError(text) from None
         return Named(entries)
 
     def _in_range(self, value: float) -> bool:
@@ -228,6 +230,8 @@ class Setting(NamedTuple):
             words = ", ".join(self.kind.named())  # type: ignore[attr-defined]
             form = self.kind.form or f"a {self.kind.__name__}"  # type: ignore[attr-defined]
             return form + (f", or one of {words}" if words else "")
+        if self.rule.or_region:
+            return "a list of cells, or the name of a region"
         return _KINDS[self.kind]
 
     @property
@@ -243,7 +247,36 @@ class Setting(NamedTuple):
         return "" if rule.most is None else f"at most {_plain(rule.most)}"
 
 
-class Settings:
+class _Checked(type):
+    """The class of classes of settings, which refuses unknown names of settings.
+
+    An entry of a `Named` does not know its name. Until it gets one, messages call it by its class.
+    """
+
+    def __call__(cls, *values: Any, **named: Any) -> Any:
+        known = _arguments(cls)
+        path = cls.path  # type: ignore[attr-defined]
+        try:
+            for name in named:
+                if known and name not in known:
+                    raise AntsError(f"`{_below(path, name)}` {not_a_setting(name, known)}")
+            return super().__call__(*values, **named)
+        except AntsError as error:
+            if not path.endswith(".NAME"):
+                raise
+            raise AntsError(str(error).replace(f"`{path}.", f"`{cls.__name__}.")) from None
+
+
+@cache
+def _arguments(cls: type) -> tuple[str, ...]:
+    """Return the names of the arguments of a class; none if it takes any name."""
+    every = signature(cls.__init__).parameters.values()  # type: ignore[misc]
+    if any(one.kind is one.VAR_KEYWORD for one in every):
+        return ()
+    return tuple(one.name for one in every)[1:]
+
+
+class Settings(metaclass=_Checked):
     """Base of the classes of settings, which are frozen dataclasses.
 
     `path` is the full name of the settings in sweep files and messages. If the class is a setting

@@ -1,8 +1,8 @@
-"""Checks of rules that you wrote: the kernels against the plain reference."""
+"""Checks of rules and observations that you wrote: the kernels against the plain reference."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -14,19 +14,23 @@ from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rules import Rule
+from taichi_ants.rules.inputs import LABOUR
 from taichi_ants.settings import declared
-from taichi_ants.task import Task
+from taichi_ants.task import Observation, Task, observations
+from taichi_ants.task.constants import EMPTY
+from taichi_ants.task.field import TRAIL
+from taichi_ants.worlds import World
 
 SEEDS, TICKS = 6, 60
 _LAID = ("with_food", "without_food", "always", "dead_end", "failed_pick_up")
 
 
 class RuleCheck(NamedTuple):
-    """The result of a check of a rule.
+    """The result of a check of a rule, or of an observation.
 
     Attributes:
-        rule: The name of the rule.
-        inputs: The number of drawn inputs that were compared.
+        rule: The name of the rule, or of the observation.
+        inputs: The number of drawn inputs that were compared; 0 for an observation.
         ticks: The number of ticks of drawn colonies that were compared.
         difference: The first difference, or an empty string.
         fields: The names of the fields that the rule reads, which models that use it must have.
@@ -39,7 +43,9 @@ class RuleCheck(NamedTuple):
     fields: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        compared = f"{self.inputs} drawn inputs and {self.ticks} ticks of {SEEDS} colonies"
+        compared = f"{self.ticks} ticks of {SEEDS} colonies"
+        if self.inputs:
+            compared = f"{self.inputs} drawn inputs and {compared}"
         reads = f" (reads the {listing(self.fields, 'field')})" if self.fields else ""
         return f"{self.rule}{reads}: {compared}: {self.difference or 'equal'}"
 
@@ -63,25 +69,48 @@ def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
     rule = rules.get(name)
     checked_whole("inputs", inputs)
     runtime.start()
-    found = difference(rule, inputs)
-    if found:
-        return RuleCheck(name, inputs, 0, found, rule.fields)
+    found, ticks = difference(rule, inputs), 0
+    if not found:
+        ticks, found = _compared(lambda seed: _task(rule, seed))
+    return RuleCheck(name, inputs, ticks, found, rule.fields)
+
+
+def check_observation(name: str) -> RuleCheck:
+    """Return the result of a comparison of an observation in kernels with its Python function.
+
+    Small drawn colonies that use it are compared as in `check_rule`. The reference computes the
+    view of each ant by a separate implementation.
+
+    Args:
+        name: The name of a registered observation.
+
+    Raises:
+        AntsError: There is no observation of this name.
+    """
+    observation = observations.get(name)
+    runtime.start()
+    ticks, found = _compared(lambda seed: _task_of(observation, seed))
+    return RuleCheck(name, 0, ticks, found, observation.reads)
+
+
+def _compared(task_of: Callable[[int], Task]) -> tuple[int, str]:
+    """Return the equal ticks of drawn colonies with the task of each seed, and a difference."""
     ticks = 0
     try:
         for seed in range(SEEDS):
-            for found in _differences(rule, seed):
+            for found in _differences(task_of(seed), seed):
                 if found:
-                    return RuleCheck(name, inputs, ticks, found, rule.fields)
+                    return ticks, found
                 ticks += 1
     except (ArithmeticError, ValueError, IndexError) as error:
-        return RuleCheck(name, inputs, ticks, f"seed {seed} fails: {error}", rule.fields)
-    return RuleCheck(name, inputs, ticks, "", rule.fields)
+        return ticks, f"seed {seed} fails: {error}"
+    return ticks, ""
 
 
 def _task(rule: Rule, seed: int) -> Task:
     """Return a drawn task that uses a rule, with drawn parameters within their ranges.
 
-    Kernels are compiled for two tasks only; others differ in numbers.
+    Kernels are compiled for two tasks only, with one nest and with two; others differ in numbers.
     """
     rng, drawn, numbers = np.random.default_rng([seed, 17]), seed % 2, {}
     for one in declared(rule.settings):
@@ -90,8 +119,11 @@ def _task(rule: Rule, seed: int) -> Task:
             value = float(rng.uniform(least, most))
             numbers[one.name] = round(value) if one.kind is int else value
     settings: dict = {"rules": {rule.name: numbers}, "evaporation_in_training": True}
-    settings["fields"] = {name: {"laid": "always"} for name in rule.fields if name != "trail"}
+    settings["fields"] = _fields(rule.fields)
     settings["traffic"] = ("blocking", "following")[drawn]
+    if any(name in rule.inputs for name in LABOUR):
+        threshold = {"distribution": "uniform", "value": 5.0, "spread": 5.0}
+        settings |= {"labour": "thresholds", "castes": {"ants": {"threshold": threshold}}}
     pheromone: dict = {"diffusion": 0.1 * drawn}
     if rule.kind == "choice":
         settings["choice"] = {"rule": rule.name}
@@ -106,9 +138,38 @@ def _task(rule: Rule, seed: int) -> Task:
     return Task().but(**settings, pheromone=pheromone)
 
 
-def _differences(rule: Rule, seed: int) -> Iterator[str]:
+def _task_of(observation: Observation, seed: int) -> Task:
+    """Return a drawn task with an observation; kernels are compiled for two tasks only."""
+    drawn = seed % 2
+    return Task().but(
+        observation=observation.name,
+        fields=_fields(observation.reads),
+        evaporation_in_training=True,
+        traffic=("blocking", "following")[drawn],
+        homing_cue=("compass", "trail")[drawn],
+        noise={"misread": 0.2 * drawn},
+        pheromone={"diffusion": 0.1 * drawn},
+    )
+
+
+def _fields(names: Iterable[str]) -> dict[str, dict[str, str]]:
+    """Return further pheromones with these names."""
+    return {name: {"laid": "always"} for name in names if name != TRAIL}
+
+
+def _world(seed: int) -> World:
+    """Return a small open world; with two nests for every second pair of seeds."""
+    world = worlds.open_world(seed, ranges=(5, 5, 5))
+    if seed % 4 < 2:
+        return world
+    far = np.where(world.ground() == EMPTY, world.distances(), 0)
+    other = world.grid.cells(far.argmax()).tolist()
+    return World(world.ranges, [world.queen, other], world.foods, world.obstacles)
+
+
+def _differences(task: Task, seed: int) -> Iterator[str]:
     """Yield, after each tick of a drawn colony, its first difference from the reference, or ""."""
-    task, world = _task(rule, seed), worlds.open_world(seed, ranges=(5, 5, 5))
+    world = _world(seed)
     learner = TrainingConfig("sarsa", 0.2, 0.9, 0.4, 1.0) if task.choice.needs_table else None
     sharing = "frozen" if learner is None else "shared"
     schedule = ("by_world", "by_chunk")[seed % 2]

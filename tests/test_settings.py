@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from command_lines import ROOT
 
-from taichi_ants import AntsError, TrainingConfig, learners
+from taichi_ants import AntsError, At, TrainingConfig, learners
 from taichi_ants.settings import (
     Is,
     Named,
@@ -250,3 +250,17 @@ def test_the_page_of_settings_is_made_from_the_declarations():
     for name in learners.names():
         if declared(learners.get(name).hyperparameters):
             assert table(learners.get(name).hyperparameters) in page
+
+
+def test_unknown_and_wrong_settings_are_named_before_an_entry_has_a_name():
+    says = "`Field.slop` is not a setting; choose slope."
+    assert refused(lambda: Field(slop=3)) == says
+    says = "`Field.slope` is 3; leave it out unless `deposit` is 'fading'."
+    assert refused(lambda: Field(slope=3)) == says
+    says = "`task.fiels` is not a setting; choose fields."
+    assert refused(lambda: Task(fiels={})) == says
+    says = "`at.remove_ant` is not a setting; choose remove_ants."
+    assert refused(lambda: At(3, remove_ant=3)) == says
+    says = "`task.castes.scout.threshold.valu` is not a setting; choose value."
+    castes = {"scout": {"threshold": {"distribution": "fixed", "valu": 3}}}
+    assert refused(lambda: Task(castes=castes)) == says

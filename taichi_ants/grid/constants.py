@@ -25,3 +25,4 @@ STREAM_TOUR = 7  # number: colony * 2**32 + the ant of `baselines.ant_system`
 STREAM_FORAGER = 8  # number: colony * 2**32 + the ant of `baselines.utility`
 STREAM_INTERVENTION = 9  # number: 0; for ants that an intervention adds
 STREAM_TRAIT = 10  # number: the ant; for its response threshold
+STREAM_INDIVIDUAL = 11  # number: the ant; for its exploration rate and its input `trait`

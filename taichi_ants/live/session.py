@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.checks import check_one_nest
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.files.archives import Kind
@@ -131,7 +130,6 @@ class Session:
     def __init__(self, setup: Setup) -> None:
         expect("setup", setup, Setup)
         self.setup, self.colony = setup, setup.build_colony()
-        check_one_nest(self.colony, "the live page")
         self.interventions = Interventions(self.colony)
         self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []
@@ -144,7 +142,7 @@ class Session:
         self.colony.observe([])  # has no effect, but compiles kernels for the first edit
         # The title must not contain the number of ants, because interventions change it.
         title = f"Ants in a world of {self.colony.grid.count} cells"
-        self._recorder = Recorder(self.colony, title=title)
+        self._recorder = Recorder(self.colony, title=title, pheromone=setup.pheromone)
         self._recorder.progress.note()
         self._recorder.snapshot()
         self._named = set(self._recorder.names())
@@ -372,17 +370,24 @@ class Session:
             yield self
 
     def policy_bytes(self) -> bytes:
-        """Return the bytes of a policy file; raise AntsError if each ant has its own table."""
-        colony = self.colony
+        """Return the bytes of a policy file; raise AntsError if ants have several tables."""
+        colony, table = self.colony, self.colony.q_values[0]
         if colony.one_a_slot:
             raise AntsError(
                 "each ant has its own table, but a policy file holds a single one; begin a session "
                 "in which ants share a table."
             )
+        if colony.n_nests > 1:
+            if self.setup.learns:
+                raise AntsError(
+                    "each nest has its own table, but a policy file holds a single one; export the "
+                    "colony instead."
+                )
+            table = table[0]  # all nests follow the same policy
         told = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
         if self.setup.learns:
             told["training"] = colony.training.as_dict()
-        given = (colony.q_values[0], told, colony.task.observation)
+        given = (table, told, colony.task.observation)
         return bytes_of("policy.npz", lambda path: save_policy(path, *given))
 
     def colony_bytes(self) -> bytes:

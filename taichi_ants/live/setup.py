@@ -37,13 +37,13 @@ _MOST_NUMBERS = 1 << 27  # elements of independent tables
 
 
 def check_cues(task: Task) -> None:
-    """Raise AntsError if a task has pheromones or rules that the live page cannot show."""
+    """Raise AntsError if a task has pheromones or rules that the form of the page lacks."""
     check_own_rules(task, "the live page")
     if task.fields or (task.outbound_cue, task.homing_cue) != (TRAIL, COMPASS):
         raise AntsError(
             f"the task has {listing(task.fields, 'further field')}, and its cues are "
-            f"{task.outbound_cue} and {task.homing_cue}; the live page has only the trail and the "
-            "compass, so draw a Colony instead."
+            f"{task.outbound_cue} and {task.homing_cue}; the form of the live page has only the "
+            "trail and the compass. Make a Session in Python, and open its file with --session."
         )
 
 
@@ -66,11 +66,13 @@ class Setup:
     epsilon: float = 0.01  # exploration rate of ants that follow action values
     world_seed: int = 0  # seed of a random world
     world_settings: Mapping[str, Any] = field(default_factory=dict)  # see `worlds.build`
+    pheromone: str = TRAIL  # that pages show and draw: the trail, or a field of the task
 
     def __post_init__(self) -> None:
         expect("world", self.world, str)
         expect("task", self.task, Task)
-        check_cues(self.task)
+        check_own_rules(self.task, "the live page")
+        check_one_of("pheromone", self.pheromone, (TRAIL, *self.task.fields))
         refuse_castes(self.task, "the live page")
         if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "independent"))

@@ -91,10 +91,27 @@ class Tools {
   }
 
   up() {
-    if (this.name === "queen" && this.last >= 0) this.edit("place", { what: "queen" }, [this.last]);
+    if (this.name === "queen" && this.last >= 0) this.edit("place", { what: "queen", ...this.nest(this.last) }, [this.last]);
     this.send();
     this.last = -1;
     if (this.aside) this.live.controls.say(`${this.aside} ${this.aside > 1 ? "ants" : "ant"} moved aside.`);
+  }
+
+  /* The pheromone that the page shows, as {field}; {} for the trail. */
+  field() {
+    const field = this.live.viewer.history.header.pheromone;
+    return field === "trail" ? {} : { field };
+  }
+
+  /* The nest of the queen nearest to a cell, as {nest}; {} for the first nest. */
+  nest(cell) {
+    const { history } = this.live.viewer, [x, y] = history.grid.centre(cell);
+    const far = [...history.frames[history.length - 1].queens].map((queen) => {
+      const [across, down] = history.grid.centre(queen);
+      return Math.hypot(across - x, down - y);
+    });
+    const nest = far.indexOf(Math.min(...far));
+    return nest > 0 ? { nest } : {};
   }
 
   /* Extend the stroke to a cell, with all cells on the way. */
@@ -127,12 +144,12 @@ class Tools {
       this.aside += cells.filter((cell) => taken.has(cell)).length;
       this.edit("place", { what: this.name }, cells.filter((cell) => ground[cell] !== QUEEN));
     } else if (this.name === "trail") {
-      this.edit("trail", { level: history.header.strongest }, cells.filter((cell) => ground[cell] !== OBSTACLE));
+      this.edit("trail", { level: history.header.strongest, ...this.field() }, cells.filter((cell) => ground[cell] !== OBSTACLE));
     } else if (this.name === "ants") this.edit("add_ants", {}, free.filter((cell) => ground[cell] === EMPTY));
     else {
       this.edit("remove_ants", {}, cells.filter((cell) => taken.has(cell)));
       this.edit("clear", {}, free.filter((cell) => ground[cell] !== EMPTY));
-      this.edit("trail", { level: 0 }, cells.filter((cell) => trail[cell] > 0));
+      this.edit("trail", { level: 0, ...this.field() }, cells.filter((cell) => trail[cell] > 0));
     }
   }
 

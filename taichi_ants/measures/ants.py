@@ -42,6 +42,22 @@ def occupancy(snapshot: Snapshot) -> np.ndarray:
     return np.bincount(snapshot.ant_cells, minlength=snapshot.grid.size).astype(np.int32)
 
 
+def regions(snapshot: Snapshot) -> dict[str, float]:
+    """Return the share of the living ants in each region of the world, by its name.
+
+    The shares refer to the living ants on any cell, and are nan without ants. AntsError if the
+    world has no regions.
+    """
+    world = snapshot.world
+    if world is None or not world.regions:
+        raise AntsError(
+            "the measure 'regions' needs a world with regions; add them with World.with_regions, "
+            "or with a table [world.regions] in a sweep file."
+        )
+    places = {name: world.region(name) for name in world.regions}
+    return {name: share_of(np.isin(snapshot.ant_cells, one)) for name, one in places.items()}
+
+
 def share_in(regions: Mapping[str, Any]) -> Callable[[Snapshot], dict[str, float]]:
     """Return a function for `register`: the share of the ants in each region, by its name.
 
@@ -51,8 +67,7 @@ def share_in(regions: Mapping[str, Any]) -> Callable[[Snapshot], dict[str, float
     The shares refer to the living ants on any cell, and are nan without ants. Regions can share
     cells.
 
-        short, long = worlds.double_bridge.branch_cells()
-        measures.register("branch", measures.share_in({"short": short, "long": long}))
+        measures.register("near", measures.share_in({"left": [(3, 0, 0)], "right": [(0, 3, 0)]}))
 
     Raises:
         AntsError: A region does not have cells of this form. The first use raises it if a cell is

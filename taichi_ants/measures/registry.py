@@ -40,6 +40,7 @@ _built_in(ants.living, "ants", "number of living ants")
 _built_in(ants.carriers, "", "share of the ants that carry food")
 _built_in(ants.foraging, "", "share of the ants that forage, which are not idle")
 _built_in(ants.distance, "steps", "mean distance of the ants to the nearest queen")
+_built_in(ants.regions, "", "share of the ants in each region of the world")
 _built_in(ants.occupancy, "ants", "number of ants on each cell (an array)")
 _YOURS: dict[str, Measure] = {}
 

@@ -155,10 +155,12 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
     """Let all ants act at once, and record in each its action, its event and its reward.
 
     All intents are from the start of the tick, so no ant's action changes that of another ant. At
-    most one ant enters a given cell, at most one takes its food, and at most one deposits on it.
+    most one ant enters a given cell, at most one takes its food, and at most one deposits on it in
+    a pheromone. Ants lay one pheromone after the other, the trail first.
     """
     winning = winners(intents, tick, world.index, task.traffic.carriers_first)
     entered, pushed = settle(intents, winning, task.traffic)
+    acted: list[tuple[Intent, Cell, bool]] = []
     for intent in intents:
         ant, slot = intent.ant, intent.ant.slot
         start, had_food = ant.cell, ant.carries
@@ -169,9 +171,9 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
         if slot in pushed:
             ant.cell, event = pushed[slot], Event.PUSHED
         elif intent.action < PICK_UP:
-            event = _move(world, intent, entered.get(slot), task, tick)
+            event = _move(intent, entered.get(slot))
         else:
-            event = _handle(world, intent, slot in winning, task, tick)
+            event = _handle(world, intent, slot in winning, task)
         if intent.rests:
             ant.event, ant.reward = Event.NONE, 0
             ant.carried += 1
@@ -180,12 +182,15 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
         if world.foods and event in (Event.PICKED_UP, Event.DELIVERED):
             paid = getattr(world.foods[ant.kind], PAID[event])
         ant.event, ant.reward = event, paid
-        for name, trail in world.fields.items():
-            if not lays(task, ant, name):
-                continue
-            for cell in _marked(task.fields[name].laid, intent, start, had_food):
-                trail.deposit(cell, ant.carried, ant, event, tick)
-        ant.carried += 1
+        acted.append((intent, start, had_food))
+    for name, trail in world.pheromones.items():
+        laid = task.fields[name].laid if name in task.fields else "with_food"
+        for intent, start, had_food in acted:
+            ant = intent.ant
+            for cell in _marked(laid, intent, start, had_food) if lays(task, ant, name) else ():
+                trail.deposit(cell, ant, tick, world.pheromones, world.stimuli[ant.nest])
+    for intent, *_ in acted:
+        intent.ant.carried += 1
     world.ants = {intent.ant.cell: intent.ant for intent in intents}
 
 
@@ -213,20 +218,14 @@ def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell
     return [ant.cell] if ant.cell != start else []
 
 
-def _move(
-    world: WorldState, intent: Intent, destination: Cell | None, task: Task, tick: int
-) -> Event:
-    ant = intent.ant
+def _move(intent: Intent, destination: Cell | None) -> Event:
     if destination is None:
         return Event.BLOCKED
-    ant.cell = destination
-    event = Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
-    if ant.carries and lays(task, ant, "trail"):
-        world.trail.deposit(destination, ant.carried, ant, event, tick)
-    return event
+    intent.ant.cell = destination
+    return Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
 
 
-def _handle(world: WorldState, intent: Intent, wins: bool, task: Task, tick: int) -> Event:
+def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:
     """Do a pick-up or a delivery if it is possible, and return the event."""
     ant = intent.ant
     if intent.gives:
@@ -240,8 +239,6 @@ def _handle(world: WorldState, intent: Intent, wins: bool, task: Task, tick: int
         if world.loads[intent.target] == 0:
             world.ground[intent.target] = EMPTY
         ant.carries, ant.carried = True, 0
-        for cell in (intent.target, ant.cell) if lays(task, ant, "trail") else ():
-            world.trail.deposit(cell, 0, ant, Event.PICKED_UP, tick)
         ant.heading = (ant.heading + 3) % N_HEADINGS
         return Event.PICKED_UP
     return Event.FAILED

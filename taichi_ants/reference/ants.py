@@ -38,6 +38,7 @@ class Ant:
         kind: The kind of the last food that it picked up.
         caste: The number of its caste.
         threshold: Its response threshold, 0 without one.
+        trait: Its number from 0 to less than 1, which never changes.
         idle: Whether it does not forage; its last action is then -1 and its last event NONE.
         percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
@@ -67,6 +68,7 @@ class Ant:
     kind: int = 0
     caste: int = 0
     threshold: np.float32 = field(default_factory=lambda: np.float32(0))
+    trait: float = 0.0
     idle: bool = False
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from taichi_ants.errors import AntsError
-from taichi_ants.grid.constants import N_HEADINGS, STREAM_TRAIT
+from taichi_ants.grid.constants import N_HEADINGS, STREAM_INDIVIDUAL, STREAM_TRAIT
 from taichi_ants.reference.ants import Ant
 from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.numbers import exponential, logarithm, power
@@ -102,6 +102,21 @@ def draw_threshold(threshold: Threshold, seed: int, number: int) -> np.float32:
             return np.float32(value * exponential(spread * z))
         if value + spread * z >= 0.0:
             return np.float32(value + spread * z)
+
+
+def draw_trait(seed: int, number: int) -> float:
+    """Return the trait of the ant with a number, from 0 to less than 1."""
+    high, _ = RandomStream(stream_state(seed, STREAM_INDIVIDUAL, number)).draw()
+    return high / _WORDS
+
+
+def epsilon_of(caste: Caste, ant: Ant, usual: float) -> float:
+    """Return the exploration rate of an ant, whose caste can have another one than `usual`."""
+    if caste.epsilon is None:
+        return usual
+    if not caste.epsilon_spread:
+        return caste.epsilon
+    return caste.epsilon + caste.epsilon_spread * (2.0 * ant.trait - 1.0)
 
 
 def starts_foraging(ant: Ant, stimulus: float, labour: Labour) -> bool:

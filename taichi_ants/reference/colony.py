@@ -27,6 +27,8 @@ from taichi_ants.reference.castes import (
     castes_at_start,
     draw_caste,
     draw_threshold,
+    draw_trait,
+    epsilon_of,
     starts_foraging,
     stops_foraging,
 )
@@ -39,7 +41,8 @@ from taichi_ants.reference.choice import (
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
 from taichi_ants.reference.learners import LEARNERS, Learner
-from taichi_ants.reference.observations import OBSERVATIONS, TURNS, codes_in_view, observe
+from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
+from taichi_ants.reference.own_observations import state_by
 from taichi_ants.reference.own_rules import choose_by_rule, pay
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
 from taichi_ants.reference.sharing import SHARING, ByGroup, FrozenTable
@@ -86,7 +89,6 @@ class ReferenceColony:
         streams: The random streams of the initial ants, which continue through all episodes.
         next_number: The number of the next ant that is added.
         stores: Food items that each queen will turn into ants.
-        stimuli: The stimulus of each nest, to which idle ants respond.
         queen_stream: The queen's random stream, which continues; wandering food also uses it.
         minds: The tables; see `sharing`.
         epsilon, learning_rate: Values in the present episode, float64.
@@ -119,13 +121,16 @@ class ReferenceColony:
             training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
         check_one_of("sharing", sharing, tuple(SHARING))
         check_one_of("learner", training.learner, tuple(LEARNERS))
-        check_one_of("observation", task.observation, tuple(OBSERVATIONS))
         falls = (
             task.evaporation_in_evaluation if sharing == "frozen" else task.evaporation_in_training
         )
         self.pheromone = task.pheromone if falls else task.pheromone.lasting
         self.fields = {n: one if falls else one.lasting for n, one in task.fields.items()}
-        self._row = OBSERVATIONS[task.observation]
+        if task.observation in OBSERVATIONS:
+            self._row = OBSERVATIONS[task.observation]
+            self._turns = TURNS.get(task.observation, AHEAD)
+        else:
+            self._row, self._turns = state_by(task.sees), task.sees.cells
         self.start_world, self._training = world, training
         self.n_ants, self._ends_at_delivery = ants, ends_at_delivery
         self.slots = capacity or (2 * ants + 64 if task.life.births else ants)
@@ -147,6 +152,11 @@ class ReferenceColony:
         self.episode = -1
         self.records: list[EpisodeRecord] = []
         self._set_up()
+
+    @property
+    def stimuli(self) -> list[float]:
+        """The stimulus of each nest, to which idle ants respond."""
+        return self.world.stimuli
 
     @property
     def foods(self) -> list[Food]:
@@ -186,7 +196,6 @@ class ReferenceColony:
         )
         self.food_sources = FoodSources(self.start_world)
         self.stores = [0] * len(self.world.queens)
-        self.stimuli = [0.0] * len(self.world.queens)
         self.next_number = self.n_ants
         self.record = EpisodeRecord()
         self.over = False
@@ -212,6 +221,7 @@ class ReferenceColony:
         """Put an ant into its slot and onto its cell, idle if it has a threshold."""
         threshold = self.caste_of(ant).threshold
         ant.threshold = draw_threshold(threshold, self.seed, ant.number)
+        ant.trait = draw_trait(self.seed, ant.number)
         ant.idle = threshold.distribution != "none"
         self.ants[ant.slot] = ant
         self.world.ants[ant.cell] = ant
@@ -229,9 +239,8 @@ class ReferenceColony:
         """Update the percept and the state index of an ant, which may misread cells in view."""
         ant.percept, ant.misread = observe(self.world, ant), {}
         if self.task.noise.misread > 0 and self.episode >= 0:  # not before the first episode
-            turns = TURNS[self.task.observation]
-            codes = codes_in_view(self.world, ant, turns)
-            ant.misread = misread_codes(codes, turns, self.task.noise.misread, ant.stream)
+            codes = codes_in_view(self.world, ant, self._turns)
+            ant.misread = misread_codes(codes, self._turns, self.task.noise.misread, ant.stream)
         ant.state = self._row(self.world, ant)
 
     def begin_episode(self, world: World | None = None) -> None:
@@ -332,7 +341,7 @@ class ReferenceColony:
                 if self.sharing == "independent":
                     self.minds.of(ant).begin()
         if self.task.labour.rule == "thresholds":
-            self.stimuli = [one + (self.task.labour.demand or 0.0) for one in self.stimuli]
+            self.stimuli[:] = [one + (self.task.labour.demand or 0.0) for one in self.stimuli]
         self.record.ticks += 1
 
     def _pay(self, pairs: Sequence[tuple[Ant, Ant]], tick: int) -> None:
@@ -367,8 +376,7 @@ class ReferenceColony:
         return replace(self.task.choice, **own) if own else self.task.choice
 
     def _epsilon_of(self, ant: Ant) -> float:
-        own = self.caste_of(ant).epsilon
-        return self.epsilon if own is None else own
+        return epsilon_of(self.caste_of(ant), ant, self.epsilon)
 
     def _count(self, acting: Sequence[Ant]) -> None:
         """Record what happened in the tick."""
@@ -471,7 +479,8 @@ class ReferenceColony:
             rate, discount = caste.learning_rate, caste.discount
             mind.learning_rate = np.float32(self.learning_rate if rate is None else rate)
             mind.discount = np.float32(self._training.discount if discount is None else discount)
-            self.minds.learn([step], [ant.stream], self._epsilon_of(ant))
+            epsilon = self.epsilon if caste.epsilon is None else caste.epsilon
+            self.minds.learn([step], [ant.stream], epsilon)
 
 
 def beginner(

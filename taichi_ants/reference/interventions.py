@@ -288,6 +288,9 @@ class Interventions:
         ants = [(tuple(row[:3]), row[3]) for row in first.ants.tolist()]
         ants = [(cell, heading) for cell, heading in ants if start.get(cell, EMPTY) == EMPTY]
         foods = [(cell, self._kinds[cell]) for cell in held[FOOD]]
-        now = World(first.ranges, self._queens, foods, held[OBSTACLE], trails, ants)
+        now = World(
+            *(first.ranges, self._queens, foods, held[OBSTACLE], trails, ants),
+            regions=first.regions,
+        )
         colony.begin_episode(now)
         self._set_stream()

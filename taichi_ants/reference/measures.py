@@ -100,6 +100,19 @@ def mean_distance(colony: ReferenceColony) -> float:
     return sum(far) / len(far) if far else NONE
 
 
+def share_in_region(colony: ReferenceColony, name: str) -> float:
+    """Return the share of the ants in a region of the world."""
+    cells = set(listed_cells(colony.start_world.regions[name]))
+    inside = [ant.cell in cells for ant in colony.ants.values()]
+    return sum(inside) / len(inside) if inside else NONE
+
+
+def measured(colony: ReferenceColony, name: str) -> float:
+    """Return the value of a measure of `MEASURES`, or of "regions.NAME"."""
+    before, _, part = name.partition(".")
+    return share_in_region(colony, part) if before == "regions" else MEASURES[name](colony)
+
+
 MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
     "deliveries": lambda colony: colony.record.deliveries,
     "first_delivery": first_delivery,

@@ -58,7 +58,7 @@ def choose_by_rule(
         "epsilon": lambda: int(epsilon * _WORDS) / _WORDS,
         "random": lambda: low / _WORDS,
         "random_2": lambda: high / _WORDS,
-        "tick": lambda: tick,
+        **_of_ants(world, ant, tick),
         **_levels(world, ant, rule, misreads=True),
     }
     return int(computed(rule, task, inputs))
@@ -72,10 +72,20 @@ def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int
         "carries": lambda: ant.carries,
         "percept": lambda: was.percept,
         "next_percept": lambda: ant.percept,
-        "tick": lambda: tick,
+        **_of_ants(world, ant, tick),
         **_levels(world, ant, rule, misreads=False),
     }
     return int(computed(rule, task, inputs))
+
+
+def _of_ants(world: WorldState, ant: Ant, tick: int) -> Inputs:
+    """Return the inputs of all kinds of rules that ants follow."""
+    return {
+        "trait": lambda: ant.trait,
+        "threshold": lambda: ant.threshold,
+        "stimulus": lambda: world.stimuli[ant.nest],
+        "tick": lambda: tick,
+    }
 
 
 def _ahead(ant: Ant) -> list[Cell]:

@@ -10,9 +10,9 @@ import taichi_ants.interventions as language
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.protocol import At, Event, Every, When
 from taichi_ants.reference.colony import EpisodeRecord, ReferenceColony
-from taichi_ants.reference.geometry import Cell, normal_form
+from taichi_ants.reference.geometry import Cell, listed_cells, normal_form
 from taichi_ants.reference.interventions import Interventions
-from taichi_ants.reference.measures import MEASURES
+from taichi_ants.reference.measures import measured
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 
 _CONTENTS = {"rock": OBSTACLE, "food": FOOD}
@@ -81,7 +81,7 @@ class Protocol:
         assert isinstance(event, When)
         if tick == 0 or tick % event.interval or (event.once and number in self._happened):
             return False
-        value = MEASURES[event.measure](self._colony)
+        value = measured(self._colony, event.measure)
         return value > event.above if event.above is not None else value < event.below  # type: ignore[operator]
 
     def apply(self, one: Any) -> None:
@@ -91,27 +91,27 @@ class Protocol:
             case language.RemoveAnts(cells=None):
                 to.remove_some(self._amount(one), one.nest)
             case language.RemoveAnts():
-                to.remove_ants(_cells(one), one.nest)
+                to.remove_ants(self._cells(one), one.nest)
             case language.AddAnts(cells=None):
                 to.add_some(self._amount(one), one.heading, one.nest)
             case language.AddAnts():
-                to.add_ants(_cells(one), one.heading, one.nest)
+                to.add_ants(self._cells(one), one.heading, one.nest)
             case language.Ants():
                 to.set_ants(one.number)
             case language.Place(what="queen"):
-                to.move_queen(_cells(one)[0], one.nest or 0)
+                to.move_queen(self._cells(one)[0], one.nest or 0)
             case language.Place():
                 names = list(self._colony.task.foods)
                 kind = names.index(one.kind) if one.kind else 0
-                to.put(_cells(one), _CONTENTS[one.what], kind)
+                to.put(self._cells(one), _CONTENTS[one.what], kind)
             case language.Move():
-                to.move(*_cells(one))
+                to.move(*self._cells(one))
             case language.Clear():
-                to.put(_cells(one), EMPTY)
+                to.put(self._cells(one), EMPTY)
             case language.Trail(cells=None):
                 to.lay_trail(list(self._colony.world.ground), one.level, one.field)
             case language.Trail():
-                to.lay_trail(_cells(one), one.level, one.field)
+                to.lay_trail(self._cells(one), one.level, one.field)
             case language.Epsilon():
                 self._colony.epsilon = one.value
             case language.LearningRate():
@@ -133,7 +133,8 @@ class Protocol:
         ants = [ant for ant in self._colony.ants.values() if one.nest in (None, ant.nest)]
         return int(one.share * len(ants) + 0.5)
 
-
-def _cells(one: Any) -> list[Cell]:
-    """Return the cells of an intervention, without duplicates."""
-    return list(dict.fromkeys(normal_form(*cell) for cell in one.cells))
+    def _cells(self, one: Any) -> list[Cell]:
+        """Return the cells of an intervention, without duplicates."""
+        if isinstance(one.cells, str):
+            return listed_cells(self._colony.start_world.regions[one.cells])
+        return list(dict.fromkeys(normal_form(*cell) for cell in one.cells))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from taichi_ants.rules import Parameters, Rule
     from taichi_ants.task import Field, Food, Pheromone
-    from taichi_ants.task.events import Event
     from taichi_ants.worlds.world import World
 
 Level = int | np.integer | np.float32
@@ -71,15 +70,25 @@ class Trail:
         """Set the level of a cell other than a rock."""
         self._levels[self._place[cell]] = level
 
-    def deposit(self, cell: Cell, carried: int, ant: Ant, event: Event, tick: int) -> None:
-        """Deposit the pheromone of an ant that has had its load for `carried` ticks.
+    def deposit(
+        self, cell: Cell, ant: Ant, tick: int, others: Mapping[str, Trail], stimulus: float
+    ) -> None:
+        """Deposit the pheromone of an ant that has had its load for `ant.carried` ticks.
 
-        The ant has the load after its action, and the percept before it.
+        The ant has the load and the event after its action, and the percept before it. `others`
+        are all pheromones by name, `stimulus` is that of the ant's nest.
         """
-        place, rule = self._place[cell], self.rule
+        place, rule, carried = self._place[cell], self.rule, ant.carried
         if rule.own_deposit is not None:
-            facts = {"carried": carried, "carries": ant.carries, "event": event, "tick": tick}
-            facts |= {"percept": ant.percept}
+            facts: dict[str, Any] = {
+                "carried": carried,
+                "carries": ant.carries,
+                "event": ant.event,
+                "tick": tick,
+            }
+            facts |= {"percept": ant.percept, "trait": ant.trait, "threshold": ant.threshold}
+            facts["stimulus"] = stimulus
+            facts |= {f"level_{name}": one.level(cell) for name, one in others.items()}
             level = self._computed(rule.own_deposit, place, facts)
             self._levels[place] = level if rule.dense else math.floor(level)
         elif rule.deposit == "set":
@@ -128,7 +137,7 @@ class WorldState:
 
     `ground` maps each cell to EMPTY, OBSTACLE, FOOD or QUEEN; it is EMPTY under ants. `ants` maps
     cells to ants. `fields` are further pheromones by name. `cues` are the names of the outbound and
-    the homing cue by caste.
+    the homing cue by caste. `stimuli` are those of the nests.
     """
 
     def __init__(
@@ -142,6 +151,7 @@ class WorldState:
     ) -> None:
         self._ranges, self.foods = world.ranges, foods
         self.queens: list[Cell] = queens_of(world)
+        self.stimuli = [0.0] * len(self.queens)
         self.ground: dict[Cell, int] = dict.fromkeys(existing_cells(self._ranges), EMPTY)
         self.ground.update(dict.fromkeys(self.queens, QUEEN))
         self.ground.update(dict.fromkeys(listed_cells(world.foods), FOOD))
@@ -165,6 +175,11 @@ class WorldState:
         outbound, homing = self.cues[ant.caste]
         uses_homing = ant.carries and homing != "compass"
         return self.pheromone_named(homing if uses_homing else outbound)
+
+    @property
+    def pheromones(self) -> dict[str, Trail]:
+        """The trail and the further fields, by name."""
+        return {"trail": self.trail, **self.fields}
 
     def pheromone_named(self, name: str) -> Trail:
         """Return the trail, or a further field."""

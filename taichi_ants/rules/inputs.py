@@ -29,11 +29,18 @@ class Kind(NamedTuple):
     most: float
     is_whole: bool
     inputs: Mapping[str, Input]
-    reads_fields: bool = False
+    of_fields: tuple[str, ...] = ()  # the beginnings of inputs that read a field
 
 
 _CODES = "codes seen: 0 E, 1 O, 2 T or S, 3 F or Q; see the glossary"
 _CUE = "the ant's cue: the pheromone that an ant with its load follows"
+LABOUR = ("threshold", "stimulus")  # inputs that need `Task.labour`
+_OF_ANTS = {  # of all kinds of rules that ants follow
+    "trait": Input("number of the ant from 0 to less than 1, which never changes"),
+    "threshold": Input("response threshold of the ant, 0 without one; needs `task.labour`"),
+    "stimulus": Input("stimulus of the ant's nest; needs `task.labour`"),
+    "tick": Input("number of the tick in the episode, from 0"),
+}
 KINDS: dict[str, Kind] = {
     "choice": Kind(
         "an action: 0 left, 1 forward, 2 right, 3 pick up, 4 give",
@@ -50,9 +57,9 @@ KINDS: dict[str, Kind] = {
             "epsilon": Input("exploration rate"),
             "random": Input("random number from 0 to less than 1"),
             "random_2": Input("another random number from 0 to less than 1"),
-            "tick": Input("number of the tick in the episode, from 0"),
+            **_OF_ANTS,
         },
-        reads_fields=True,
+        of_fields=(LEVELS, LEVEL),
     ),
     "deposit": Kind(
         "the new level of the cell; the level itself for no deposit",
@@ -63,8 +70,9 @@ KINDS: dict[str, Kind] = {
             "carries": Input("1 if the ant has food after its action, else 0"),
             "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
             "percept": Input("the paper's state of the ant before its action, 0 to 127"),
-            "tick": Input("number of the tick in the episode, from 0"),
+            **_OF_ANTS,
         },
+        of_fields=(LEVEL,),
     ),
     "evaporation": Kind(
         "the level of a cell after the tick, before diffusion",
@@ -85,9 +93,9 @@ KINDS: dict[str, Kind] = {
             "next_percept": Input("the paper's state after the tick, 0 to 127"),
             "levels": Input(f"levels of {_CUE}, after the tick; 0 on obstacles and food", AHEAD),
             "level": Input("level of the ant's cue on its own cell, after the tick"),
-            "tick": Input("number of the tick in the episode, from 0"),
+            **_OF_ANTS,
         },
-        reads_fields=True,
+        of_fields=(LEVELS, LEVEL),
     ),
 }
 
@@ -96,9 +104,9 @@ def input_of(kind: str, name: str) -> Input | None:
     """Return an input of a kind of rules by its name; None if there is none."""
     if name in KINDS[kind].inputs:
         return KINDS[kind].inputs[name]
-    for start, length in ((LEVELS, AHEAD), (LEVEL, 0)):
-        if KINDS[kind].reads_fields and name.startswith(start) and name != start:
-            return Input(f"level of {name.removeprefix(start)}", length)
+    for start in KINDS[kind].of_fields:
+        if name.startswith(start) and name != start:
+            return Input(f"level of {name.removeprefix(start)}", AHEAD if start == LEVELS else 0)
     return None
 
 
@@ -140,7 +148,7 @@ def _drawn(rng: np.random.Generator, name: str) -> float:
 
     if name in _MOST:
         return float(rng.integers(_MOST[name] + 1))
-    if name in ("random", "random_2", "epsilon"):
+    if name in ("random", "random_2", "epsilon", "trait"):
         return float(rng.integers(2**32)) / 2**32
     if name in ("tick", "carried"):
         return float(int(10 ** rng.uniform(0, 7)) - 1)

@@ -177,6 +177,8 @@ class _Translation:
             return f"ti.select({self._truth(node.test)}, {branches})"
         if isinstance(node, ast.Call):
             return self._call(node)
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
+            raise self._refuse(node, "is not allowed; write power(x, y), of taichi_ants.rules")
         raise self._refuse(node)
 
     def _literal(self, node: ast.expr, value: Any) -> str:

@@ -46,6 +46,7 @@ class Rule:
         function: The function. Arguments without a default are inputs; `taichi_ants.rules.KINDS`
             has the inputs of each kind. In "choice" and "reward", `levels_NAME` are the levels of
             the field NAME in the three cells ahead, and `level_NAME` is that of the ant's own cell.
+            In "deposit", `level_NAME` is that of the cell of the deposit.
             Arguments with a default are parameters, whole numbers or floats.
         twin: The function that the reference calls; `function` itself unless another one is given.
         inputs: The inputs by name, in the order of the arguments.
@@ -172,7 +173,7 @@ def _rule(
         if argument.default is argument.empty:
             one = input_of(kind, argument.name)
             if one is None:
-                more = ", levels_FIELD, level_FIELD" if KINDS[kind].reads_fields else ""
+                more = "".join(f", {start}FIELD" for start in KINDS[kind].of_fields)
                 raise AntsError(
                     f"the rule {name!r} has the argument {argument.name!r}, which is not an input "
                     f"of the kind {kind!r}; choose from {', '.join(KINDS[kind].inputs)}{more}, or "

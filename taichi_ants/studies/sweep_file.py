@@ -307,7 +307,8 @@ def _point(
         *(one.path for one in all_of(Task) if not one.is_group or one.has_names),
         *(one.path for one in (*declared(TrainingConfig), *more)),
     ]
-    named = "|".join(re.escape(one.path) for one in named_groups(Task)) or "-"
+    tables = ["world.regions", *(one.path for one in named_groups(Task))]
+    named = "|".join(map(re.escape, tables))
     settings, events = _without_events(settings)
     for name in settings:
         # The world checks its settings, and named groups check theirs.
@@ -356,7 +357,7 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
     part = name if any(one.startswith(f"{name}.") for one in known) else name.rpartition(".")[0]
     if part and part not in _PARTS:
         near = near or [one for one in known if one.rpartition(".")[0] == part]
-    near = near or difflib.get_close_matches(name, known, 3)
+    near = near or difflib.get_close_matches(name, [*known, *_OF_FILE], 3)
     near = near or [*_own(kind), *(f"{one}. ..." for one in _PARTS[:3])]
     return f"of this sweep; choose one of {', '.join(near)}"
 
@@ -364,11 +365,15 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
 def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
     preset, drawn = given.pop("preset", "paper"), "seed" in given
     first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
+    regions = given.pop("regions", {})
+    if not isinstance(regions, Mapping):
+        raise AntsError(f"world.regions is {shown(regions)}; it must be a table of regions.")
     if checked_flag("world.per_seed", per_seed) and kind == "runs":
         raise AntsError('world.per_seed is true, but kind is "runs"; leave it out.')
     if per_seed or drawn:
         worlds.check_seed_counts(preset, "world.per_seed" if per_seed else "world.seed")
     if not per_seed:
-        return worlds.build(preset, first, **given)
+        return worlds.build(preset, first, **given).with_regions(regions)
     checked_whole("world.seed", first, -(2**62), 2**62)
-    return tuple(worlds.build(preset, first + seed, **given) for seed in seeds)
+    drawn_worlds = (worlds.build(preset, first + seed, **given) for seed in seeds)
+    return tuple(world.with_regions(regions) for world in drawn_worlds)

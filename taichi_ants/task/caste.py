@@ -99,6 +99,11 @@ class Caste(Settings, path="task.castes.NAME"):
         Is("policy file, or the name of a hand-written policy, that the ants follow; off: learn"),
     ] = None
     epsilon: Annotated[float | None, Is("constant exploration rate", least=0, most=1)] = None
+    epsilon_spread: Annotated[
+        float | None,
+        Is("half the range of the exploration rates of the ants around `epsilon`"),
+        Is(least=0, most=0.5),
+    ] = None
     learning_rate: Annotated[
         float | None, Is("constant learning rate", least=1e-37, most=1)
     ] = None  # fmt: skip
@@ -143,6 +148,20 @@ class Caste(Settings, path="task.castes.NAME"):
             raise AntsError(
                 f"`{self.path}.ants` is {self.ants}, but `share` is {self.share}; give one of them."
             )
+        if self.epsilon_spread is not None:
+            self._check_spread(self.epsilon_spread)
+
+    def _check_spread(self, spread: float) -> None:
+        if self.epsilon is None:
+            raise AntsError(
+                f"`{self.path}.epsilon_spread` is {spread}, but `epsilon` is off; set it, too."
+            )
+        if spread > min(self.epsilon, 1 - self.epsilon):
+            raise AntsError(
+                f"`{self.path}.epsilon_spread` is {spread}; with `epsilon` {self.epsilon} it must "
+                f"be at most {min(self.epsilon, 1 - self.epsilon):g}, because rates lie between 0 "
+                "and 1."
+            )
 
     def __repr__(self) -> str:
         """Return the settings that differ from their defaults."""
@@ -152,7 +171,8 @@ class Caste(Settings, path="task.castes.NAME"):
     @property
     def fixed(self) -> tuple[Any, ...]:
         """The settings that cannot change in an episode."""
-        return self.share, self.ants, self.nest, self.policy, self.threshold.exists
+        varies = bool(self.epsilon_spread)
+        return self.share, self.ants, self.nest, self.policy, self.threshold.exists, varies
 
     def laid(self, names: Sequence[str]) -> list[str]:
         """Return the pheromones that the ants lay, of those with these names."""

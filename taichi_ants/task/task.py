@@ -9,6 +9,7 @@ from functools import partial
 from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.rules.inputs import LABOUR
 from taichi_ants.rules.registry import Parameters, Rule, own, words
 from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
@@ -216,6 +217,11 @@ class Task(Settings, path="task"):
                     raise AntsError(
                         f"the rule {name!r} reads the field {read!r}; add `task.fields.{read}`."
                     )
+            needs = [read for read in LABOUR if read in rule.inputs]
+            if needs and not self.labour.divides:
+                raise AntsError(
+                    f"the rule {name!r} reads `{needs[0]}`; set `task.labour.rule` to 'thresholds'."
+                )
         if self.choice.own_rule and self.noise.misread and self.observation != "paper":
             raise AntsError(
                 f"`task.noise.misread` is {self.noise.misread}; with your rule of choice "
@@ -270,9 +276,10 @@ class Task(Settings, path="task"):
                 f"{path}.threshold` is {caste.threshold.distribution!r}; leave it out unless "
                 "`task.labour.rule` is 'thresholds'."
             )
+        learning = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
         rules = {
-            "greedy": ("policy", "epsilon", "learning_rate", "discount"),
-            "softmax": ("policy", "epsilon", "learning_rate", "discount", "temperature"),
+            "greedy": learning,
+            "softmax": (*learning, "temperature"),
             "deneubourg": ("k", "exponent"),
         }
         usual = rules["greedy"] if self.choice.needs_table else ()  # for your own rules

@@ -107,7 +107,8 @@ class Panel {
     const shapes = header.view.map((turn, i) => {
       const angle = (turn * Math.PI) / 3, x = 1.732 * Math.sin(angle), y = -1.732 * Math.cos(angle);
       const cell = ant.cell + this.history.grid.offsets[(ant.heading + turn + 6) % 6], letter = letters[i] ?? "";
-      const hidden = letter === "E" || (ant.loaded && /^[A-SU-Z]/i.test(letter));
+      // Ants may see another field by other rules.
+      const hidden = header.pheromone === "trail" && (letter === "E" || (ant.loaded && /^[A-SU-Z]/i.test(letter)));
       hides ||= hidden && world.trail[cell] >= 1;
       return `<g transform="translate(${x} ${y})">
         <path d="${HEXAGON}" transform="scale(.93)" fill="${letter === "O" ? "var(--rock)" : this.fillOf(cell, world, hidden)}"/>
@@ -192,7 +193,7 @@ class Panel {
       `${link(number)} (${history.header.actions[action]}${["BLOCKED", "FAILED"].includes(event) ? ", failed" : ""})`);
     const lines = [
       ["contains", ants.length ? ants.map(link).join(", ") : HOLDS[ground[cell]] ?? "?"],
-      ["trail", `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.strongest}`],
+      [safe(history.header.pheromone), `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.strongest}`],
       ["next actions", wanting.join(", ") || "none"],
     ];
     card.innerHTML = `<div class="head"><h2>Cell (${history.grid.cube(cell).join(", ")})</h2>`
@@ -222,7 +223,7 @@ class Panel {
     byId("legend").innerHTML = [
       `${bodies[0]}ant`, `${bodies[1]}ant with food`, `${cell("var(--food-floor)", drawing("food", CRUMBS))}food`,
       `${cell("var(--queen-floor)", drawing("queen", CROWN))}queen`, `${cell("var(--rock)")}rock`,
-      '<span class="ramp"></span>trail',
+      `<span class="ramp"></span>${safe(this.history.header.pheromone)}`,
     ].map((item) => `<li>${item}</li>`).join("");
     document.querySelector(".ramp").style.background = `linear-gradient(to right,${samples.join()})`;
   }

@@ -15,11 +15,13 @@ from taichi_ants import learners
 from taichi_ants.checks import check_progress, check_rewards, refuse_castes, refuse_foods
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
-from taichi_ants.errors import AntsError, count, expect
+from taichi_ants.errors import AntsError, check_one_of, count, expect
 from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import Episode, colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
+from taichi_ants.task.field import TRAIL
+from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.viewer.frames import Recording, pack, types_of
 
 _MOST_NAMES = 4096  # states up to which a header names all states, seen or not
@@ -82,21 +84,32 @@ class Recorder:
         world: The number of the world; AntsError if there is no such world.
         title: The title of the page; "" for a description of the colony.
         follow: The number of the ant that the page follows at first.
+        pheromone: The name of the pheromone that the page shows: the trail, or a field.
+
+    Raises:
+        AntsError: The page cannot show the task, or there is no such pheromone.
     """
 
     def __init__(
-        self, colony: Colony, world: int = 0, title: str = "", follow: int | None = None
+        self,
+        colony: Colony,
+        world: int = 0,
+        title: str = "",
+        follow: int | None = None,
+        pheromone: str = TRAIL,
     ) -> None:
         expect("colony", colony, Colony)
         expect("title", title, str)
         refuse_foods(colony.task, "the viewer")
         refuse_castes(colony.task, "the viewer")
         check_rewards(colony.task, "the viewer")
+        check_one_of("pheromone", pheromone, (TRAIL, *colony.fields))
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
+        self.pheromone = pheromone
         start = colony.snapshot(world)
         self.grid = start.grid
         self._n_states = colony.task.n_states
-        self.types = types_of(self.grid.size, self._n_states, colony.pheromone.dense)
+        self.types = types_of(self.grid.size, self._n_states, self._rule.dense)
         self._learns = colony.sharing != "frozen"
         learner = learners.get(colony.training.learner)
         self._has_td_errors = learner.td_error is not None and not learner.plans
@@ -104,7 +117,8 @@ class Recorder:
         # The data of a page that has read all frames so far.
         self._numbers = np.zeros(0, np.int32)
         self._ground = np.zeros(self.grid.size, np.uint8)
-        self._trail = np.zeros(self.grid.size, start.trail.dtype)  # as it is stored
+        # The levels of the pheromone, as they are stored.
+        self._trail = np.zeros(self.grid.size, start.fields[pheromone].dtype)
         self._queens = np.zeros(0, np.int32)
         owners = colony.owners
         self._known = np.zeros(owners * self._n_states, bool)  # rows of tables that were sent
@@ -113,6 +127,11 @@ class Recorder:
         self._fixed: np.ndarray | None = None
         self._fixed = None if self._learns else self._tables()  # constant if no ant learns
         self.progress = Progress(colony, world)
+
+    @property
+    def _rule(self) -> Pheromone:
+        """The rules of the pheromone that the page shows."""
+        return self.colony.pheromones[self.colony.task.number_of(self.pheromone)]
 
     def header(self) -> dict[str, Any]:
         """Return facts about all frames, JSON-compatible."""
@@ -124,7 +143,8 @@ class Recorder:
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
-            "strongest": task.pheromone.darkest,
+            "strongest": self._rule.darkest,
+            "pheromone": self.pheromone,
             "n_states": self._n_states,
             "names": self.names(),
             "view": list(task.sees.cells),
@@ -161,7 +181,8 @@ class Recorder:
         if colony.n_nests > 1:
             lines["nests"] = str(colony.n_nests)
         if colony.fields:
-            lines["pheromone"] = f"the trail; hidden: {', '.join(colony.fields)}"
+            hidden = [name for name in (TRAIL, *colony.fields) if name != self.pheromone]
+            lines["pheromone"] = f"{self.pheromone}; hidden: {', '.join(hidden)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
             shared = "one per nest" if colony.n_nests > 1 else "shared"
@@ -257,7 +278,7 @@ class Recorder:
         rates = (colony.epsilon, colony.learning_rate)
         delivered = colony.delivered[self.world] + totals[0]
         counts = (len(numbers), delivered, self.progress.ticks)
-        stored, clock = colony.stored_trail(self.world)
+        stored, clock = colony.stored_trail(self.world, self.pheromone)
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
         sections.setdefault("progress", self.progress.news())
         sections |= _changes("ground", self._ground, snapshot.ground)
@@ -299,6 +320,7 @@ def record_colony(
     world: int = 0,
     title: str = "",
     follow: int | None = None,
+    pheromone: str = TRAIL,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Return a recording of a colony's next ticks; other arguments are those of `Recorder`.
@@ -314,7 +336,7 @@ def record_colony(
     """
     between, done = intervals(colony, ticks, frame_interval, follow), 0
     check_progress(progress)
-    recorder = Recorder(colony, world, title, follow)
+    recorder = Recorder(colony, world, title, follow, pheromone)
     frames = [recorder.snapshot()]
     for n in between:
         frames.append(recorder.tick(n))

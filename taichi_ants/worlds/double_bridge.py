@@ -50,7 +50,8 @@ def double_bridge(
     """Return a world with a short and a long branch between nest and food, enclosed by rocks.
 
     The queen is at the origin, in the middle of a room. The food is a pile in the middle of another
-    room. There are no trails and no listed ants. Lengths are steps from junction to junction;
+    room. The branches without the junctions are the regions "short" and "long". There are no trails
+    and no listed ants. Lengths are steps from junction to junction;
     `long` is at most 2 * short - 3 - aside. With `aside` 0, the first cells of both branches at the
     food's junction are as far from the queen as the junction. With larger values, the first cell of
     the short branch is nearer to her, and that of the long branch is not.
@@ -61,11 +62,13 @@ def double_bridge(
     to_pile = grid.distances(pile)
     walled = np.minimum(grid.distances(queen), to_pile) > ROOM_RADIUS
     walled[grid.index(corridors)] = False
+    branches = branch_cells(short, long, mirrored, aside)
     return World(
         grid.ranges,
         queen,
         foods=grid.cells(np.flatnonzero(grid.exists & (to_pile <= PILE_RADIUS))),
         obstacles=grid.cells(np.flatnonzero(grid.exists & walled)),
+        regions=dict(zip(("short", "long"), branches, strict=True)),
     )
 
 

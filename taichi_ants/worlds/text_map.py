@@ -13,6 +13,10 @@ and fourth kind.
 
 Lines that start with `;` are comments. A line `trail = 25` above the drawing sets the level of all
 trails. Ants are numbered in reading order.
+
+A line `region gate = %` above the drawing says that cells drawn as % are empty, and belong to the
+region "gate"; with `region gate = % #` they are obstacles. A cell can belong to several regions, as
+in `region gate, short = % #`, and a region can have several marks, each in its own line.
 """
 
 from __future__ import annotations
@@ -20,8 +24,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +46,8 @@ ANTS_ON_TRAIL = "abcdef"
 _CELLS = {EMPTY, OBSTACLE, TRAIL, *FOODS, *QUEENS, *ANTS, *ANTS_ON_TRAIL}
 _ALLOWED = ". # t, F G H I, Q R S U, 0 to 5, a to f and blanks"
 _SETTING = re.compile(r"\s*([A-Za-z]\w*)\s*=(.*)")
+_REGION = re.compile(r"\s*region\s+(\w+(?:\s*,\s*\w+)*)\s*=\s*(\S)(?:\s+(\S))?\s*")
+_MARKS = "%*@+!$&/?:<>^~|-_gklmnopqrsuvwxyzABCDEJKLMNOPTVWXYZ6789"  # for regions, in this order
 
 
 def load_map(path: str | os.PathLike[str]) -> World:
@@ -57,7 +64,7 @@ def from_text(text: str, source: str = "the map") -> World:
     if not isinstance(text, str):
         raise AntsError(f"{source} is {type(text).__name__}; it must be text.")
     text = text.removeprefix("\ufeff")  # the byte-order mark, which some editors write
-    level, drawn = _read(text, source)
+    level, drawn, regions = _read(text, source)
     axials = _axials(drawn, source)
     ranges, origin = smallest_world(axials)
     cells = cube(axials - origin)
@@ -65,6 +72,13 @@ def from_text(text: str, source: str = "the map") -> World:
     undrawn = grid.exists.copy()
     undrawn[grid.index(cells)] = False
 
+    names = dict.fromkeys(name for several in regions.values() for name in several.names)
+    within = {
+        name: cells[[one.mark in regions and name in regions[one.mark].names for one in drawn]]
+        for name in names
+    }
+    drawn = [replace(one, mark=regions[one.mark].cell) if one.mark in regions else one
+             for one in drawn]  # fmt: skip
     marks = np.array([one.mark for one in drawn])
     trails = cells[np.isin(marks, [TRAIL, *ANTS_ON_TRAIL])]
     is_food = np.isin(marks, [*FOODS])
@@ -78,12 +92,13 @@ def from_text(text: str, source: str = "the map") -> World:
         obstacles=np.concatenate([cells[marks == OBSTACLE], grid.cells(np.flatnonzero(undrawn))]),
         trails=np.column_stack([trails, np.full(len(trails), level)]),
         ants=np.column_stack([cells[is_ant], np.array(headings, dtype=np.int64)]),
+        regions=within,
     )
 
 
 def ranges_of(text: str, source: str = "the map") -> tuple[int, int, int]:
     """Return the ranges of the world drawn in `text`, without building it."""
-    _, drawn = _read(text, source)
+    _, drawn, _ = _read(text, source)
     return smallest_world(_axials(drawn, source))[0]
 
 
@@ -100,9 +115,17 @@ class _Drawn:
         return f"line {self.line}, column {self.column + 1} of {source} has {self.mark!r}"
 
 
-def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
+class _Mark(NamedTuple):
+    """What the mark of a region draws: the character of the cell, and the names of the regions."""
+
+    cell: str
+    names: tuple[str, ...]
+
+
+def _read(text: str, source: str) -> tuple[int, list[_Drawn], dict[str, _Mark]]:
     level = None
     drawn: list[_Drawn] = []
+    regions: dict[str, _Mark] = {}
     row = 0
     for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
         if line.lstrip().startswith(";"):
@@ -115,15 +138,29 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
                 )
             level = _read_level(f"line {number} of {source}", *setting.groups())
             continue
+        if line.split()[:1] == ["region"]:
+            where = f"line {number} of {source}"
+            if drawn:
+                raise AntsError(f"{where} names a region; move it above the drawing.")
+            _read_region(where, line, regions)
+            continue
         row += 1
         for column, mark in enumerate(line):
             if mark != " ":
                 drawn.append(_Drawn(mark, number, row, column))
-                if mark not in _CELLS:
+                if mark not in _CELLS and mark not in regions:
                     raise AntsError(f"{drawn[-1].found(source)}; use only {_ALLOWED}.")
     if not drawn:
         raise AntsError(f"{source} has no cells; draw cells with {_ALLOWED}.")
-    queens = [one for one in drawn if one.mark in QUEENS]
+    for mark, several_names in regions.items():
+        if not any(one.mark == mark for one in drawn):
+            raise AntsError(
+                f"{source} has no cell {mark!r} of the region {', '.join(several_names.names)}; "
+                "draw one, or leave the line of the region out."
+            )
+    cell_of = {mark: one.cell for mark, one in regions.items()}
+    queens = [replace(one, mark=cell_of.get(one.mark, one.mark)) for one in drawn]
+    queens = [one for one in queens if one.mark in QUEENS]
     for nest, mark in enumerate(QUEENS):
         several = [one for one in queens if one.mark == mark]
         if not several and (nest == 0 or any(late.mark > mark for late in queens)):
@@ -134,12 +171,28 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn]]:
                 f"{several[1].found(source)} a second time; draw the queen of each nest once, as "
                 f"{', '.join(QUEENS)}."
             )
-    return DEFAULT_TRAIL_LEVEL if level is None else level, drawn
+    return DEFAULT_TRAIL_LEVEL if level is None else level, drawn, regions
+
+
+def _read_region(where: str, line: str, regions: dict[str, _Mark]) -> None:
+    """Add the mark of a line such as `region gate = % #`."""
+    form = "write a name and a mark, such as `region gate = %` or `region gate = % #`"
+    found = _REGION.fullmatch(line)
+    if found is None:
+        raise AntsError(f"{where} is {shown(line.strip())}; {form}.")
+    names, mark, cell = found.groups()
+    if mark in _CELLS or mark in regions or mark in "=;":
+        why = "is used already" if mark in regions else "has a meaning in maps"
+        free = " ".join(one for one in _MARKS[:10] if one not in regions)
+        raise AntsError(f"{where} has the mark {mark!r}, which {why}; choose one of {free}.")
+    if cell is not None and cell not in _CELLS:
+        raise AntsError(f"{where} draws cells as {cell!r}; use only {_ALLOWED}.")
+    regions[mark] = _Mark(cell or EMPTY, tuple(one.strip() for one in names.split(",")))
 
 
 def _read_level(where: str, name: str, value: str) -> int:
     if name != "trail":
-        raise AntsError(f"{where} sets {shown(name)}; the only setting is trail.")
+        raise AntsError(f"{where} sets {shown(name)}; the only settings are trail and region.")
     level = int(value) if re.fullmatch(r"\s*[0-9]{1,10}\s*", value) else 0
     if not 1 <= level <= MAX_TRAIL_LEVEL:
         raise AntsError(
@@ -238,7 +291,36 @@ def to_text(world: World) -> str:
     for *cell, heading in world.ants.tolist():
         letters = ANTS_ON_TRAIL if tuple(cell) in on_trail else ANTS
         marks.append((np.array([cell]), letters[heading]))
-    return "".join(f"trail = {level}\n" for level in levels) + drawing(world.ranges, marks)
+    lines = [f"trail = {level}" for level in levels]
+    if world.regions:
+        more, named = _marks_of_regions(world, marks)
+        lines, marks = [*lines, *named], [*marks, *more]
+    return "".join(f"{line}\n" for line in lines) + drawing(world.ranges, marks)
+
+
+def _marks_of_regions(
+    world: World, marks: Iterable[tuple[np.ndarray, str]]
+) -> tuple[list[tuple[np.ndarray, str]], list[str]]:
+    """Return the marks of the cells in regions, and the lines that explain them."""
+    drawn = {tuple(cell): mark for cells, mark in marks for cell in cells.tolist()}
+    inside: dict[tuple[int, ...], list[str]] = {}
+    for name, cells in world.regions.items():
+        for cell in map(tuple, cells.tolist()):
+            inside.setdefault(cell, []).append(name)
+    groups: dict[tuple[str, ...], list[tuple[int, ...]]] = {}
+    for cell, names in sorted(inside.items()):
+        groups.setdefault((drawn[cell], *names), []).append(cell)
+    if len(groups) > len(_MARKS):
+        raise AntsError(
+            f"the regions have {len(groups)} kinds of cells, but a map can show {len(_MARKS)}; "
+            "leave out some regions."
+        )
+    more, lines = [], []
+    for mark, ((cell_mark, *names), group) in zip(_MARKS, groups.items(), strict=False):
+        more.append((np.array(group), mark))
+        end = "" if cell_mark == EMPTY else f" {cell_mark}"
+        lines.append(f"region {', '.join(names)} = {mark}{end}")
+    return more, lines
 
 
 def drawing(ranges: tuple[int, int, int], marks: Iterable[tuple[np.ndarray, str]]) -> str:

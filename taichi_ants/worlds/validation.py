@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 import numpy as np
 
 from taichi_ants.errors import AntsError, count, entries_of, shown, whole
@@ -68,6 +71,46 @@ def parse_contents(
     for rows in contents.values():
         rows.setflags(write=False)
     return contents
+
+
+def parse_regions(grid: AxialGrid, regions: object) -> Mapping[str, np.ndarray]:
+    """Return the cells of regions, each int32 (n, 3) in lexicographic order, by sorted names.
+
+    A region is a sequence of cells, or a mapping with a `centre` and a `radius`.
+    """
+    if not isinstance(regions, Mapping):
+        raise AntsError(
+            f"regions are {shown(regions)}; they must be cells by the names of regions."
+        )
+    found: dict[str, np.ndarray] = {}
+    for name, cells in regions.items():
+        if not isinstance(name, str) or not name.isidentifier():
+            raise AntsError(
+                f"regions has the name {shown(name)}; it must be a word of letters, digits and _, "
+                "and not begin with a digit."
+            )
+        path = f"regions.{name}"
+        rows = _disc(path, cells, grid) if isinstance(cells, Mapping) else _parse(path, cells, grid)
+        if not len(rows):
+            raise AntsError(f"{path} is empty; give at least one cell.")
+        found[name] = np.unique(rows, axis=0)
+        found[name].setflags(write=False)
+    return MappingProxyType(dict(sorted(found.items())))
+
+
+def _disc(path: str, given: Mapping, grid: AxialGrid) -> np.ndarray:
+    """Return the cells of the world within a number of steps from a cell."""
+    if set(given) != {"centre", "radius"}:
+        raise AntsError(
+            f"{path} has the settings {', '.join(map(str, given)) or 'of nothing'}; give centre "
+            "(x, y, z) and radius, or a list of cells."
+        )
+    radius = whole(f"{path}.radius", given["radius"])
+    if radius < 0:
+        raise AntsError(f"{path}.radius is {radius}; it must be at least 0.")
+    row = np.array([_row(f"{path}.centre", given["centre"], "(x, y, z)", 3)])
+    ((x, y, z),) = _inside(f"{path}.centre", row, grid).tolist()
+    return grid.cells(np.flatnonzero(grid.exists & (grid.distances((x, y, z)) <= radius)))
 
 
 def _queens(values: object, grid: AxialGrid) -> np.ndarray:
@@ -140,7 +183,7 @@ def _inside(name: str, given: np.ndarray, grid: AxialGrid) -> np.ndarray:
     rows[:, :3] -= given[:, :3].min(axis=1, keepdims=True, initial=FAR)
     (outside,) = np.nonzero((rows[:, :3] >= np.array(grid.ranges)).any(axis=1))
     if len(outside):
-        place = f"{name}[{outside[0]}]" if name != "queen" else name
+        place = name if name == "queen" or name.endswith(".centre") else f"{name}[{outside[0]}]"
         raise AntsError(
             f"{place} is {tuple(given[outside[0]].tolist())}, outside the world; after the "
             f"smallest coordinate is subtracted from all, x, y, z must be below {grid.ranges}."

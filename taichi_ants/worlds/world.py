@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -46,6 +46,9 @@ class World:
             or such an array. `start` places additional ants.
         food_kinds: The kind of each food item, uint8 (n,), 0 to 7; empty if all are of kind 0.
         other_queens: The cells of the queens of all nests but the first, int32 (N - 1, 3).
+        regions: The cells of regions by name, each int32 (n, 3), for interventions and measures. A
+            region is a sequence of (x, y, z), or a mapping with a `centre` and a `radius` in steps.
+            Regions can overlap, and do not change the rules.
 
     Raises:
         AntsError: A value has the wrong form, is outside the world or listed twice, or shares a
@@ -60,6 +63,7 @@ class World:
     ants: np.ndarray = ()  # type: ignore[assignment]
     food_kinds: np.ndarray = ()  # type: ignore[assignment]
     other_queens: np.ndarray = ()  # type: ignore[assignment]
+    regions: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     if TYPE_CHECKING:  # arguments may be any sequences, but attributes are arrays
 
@@ -73,6 +77,7 @@ class World:
             ants: npt.ArrayLike = (),
             food_kinds: npt.ArrayLike = (),
             other_queens: npt.ArrayLike = (),
+            regions: Mapping[str, Any] = ...,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -90,6 +95,7 @@ class World:
             contents["food_kinds"] = contents["food_kinds"][:0]
         # The dataclass is frozen; only this code sets its fields.
         object.__setattr__(self, "ranges", ranges)
+        object.__setattr__(self, "regions", validation.parse_regions(grid, self.regions))
         for name, value in contents.items():
             object.__setattr__(self, name, value)
 
@@ -112,6 +118,21 @@ class World:
     def n_food_kinds(self) -> int:
         """The number of kinds of food, at least 1."""
         return int(self.food_kinds.max(initial=0)) + 1
+
+    def with_regions(self, regions: Mapping[str, Any]) -> World:
+        """Return the world with more regions, which replace those of the same names."""
+        more = validation.parse_regions(self.grid, regions)
+        return replace(self, regions={**self.regions, **more}) if more else self
+
+    def region(self, name: str) -> np.ndarray:
+        """Return the flat indices of the cells of a region; AntsError if there is none."""
+        if name not in self.regions:
+            known = ", ".join(self.regions) or "none"
+            raise AntsError(
+                f"there is no region {shown(name)} in the world, whose regions are: {known}; "
+                "choose one of them, or add it to the world."
+            )
+        return self.grid.index(self.regions[name])
 
     def ground(self) -> np.ndarray:
         """Return EMPTY, OBSTACLE (also outside), FOOD or QUEEN by cell, uint8 (grid.size,)."""
@@ -254,13 +275,17 @@ class World:
         """Return the world as names and lists of numbers; `from_dict` reads it."""
         parts = {name: getattr(self, name).tolist() for name in _PARTS}
         parts |= {name: getattr(self, name).tolist() for name in _MORE if len(getattr(self, name))}
+        if self.regions:
+            parts["regions"] = {name: cells.tolist() for name, cells in self.regions.items()}
         return {"ranges": [*self.ranges], "queen": [*self.queen], **parts}
 
     @classmethod
     def from_dict(cls, facts: Mapping[str, Any]) -> World:
         """Return the world of `as_dict`; raises ValueError, KeyError or TypeError."""
-        more = {name: np.array(facts[name]) for name in _MORE if name in facts}
-        return cls(facts["ranges"], facts["queen"], *(np.array(facts[n]) for n in _PARTS), **more)
+        parts: dict[str, Any] = {name: np.array(facts[name]) for name in _PARTS}
+        parts |= {name: np.array(facts[name]) for name in _MORE if name in facts}
+        parts["regions"] = facts.get("regions", {})
+        return cls(facts["ranges"], facts["queen"], **parts)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, World):
@@ -273,12 +298,13 @@ class World:
     @cached_property
     def _key(self) -> tuple:
         arrays = (getattr(self, name).tobytes() for name in (*_PARTS, *_MORE))
-        return (self.ranges, self.queen, *arrays)
+        regions = (part for name, one in self.regions.items() for part in (name, one.tobytes()))
+        return (self.ranges, self.queen, *arrays, *regions)
 
     def __reduce__(self) -> tuple:
         # Copies and unpickled worlds are built from their contents, so that arrays are read-only.
         arrays = (getattr(self, name) for name in (*_PARTS, *_MORE))
-        return World, (self.ranges, self.queen, *arrays)
+        return World, (self.ranges, self.queen, *arrays, dict(self.regions))
 
     def __repr__(self) -> str:
         queens = f"queen={self.queen}" if self.n_nests == 1 else f"queens: {self.n_nests}"

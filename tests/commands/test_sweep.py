@@ -186,6 +186,7 @@ WRONG = {
         "shapings =",
         ["'task.rewards.shapings' is not a setting", "task.rewards.shaping"],
     ),
+    "unknown key of the file": ("seeds =", "seds =", ["'seds' is not a setting", "one of seeds"]),
     "unknown above": ("episodes =", "episode =", ["'episode' is not a setting", "episodes"]),
     "not in full": (
         "task.rewards.shaping =",

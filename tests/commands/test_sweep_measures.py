@@ -207,3 +207,36 @@ def test_mistakes_end_in_one_sentence(old, new, words, sweep):
     assert_one_sentence(err)
     for word in words:
         assert word in err
+
+
+def test_regions_of_a_sweep_file(sweep):
+    """An intervention and a measure read them; the second event opens the gate, or does not."""
+    gate = """
+[world.regions]
+gate = [[0, 5, 5], [0, 5, 6]]
+all = {centre = [0, 0, 0], radius = 99}
+
+[[at]]
+tick = 0
+add_ants = "gate"
+
+[[at]]
+remove_ants = "all"
+
+[vary]
+at.2.tick = [1, 59]
+"""
+    text = FILE.replace('["entropy", "deliveries", "path_length"]', '["regions.all", "living"]')
+    text = text.replace("[vary]\ntask.pheromone.level = [20, 250]\n", gate)
+    text = text.replace("ants = 6", "ants = 6\ncapacity = 8")
+    status, _, _ = sweep(text, "--no-figures")
+    assert status == 0
+    rows = [row for row in read_csv("series.csv") if row["measure"] == "living"]
+    living = {(row["at.2.tick"], row["tick"]): row["value"] for row in rows}
+    assert living["59", "25"] == "8.0"
+    assert living["1", "25"] == living["59", "60"] == "0.0"
+    assert {row["regions.all"] for row in read_csv("runs.csv")} == {""}  # no ants are left
+    status, _, error = sweep(text.replace('"gate"', '"gte"'), "--no-figures", "--force")
+    assert status != 0
+    assert_one_sentence(error)
+    assert "there is no region 'gte' in the world, whose regions are: all, gate; choose" in error

@@ -12,6 +12,7 @@ from taichi_ants import Colony, TrainingConfig, measures, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.measures import registry
 from taichi_ants.rendering import Snapshot
+from taichi_ants.task import foraging
 
 GUIDE = (ROOT / "docs" / "measures.md").read_text("utf-8")
 
@@ -31,12 +32,13 @@ def test_your_own_measures_work_as_the_guide_writes_them(monkeypatch):
     follows = {"sharing": "frozen", "q_values": trail_follower()}
     rule = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
     colony = Colony(worlds.build("double_bridge"), None, rule, ants=9, **follows)
-    names = {"colony": colony}
+    names = {"colony": colony, "Colony": Colony, "rule": rule, "task": foraging()}
+    names |= {"trail_follower": trail_follower, "worlds": worlds}
     for kind, code in re.findall(r"```(\w*)\n(.*?)```", GUIDE, re.DOTALL):
-        if not kind and "measures." in code:
+        if not kind and "measures" in code:
             exec(compile(code.replace("2000", "200"), "measures.md", "exec"), names)
     assert set(measures.names()) - measures.BUILT_IN.keys() == {"outside", "branch", "most_active"}
-    assert {"branch.short", "branch.long"} == names["result"].series.values.keys()
+    assert {"regions.short", "regions.long"} == names["result"].series.values.keys()
     found = colony.run(1, 40, measures=["outside", "most_active"], every=20).series.values
     assert len(found) == 2
 

@@ -13,15 +13,17 @@ from browser import Page, assert_policy_holds, started
 from command_lines import crowding
 from rooms import CHOSEN, Guest, running
 
-from taichi_ants import Colony, load_policy
+from taichi_ants import Colony, TrainingConfig, World, load_policy
 from taichi_ants.commands import watch
 from taichi_ants.learners.expected_sarsa import EXPECTED_SARSA
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.server import Room
 from taichi_ants.live.session import Log, Session
-from taichi_ants.live.setup import MOST_ANTS
+from taichi_ants.live.setup import MOST_ANTS, Setup
+from taichi_ants.task import foraging
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.worlds import to_text
 
 pytestmark = pytest.mark.browser
 
@@ -29,7 +31,7 @@ WORLD = """() => {
   const { history } = viewer, moment = history.length - 1, frame = history.frames[moment];
   const { ground, trail } = history.worldAt(moment);
   return { ground: [...ground], trail: [...trail], cells: [...frame.cells].sort((a, b) => a - b),
-           loaded: frame.poses.reduce((sum, pose) => sum + (pose >> 3), 0),
+           loaded: frame.poses.reduce((sum, pose) => sum + (pose >> 3 & 1), 0),
            tick: frame.tick, deliveries: frame.deliveries };
 }"""
 
@@ -229,6 +231,64 @@ def test_each_tool_changes_the_world_of_the_engine(page, room, how):
     page.press("1")
     page.click_cell(here)
     assert "contains food" in page.text("#cell")
+
+
+def test_several_nests_are_shown_and_the_nearest_queen_moves(browser, shared):
+    world = World((7, 7, 7), [(0, 6, 0), (6, 0, 3)], [(0, 0, 5), (1, 0, 5)])
+    with Guest(shared) as guest:
+        guest.ask("begin", chosen={**CHOSEN, "world": "map", "map": to_text(world)})
+        guest.until("whole")
+    page = Page(browser, shared.url)
+    try:
+        page.press("Shift+ArrowRight")
+        wait(page, "viewer.history.frames.at(-1).tick === 10")
+        assert_same(page, shared)
+        colony = shared.session.colony
+        queens = page.read("[...viewer.history.frames.at(-1).queens]")
+        assert queens == colony.snapshot().queens.tolist()
+        nests = page.read("[...viewer.history.frames.at(-1).poses].map((pose) => pose >> 4)")
+        assert sorted(nests) == sorted(colony.nests[0, colony.living[0]].tolist())
+        far = colony.grid.distances((6, 0, 3))
+        free = [c for c in np.flatnonzero(far == 1) if shared.session.interventions.is_empty(c)]
+        page.press("7")
+        page.read("cell => viewer.chooseCell(cell, true)", int(free[0]))
+        page.tab.focus("#world")
+        page.tab.keyboard.press("Enter")
+        (edit,) = edits(shared, 1)
+        assert edit == {"place": {"what": "queen", "nest": 1, "cells": [int(free[0])]}}
+        assert_same(page, shared)
+        assert colony.snapshot().queens.tolist() == [queens[0], int(free[0])]
+    finally:
+        page.close()
+
+
+def test_a_field_is_shown_and_drawn(browser):
+    task = foraging().but(fields={"home": {"laid": "without_food", "level": 90}}, homing_cue="home")
+    learner = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9)
+    setup = Setup("paper", task, learner, 12, pheromone="home")
+    with running(Choices({}), setup=setup) as room:
+        page = Page(browser, room.url)
+        try:
+            page.press("Shift+ArrowRight")
+            wait(page, "viewer.history.frames.at(-1).tick === 11")
+            colony = room.session.colony
+            for _ in range(50):
+                shown = page.read(WORLD)["trail"]
+                if shown == colony.snapshot().fields["home"].tolist():
+                    break
+                time.sleep(0.1)
+            assert shown == colony.snapshot().fields["home"].tolist()
+            assert max(shown) > 0
+            assert "home" in page.text("#legend")
+            there = cell_of(room, 5, 4, 0)
+            page.press("4")
+            page.read("cell => viewer.chooseCell(cell, true)", there)
+            page.tab.focus("#world")
+            page.tab.keyboard.press("Enter")
+            (edit,) = edits(room, 1)
+            assert edit == {"trail": {"level": 90, "cells": [there], "field": "home"}}
+        finally:
+            page.close()
 
 
 def test_a_change_is_undone_and_the_session_before_comes_back(page, room):

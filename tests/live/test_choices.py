@@ -10,6 +10,7 @@ from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.commands import watch
+from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import TASKS, Choices, fields
 from taichi_ants.settings import Named, all_of
 from taichi_ants.task import Labour, Task
@@ -42,12 +43,17 @@ def test_the_form_has_every_setting_with_its_bounds():
     assert offered["world.aside"]["world"] == "double_bridge"
 
 
-def test_fields_that_the_page_cannot_show_are_refused():
+def test_fields_that_the_form_lacks_are_refused():
     chosen = Choices({}).chosen(Choices({}).setup(watch.START))
     Choices({}).setup(chosen)  # without the cues, which the form does not have
     for rules in ({"fields": {"home": {}}}, {"homing_cue": "trail"}):
-        with pytest.raises(AntsError, match=r"only the trail and the compass, so draw a Colony"):
-            replace(Choices({}).setup(watch.START), task=Task(**rules))
+        policy = Policy(trail_follower(), "paper", {"task": Task(**rules).as_dict()})
+        with pytest.raises(AntsError, match=r"the form of the live page has only the trail and"):
+            Choices({"mine": policy})
+        setup = replace(Choices({}).setup(watch.START), task=Task(**rules))
+        assert Choices({}).chosen(setup)["settings"]["task.outbound_cue"] == "trail"
+    with pytest.raises(AntsError, match=r"^pheromone is 'hme'; it must be one of trail, home\.$"):
+        replace(setup, task=Task(fields={"home": {}}), pheromone="hme")
 
 
 def test_settings_of_the_form_reach_the_session():

@@ -44,6 +44,12 @@ LIVELY = Task(
     life=Life(births=True, lifespan=60, regrowth=2, wander=9),
 )
 SMALL = {"ranges": (9, 8, 7)}
+HOMING = tasks.foraging().but(
+    fields={"home": {"laid": "without_food", "evaporation": "exponential"}}, homing_cue="home"
+)
+TWO_NESTS = text_map.to_text(
+    World((7, 7, 7), [(0, 6, 0), (6, 0, 3)], [(0, 0, 5), (1, 0, 5), (5, 5, 0)], [(0, 3, 0)])
+)
 SETUPS = {
     "foraging": Setup("open", tasks.foraging(), LEARNS, 20, 40, 3, 25, world_settings=SMALL),
     "queueing": Setup(
@@ -56,6 +62,8 @@ SETUPS = {
         world_settings=SMALL,
     ),
     "paper": Setup("paper", Task(), LEARNS, 5, ticks_per_episode=30, sharing="independent"),
+    "nests": Setup(TWO_NESTS, tasks.foraging(), LEARNS, 20, 40, 3, 25),
+    "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL, pheromone="home"),
 }
 MARKED = [pytest.param(one, marks=[pytest.mark.slow] * (one == "queueing")) for one in SETUPS]
 
@@ -144,7 +152,7 @@ def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeyp
     for one in (undone, again):
         one.advance(10)
         (seen,) = played(Recording(one.header(), [one.snapshot()]))
-        assert np.array_equal(seen.trail, one.colony.snapshot().trail)
+        assert np.array_equal(seen.trail, one.colony.snapshot().fields[session.setup.pheromone])
     assert undone.same(again)
     assert session.interventions.state() == stands
 
@@ -247,11 +255,11 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
         assert all(a.values[entry] == value for entry, value in b.values.items())
         known = {entry // 5 for entry in b.values}
         n_states = session.colony.task.n_states
-        owners = b.numbers if session.colony.one_a_slot else np.zeros(len(b.states), int)
+        owners = b.numbers if session.colony.one_a_slot else b.nests
         assert set((owners * n_states + b.states).tolist()) <= known
     snapshot = session.colony.snapshot()
     assert np.array_equal(joined[-1].ground, snapshot.ground)
-    assert np.array_equal(joined[-1].trail, snapshot.trail)
+    assert np.array_equal(joined[-1].trail, snapshot.fields[session.setup.pheromone])
 
 
 def test_states_have_names_before_they_are_seen_on_pages():
@@ -539,11 +547,26 @@ def test_a_policy_is_a_training_or_one_table(table):
         Setup("paper", Task(), table)
 
 
-def test_several_nests_are_refused():
-    world = World((3, 3, 3), [(0, 0, 0), (2, 0, 0)], foods=[(0, 2, 0)])
-    two = replace(SETUPS["paper"], world=text_map.to_text(world))
-    with pytest.raises(AntsError, match="the live page supports one nest and no"):
-        Session(two)
+def test_a_policy_of_several_nests_is_exported_if_they_share_it(tmp_path):
+    two = SETUPS["nests"]
+    with pytest.raises(AntsError, match=r"^each nest has its own table, but .* export the colony"):
+        Session(two).policy_bytes()
+    table = trail_follower("ants")
+    follows = Session(replace(two, policy=table))
+    (tmp_path / "policy.npz").write_bytes(follows.policy_bytes())
+    assert np.array_equal(load_policy(tmp_path / "policy.npz").q_values, table)
+
+
+def test_the_queen_of_any_nest_moves():
+    session = Session(SETUPS["nests"])
+    session.advance(10)
+    before = session.colony.snapshot().queens
+    empty = np.flatnonzero(session.colony.snapshot().ground == EMPTY)
+    cell = int(next(one for one in empty if session.interventions.is_empty(int(one))))
+    session.apply({"place": {"what": "queen", "nest": 1, "cells": [cell]}})
+    assert session.colony.snapshot().queens.tolist() == [before[0], cell]
+    session.apply({"episode": {}})
+    assert session.colony.snapshot().queens.tolist() == [before[0], cell]
 
 
 def test_what_a_hand_has_set_stays_in_later_episodes():

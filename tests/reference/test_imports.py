@@ -16,7 +16,7 @@ ALLOWED = {
     "taichi_ants.task.constants",
     "taichi_ants.task.events",
     "taichi_ants.errors",
-    # Your own rules, and the form of their inputs.
+    # Your own rules and observations, and the form of their inputs.
     "taichi_ants.rules",
     "taichi_ants.rules.functions",
     "taichi_ants.rules.inputs",
@@ -37,11 +37,12 @@ OUTSIDE = {
     "math",
     "numpy",
     "struct",
+    "types",
     "typing",
 }
 RULES = {
     *("Caste", "Choice", "Field", "Food", "Labour", "Life"),
-    *("Pheromone", "Rewards", "Task", "Threshold", "Traffic"),
+    *("Observation", "Pheromone", "Rewards", "Task", "Threshold", "Traffic"),
 }
 
 

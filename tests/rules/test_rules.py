@@ -20,10 +20,12 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.interventions import TaskNumbers
+from taichi_ants.reference import own_observations
 from taichi_ants.rules import exp, log, power, registry
 from taichi_ants.rules.inputs import KINDS
-from taichi_ants.task import Choice
-from taichi_ants.testing import check_rule
+from taichi_ants.task import Choice, Observation, observations
+from taichi_ants.task.observations import registry as seen
+from taichi_ants.testing import check_observation, check_rule
 
 
 @pytest.fixture
@@ -166,6 +168,10 @@ def after_loop(level):
     return i
 
 
+def square(level):
+    return level**2
+
+
 def half(random):
     return random * 4
 
@@ -191,6 +197,7 @@ WRONG = [
     ("choice", whole_vector, "is a vector; use its entries"),
     ("choice", outside, "must have an index from 0 to 2"),
     ("choice", far_entry, "IndexError: there is no entry 3"),
+    ("evaporation", square, r"`level ** 2`, is not allowed; write power(x, y), of"),
     ("choice", half, "an action, a whole number from 0 to 4"),
     ("evaporation", tuples, "assign to one name at a time"),
     ("deposit", starred, "use plain arguments"),
@@ -310,9 +317,57 @@ def test_a_rule_that_differs_from_its_twin_is_refused(clean):
         Colony(worlds.paper(), task, own_config(), 0).run(1, 1)
 
 
+def test_rules_that_read_labour_or_fields_need_them(clean):
+    message = r"^the rule 'hungry' reads `threshold`; set `task\.labour\.rule` to 'thresholds'\.$"
+    with pytest.raises(AntsError, match=message):
+        Task(choice="hungry")
+    castes, labour = {"one": {"threshold": 1.0}}, "thresholds"
+    assert Task().but(choice="hungry", castes=castes, labour=labour).choice.own_rule
+    with pytest.raises(AntsError, match=r"^the rule 'alarm' reads the field 'B'; add `task\.fiel"):
+        Task(pheromone=Pheromone(deposit="alarm"))
+    with pytest.raises(AntsError, match=r"'levels_B', which is not an input .* level_FIELD, or"):
+        rules.register("deposit")(reads_ahead)
+
+
+def reads_ahead(level, levels_B):  # noqa: N803
+    return level
+
+
+def homely(view):
+    index = 2 * view.percept
+    if view.own_B >= 1:
+        index += 1
+    if view.trail[0] > view.own_level:
+        index = view.strangers[2] + 2 * view.ants[0]
+    return index
+
+
+def test_an_observation_is_compared_with_the_reference(monkeypatch):
+    monkeypatch.setattr(seen, "_OBSERVATIONS", dict(seen._OBSERVATIONS))
+    observations.register(Observation("homely", 256, homely, reads=("B", "trail")))
+    check = check_observation("homely")
+    assert str(check) == "homely (reads the fields B and trail): 360 ticks of 6 colonies: equal"
+    monkeypatch.setattr(own_observations, "strongest_in_view", lambda *_: 0)
+    assert check_observation("homely").ticks == 360  # it does not read this
+    monkeypatch.setattr(own_observations, "codes_seen", lambda *_: [0, 0, 0])
+    check = check_observation("homely")
+    assert check.ticks < 360
+    assert check.difference.startswith("seed 0, tick ")
+
+
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    "name", ["alarm", *(pytest.param(n, marks=SLOW) for n in ("hungry", "demanded"))]
+)
+def test_rules_that_read_other_fields_and_labour_equal_the_reference(name):
+    assert check_rule(name, 100).difference == ""
+
+
 def test_every_input_is_used_by_the_rules_of_the_tests():
     used = {kind: set() for kind in KINDS}
-    for name in ("power_law", "weaker", "weber", "restless", "shaped"):
+    for name in rules.names():
         used[rules.get(name).kind] |= set(rules.get(name).inputs)
     for kind, known in KINDS.items():
         assert known.inputs.keys() <= used[kind], kind

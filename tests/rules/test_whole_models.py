@@ -26,6 +26,7 @@ from taichi_ants.reference.protocol import Protocol
 TICKS, EPISODES = 50, 2
 TRAIL = {"evaporation": "power_law", "half_life": None, "deposit": "weaker", "cap": None}
 TRAIL |= {"level": 250, "slope": None}
+ALARM = {"deposit": "alarm", "level": 250, "cap": None, "slope": None}
 # By name: arguments of `random_colony`; nests, kinds of food, loads; castes, labour, their cues;
 # and changes of the task.
 MODELS = {
@@ -62,6 +63,21 @@ MODELS = {
         (2, True, None),
         {"choice": "restless", "reward": "shaped", "fields": {"B": {"evaporation": "power_law"}}},
     ),
+    "labour of users": (
+        {
+            **{"learner": "sarsa", "sharing": "shared", "traffic": "following"},
+            **{"dense": False, "fields": "aB"},
+        },
+        (2, 2, False),
+        (2, True, None),
+        {"reward": "demanded", "pheromone": ALARM, "fields": {"a": ALARM, "B": ALARM}},
+    ),
+    "choice by labour": (
+        {"learner": "q_learning", "sharing": "frozen", "dense": True, "fields": "aB"},
+        (2, 1, False),
+        (2, True, None),
+        {"choice": "hungry", "fields": {"a": {**ALARM, "laid": "dead_end"}}},
+    ),
     "own tables": (
         {
             **{"learner": "dyna_q", "sharing": "independent", "observation": "queues"},
@@ -92,6 +108,8 @@ def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[Event]] | None
     life = drawn.task.life
     drawn = replace(drawn, task=drawn.task.but(life={"lifespan": life.lifespan and 25}))
     drawn = with_nests(drawn, seed, nests, kinds, loads)
+    if castes[1]:  # your rules can read thresholds; `drawn_castes` draws others
+        changes = {"labour": "thresholds", "castes": {"one": {"threshold": 1.0}}, **changes}
     drawn = replace(drawn, task=drawn.task.but(**changes))
     if not drawn.task.choice.needs_table:
         drawn = replace(drawn, training=None, q_values=None)

@@ -27,6 +27,7 @@ def weaker(
     carries,
     event,
     percept,
+    trait,
     tick,
     amount: Annotated[float, Is("level of a new deposit", least=0, most=300)] = 100.0,
 ):
@@ -37,7 +38,24 @@ def weaker(
     elif 0 < tick < 5:
         pass
     else:
-        found += amount * exp(-carried / 20) + log(1 + level)
+        found += amount * exp(-carried / 20) + log(1 + level) + 9 * trait
+    return min(found, HIGHEST)
+
+
+@rules.register("deposit")
+def alarm(
+    level,
+    level_trail,
+    level_B,  # noqa: N803
+    threshold,
+    stimulus,
+    carries,
+    amount=30.0,
+):
+    """Return a level that depends on other pheromones and on the division of labour."""
+    found = level
+    if level_trail < 5 * amount and stimulus > threshold / 4:
+        found = amount + level_B / 2 + 7 * carries
     return min(found, HIGHEST)
 
 
@@ -84,6 +102,7 @@ def restless(
     level_trail,
     levels_trail,
     percept,
+    trait,
     tick,
     boost: Annotated[int, Is("addition to a value", least=0, most=9)] = 1,
 ):
@@ -97,7 +116,7 @@ def restless(
         if value > top:
             top = value
             best = a
-    if random < epsilon + 0.1:
+    if random < epsilon + 0.2 * trait:
         best = (random_2 * 5 + tick + percept) // 1 % 5
     return best
 
@@ -111,6 +130,7 @@ def shaped(
     next_percept,
     levels,
     level,
+    trait,
     tick,
     scale: Annotated[float, Is("reward for a rising level", least=0, most=9)] = 2.0,
 ):
@@ -121,5 +141,27 @@ def shaped(
     if event == Event.DELIVERED:
         more += 5 + tick % 3
     if percept == next_percept:
-        more -= 1
+        more -= 1 + (trait < 0.3)
     return min(max((reward + more) // 1, -1000), 1000)
+
+
+@rules.register("choice")
+def hungry(codes, carries, threshold, stimulus, trait, random, random_2):
+    """Return an action that depends on the division of labour."""
+    action = random * 3 // 1
+    if random_2 + stimulus > threshold or trait < 0.5:
+        for i in range(3):
+            if codes[i] == 3:
+                action = 3 + carries
+            elif codes[i] == 2:
+                action = i
+    return min(action, 4)
+
+
+@rules.register("reward")
+def demanded(reward, event, threshold, stimulus):
+    """Return a reward that depends on the division of labour."""
+    more = 0
+    if event == Event.DELIVERED and stimulus > threshold:
+        more = 4
+    return min(max(reward + more + min(stimulus, 9) // 1, -1000), 1000)

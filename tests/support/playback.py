@@ -34,6 +34,7 @@ class Played:
         actions, events, td_errors: The last step of the ants of the previous moment.
         ground, trail: The contents and trail levels of all cells.
         values: Changed action values, by entry.
+        nests: The nests of the living ants.
     """
 
     clock: list[float]
@@ -48,6 +49,7 @@ class Played:
     ground: np.ndarray
     trail: np.ndarray
     values: dict[int, float] = field(default_factory=dict)
+    nests: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
 
     def row(self, state: int, n_states: int, owner: int = 0) -> np.ndarray:
         """Return the action values of a state, float32 (5,)."""
@@ -88,6 +90,7 @@ def played(recording: Recording) -> Iterator[Played]:
             ground.copy(),
             np.maximum(stored - stored.dtype.type(clock[9]), 0),
             dict(values),
+            (frame["poses"] >> 4).astype(int),
         )
 
 

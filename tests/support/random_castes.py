@@ -75,7 +75,10 @@ def _numbers(rng: np.random.Generator, drawn: RandomColony) -> dict[str, Any]:
         del able["temperature"]
     if task.life.lifespan is None and not task.life.births:
         del able["lifespan"]
-    return found | {name: one for name, one in able.items() if rng.random() < 0.5}
+    found |= {name: one for name, one in able.items() if rng.random() < 0.5}
+    if found.get("epsilon") == 0.2 and rng.random() < 0.5:
+        found["epsilon_spread"] = 0.15
+    return found
 
 
 def _share_out(rng: np.random.Generator, named: dict[str, dict[str, Any]], n: int) -> None:

@@ -1,4 +1,4 @@
-"""Small random worlds with food, rocks, trails of all strengths, and at most one ant."""
+"""Small random worlds with food, rocks, trails of all strengths, regions, and at most one ant."""
 
 from __future__ import annotations
 
@@ -16,7 +16,14 @@ def random_world(seed: int, largest_range: int = 5) -> World:
     while True:
         world = _draw(rng, largest_range)
         if world is not None:
-            return world
+            return world.with_regions(_regions(np.random.default_rng([seed, 12]), world))
+
+
+def _regions(rng: np.random.Generator, world: World) -> dict[str, object]:
+    """Return a region of some cells, and one around a cell; they may overlap."""
+    cells = rng.permutation(world.grid.cells(np.flatnonzero(world.grid.exists)))
+    disc = {"centre": cells[0].tolist(), "radius": int(rng.integers(3))}
+    return {"a": cells[: rng.integers(1, 5)], "b": disc}
 
 
 def _draw(rng: np.random.Generator, largest_range: int) -> World | None:

@@ -15,6 +15,7 @@ from websockets.sync.client import ClientConnection, connect
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.server import Room
 from taichi_ants.live.session import Session
+from taichi_ants.live.setup import Setup
 
 SECONDS = 60.0  # timeout of a client that waits for a message
 
@@ -38,9 +39,11 @@ CHOSEN: dict[str, Any] = {
 
 
 @contextmanager
-def running(choices: Choices, chosen: dict[str, Any] | None = None) -> Iterator[Room]:
+def running(
+    choices: Choices, chosen: dict[str, Any] | None = None, setup: Setup | None = None
+) -> Iterator[Room]:
     """Yield a server whose session runs in another thread."""
-    session = Session(choices.setup(chosen or CHOSEN))  # starts Taichi, in this thread
+    session = Session(setup or choices.setup(chosen or CHOSEN))  # starts Taichi, in this thread
     session.advance()
     room = Room(session, choices)
     thread = threading.Thread(target=room.run, daemon=True)

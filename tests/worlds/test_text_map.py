@@ -106,7 +106,10 @@ def test_settings() -> None:
         ("trail = ٣\nQ", "sets trail to '٣'"),
         ("trail =\nQ", "sets trail to ''"),
         ("trail = 1 2\nQ", "sets trail to '1 2'"),
-        ("; c\ntrails = 3\nQ", "line 2 of the map sets 'trails'; the only setting is trail"),
+        (
+            "; c\ntrails = 3\nQ",
+            "line 2 of the map sets 'trails'; the only settings are trail and region",
+        ),
         ("trail = 3\ntrail = 3\nQ", "line 2 of the map is 'trail = 3'; only one such line"),
         ("Q\ntrail = 3", "line 2 of the map is 'trail = 3'; only one such line is allowed, above"),
         ("Q" + " " * 200_003 + "." + "\n" * 200_000 + ".", "ranges are"),

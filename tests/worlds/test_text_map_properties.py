@@ -34,6 +34,12 @@ def drawable_worlds(draw: st.DrawFn) -> World:
         obstacles=are("#"),
         trails=[(cell, level) for cell in are("ta")],
         ants=[(cell, draw(st.integers(0, 5))) for cell in are("0a")],
+        regions=draw(
+            st.dictionaries(
+                st.sampled_from(["a", "region", "of_2"]),
+                st.lists(st.sampled_from(cells), min_size=1),
+            )
+        ),
     )
 
 
@@ -44,7 +50,7 @@ def test_reading_undoes_drawing(world: World) -> None:
     assert to_text(again) == drawn
     assert sorted(again.ants.tolist()) == sorted(world.ants.tolist())
     contents = (world.foods, world.obstacles, world.trails)
-    assert again == World(world.ranges, world.queen, *contents, again.ants)
+    assert again == World(world.ranges, world.queen, *contents, again.ants, regions=world.regions)
 
 
 @given(axial_cells)

@@ -2,6 +2,9 @@
 
 import taichi as ti
 
+from taichi_ants.grid.constants import STREAM_INDIVIDUAL
+from taichi_ants.task.rules.random_bits import advance, bits_of, high_word, stream_of
+
 
 @ti.func
 def trait(column: ti.template(), ant):
@@ -13,6 +16,13 @@ def trait(column: ti.template(), ant):
 def put(column: ti.template(), ant, value):
     """Set a value of an ant in a byte column."""
     column[ant] = ti.cast(value, ti.i8)
+
+
+@ti.func
+def individual(c: ti.template(), w, ant):
+    """Return the number of an ant that never changes, from 0 to less than 1, f64."""
+    stream = advance(stream_of(c.seeds[w], STREAM_INDIVIDUAL, ti.cast(c.number[ant], ti.u64)))
+    return ti.cast(high_word(bits_of(stream)), ti.f64) / 4294967296.0
 
 
 @ti.func

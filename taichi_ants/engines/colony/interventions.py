@@ -55,6 +55,7 @@ from taichi_ants.worlds.world import World
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
+Cells = np.ndarray | str  # flat indices (n,), or the name of a region
 REACH = 8  # cells; twice the radius of the largest brush on the live page
 
 
@@ -71,7 +72,8 @@ _CONTENT, _NUMBER = 15, 4
 class Interventions:
     """Changes of some worlds of a colony, and of the start of their later episodes.
 
-    Cells are flat indices, int (n,), without duplicates, see `index`. A cell on which something
+    Cells are flat indices, int (n,), without duplicates, or the name of a region, see `index`. A
+    cell on which something
     cannot be placed, because an ant, a rock or the queen is on it, does not change. A method that
     raises an error changes nothing, except worlds before the one with the error.
 
@@ -118,12 +120,16 @@ class Interventions:
         """The number of living ants in the first of the worlds."""
         return int(self.colony.arrays["worlds"][WorldRow.LIVING, self.worlds[0]])
 
-    def index(self, cells: Sequence[Any]) -> np.ndarray:
+    def index(self, cells: Sequence[Any] | str) -> Cells:
         """Return the flat indices of cells (x, y, z) or flat indices, without duplicates.
 
-        AntsError if a cell does not exist.
+        The name of a region remains. AntsError if a cell or the region does not exist.
         """
-        return indices(self.colony.grid, cells)
+        if not isinstance(cells, str):
+            return indices(self.colony.grid, cells)
+        for one in self._each():
+            one.index(cells)
+        return cells
 
     def is_empty(self, cell: int) -> bool:
         """Return whether a cell is empty and has no ant, in all of the worlds."""
@@ -133,7 +139,7 @@ class Interventions:
         """Return the flat indices of all cells."""
         return np.flatnonzero(self.colony.grid.exists)
 
-    def put(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
+    def put(self, cells: Cells, what: int, kind: int = 0) -> None:
         """Make cells EMPTY, OBSTACLE or FOOD, except those of queens and of ants that stay.
 
         Rock and food move ants aside, and rocks remove trails. Food of a kind fills its cell with
@@ -141,7 +147,7 @@ class Interventions:
         food. AntsError if later episodes would have no room for the ants, or no food to learn from.
         """
         for one in self._each():
-            one.put(cells, what, kind)
+            one.put(one.index(cells), what, kind)
         self.colony.observe(self.worlds)
 
     def move_queen(self, cell: int, nest: int = 0) -> None:
@@ -163,16 +169,15 @@ class Interventions:
             one.move(cell, to)
         self.colony.observe(self.worlds)
 
-    def lay_trail(self, cells: np.ndarray, level: int, field: str = TRAIL) -> None:
+    def lay_trail(self, cells: Cells, level: int, field: str = TRAIL) -> None:
         """Set the trail, or a further field, of cells other than rocks."""
         number = [TRAIL, *self.colony.fields].index(field)
         for one in self._each():
-            one.lay(cells[one.view("walls")[cells] == 0], level, number)
+            places = one.index(cells)
+            one.lay(places[one.view("walls")[places] == 0], level, number)
         self.colony.observe(self.worlds)
 
-    def add_ants(
-        self, cells: np.ndarray, heading: int | None = None, nest: int | None = None
-    ) -> None:
+    def add_ants(self, cells: Cells, heading: int | None = None, nest: int | None = None) -> None:
         """Put newborn ants on those of the cells that are empty, with random headings by default.
 
         By default, each belongs to the nest of the nearest queen. AntsError if the capacity of the
@@ -180,8 +185,9 @@ class Interventions:
         """
         self._check_nest(nest)
         for one in self._each():
-            nests = one.nearest_nests(cells) if nest is None else np.full(len(cells), nest)
-            one.add(cells, nests, heading)
+            places = one.index(cells)
+            nests = one.nearest_nests(places) if nest is None else np.full(len(places), nest)
+            one.add(places, nests, heading)
         self.colony.observe(self.worlds)
 
     def add_some(
@@ -201,12 +207,12 @@ class Interventions:
             one.add_some(one.amount(number, share, nest), heading, nest)
         self.colony.observe(self.worlds)
 
-    def remove_ants(self, cells: np.ndarray, nest: int | None = None) -> None:
+    def remove_ants(self, cells: Cells, nest: int | None = None) -> None:
         """Remove the ants on these cells, or those of a nest, with the food that they carry."""
         self._check_nest(nest)
         for one in self._each():
             slots = one.living_slots(nest)
-            one.remove(slots[np.isin(one.cells[slots], cells)])
+            one.remove(slots[np.isin(one.cells[slots], one.index(cells))])
         self.colony.observe(self.worlds)
 
     def remove_some(self, number: int | None, share: float | None, nest: int | None = None) -> None:
@@ -322,6 +328,7 @@ class Interventions:
             first.trails[start[trails] != OBSTACLE],
             first.ants[start[ants] == EMPTY],
             food_kinds=start[foods] >> _NUMBER,
+            regions=first.regions,
         )
 
     def begin_episode(self) -> None:
@@ -380,6 +387,12 @@ class _World:
     def __init__(self, interventions: Interventions, w: int) -> None:
         self.all, self.w, self.colony = interventions, w, interventions.colony
         self.rows = self.colony.arrays["worlds"][:, w]
+
+    def index(self, cells: Cells) -> np.ndarray:
+        """Return flat indices, or those of the cells of a region; AntsError if there is none."""
+        if not isinstance(cells, str):
+            return cells
+        return self.colony.worlds[self.w].region(cells)
 
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""

@@ -75,6 +75,7 @@ class Features(NamedTuple):
     n_castes: int = 0  # 0: ants have no castes
     cues: tuple[tuple[int, int], ...] = ()  # of all castes, outbound and homing, if they differ
     has_labour: bool = False
+    epsilon_varies: bool = False  # between the ants of a caste
     rules: tuple[Rule, ...] = ()  # your own rules, in the order of their parameters
     reward: str = "by_event"
     deposits: tuple[str, ...] = ()  # the rules of each pheromone, if any is your own
@@ -123,6 +124,7 @@ class Variant:
         self.idle = STANDS if self.traffic.shared else 0
         self.n_nests, self.n_kinds = features.n_nests, features.n_kinds
         self.n_castes, self.has_labour = features.n_castes, features.has_labour
+        self.epsilon_varies = features.epsilon_varies
         self.n_groups = self.n_nests * max(1, self.n_castes)  # in a world: nests by castes
         self.has_foods, self.has_loads = features.has_foods, features.has_loads
         # Whether deliveries are counted by nest and kind.
@@ -134,9 +136,13 @@ class Variant:
         self.own_reward = own_inputs.reward(own(features.reward))
         self.has_own_choice = self.own_choice is not None
         self.has_own_reward = self.own_reward is not None
-        self.own_deposits = tuple(map(own, features.deposits or none))
+        self.own_deposits = tuple(own_inputs.deposit(own(one)) for one in features.deposits or none)
         self.own_evaporations = tuple(map(own, features.evaporations or none))
         self.field_numbers = {name: number for number, name in enumerate(features.fields)}
+        # Whether pheromones are laid one after the other, because rules of deposits read others.
+        lay = [rule for rule in features.rules if rule.kind == "deposit"]
+        self.lays_apart = any(rule.fields for rule in lay)
+        self.reads_stimulus = any("stimulus" in rule.inputs for rule in features.rules)
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
@@ -197,11 +203,14 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
     if v.traffic.shared:
         yield Phase(ANTS, steps.resolve)
     yield Phase(ANTS, steps.act)
+    if v.lays_apart:
+        for number in range(len(v.pheromones)):
+            yield Phase(ANTS, steps.lays_field(number))
     if v.dense:
         yield Phase(CELLS, trail.evaporate)
         yield Phase(CELLS, trail.diffuse)
         yield Phase(CELLS, trail.settle)
-    if v.ants_change or v.food_changes:
+    if v.ants_change or v.food_changes or v.reads_stimulus:
         yield Phase(WORLD, life.count)
     if v.ants_change:
         yield Phase(WORLD, life.give_birth)

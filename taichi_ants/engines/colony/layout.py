@@ -114,6 +114,7 @@ class CasteRow(IntEnum):
     """Rows of `castes`, one column for each caste; see `Caste`."""
 
     EPSILON = 0  # -1 if it has that of the colony
+    EPSILON_SPREAD = auto()
     LEARNING_RATE = auto()  # -1 if it has that of the colony
     DISCOUNT = auto()
     TEMPERATURE = auto()

@@ -1,7 +1,9 @@
-"""The inputs of rules of choice and reward that you wrote; only those that a rule reads compile.
+"""The inputs of rules that ants follow and you wrote; only those that a rule reads compile.
 
-A rule of choice reads what the ant sees before its action. A rule of rewards runs when the ant
-observes at the end of a tick, before it learns, so it reads levels after the tick.
+A rule of choice reads what the ant sees before its action. A rule of deposits that reads other
+pheromones reads those that ants lay before it with the deposits of this tick, see
+`Variant.lays_apart`. A rule of rewards runs when the ant observes at the end of a tick, before it
+learns, so it reads levels after the tick.
 """
 
 from collections.abc import Callable
@@ -9,6 +11,7 @@ from typing import Any
 
 import taichi as ti
 
+from taichi_ants.engines.colony.columns import individual, nest_of
 from taichi_ants.engines.colony.own_rules import OwnRule
 from taichi_ants.engines.colony.steps import (
     cell_ahead,
@@ -22,7 +25,7 @@ from taichi_ants.engines.colony.steps import (
 from taichi_ants.engines.colony.trail import level_of
 from taichi_ants.engines.own_rules import for_kernels
 from taichi_ants.learners.memory import values_of
-from taichi_ants.rules.inputs import AHEAD, field_of
+from taichi_ants.rules.inputs import AHEAD, LEVELS, field_of
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.rules.actions import step_towards
 from taichi_ants.task.rules.random_bits import high_word, low_word
@@ -51,14 +54,40 @@ def choice(rule: OwnRule | None) -> Callable[..., Any] | None:
             "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick),
             "carries": lambda: carries,
             "percept": lambda: seen,
-            "epsilon": lambda: _share(explore_below_of(c, v, ant)),
+            "epsilon": lambda: _share(explore_below_of(c, v, w, ant)),
             "random": lambda: _share(low_word(bits)),
             "random_2": lambda: _share(high_word(bits)),
-            "tick": lambda: tick,
+            **_of_ants(c, v, w, ant, tick),
         }
         return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, percept, tick))
 
     return for_kernels(choose)
+
+
+def deposit(rule: OwnRule | None) -> Callable[..., Any] | None:
+    """Return a function for kernels that returns a level, f64; see `trail.deposit`."""
+    if rule is None:
+        return None
+
+    def lay(
+        c: Any, v: Any, w: Any, ant: Any, level: Any, place: Any, carried: Any, carries: Any,
+        event: Any, percept: Any, tick: Any,
+    ) -> Any:  # fmt: skip
+        make = {
+            "level": lambda: level,
+            "carried": lambda: carried,
+            "carries": lambda: carries,
+            "event": lambda: event,
+            "percept": lambda: percept,
+            **_of_ants(c, v, w, ant, tick),
+        }
+        inputs = {
+            name: make[name]() if name in make else _level(c, v, name, place, tick)
+            for name in rule.inputs
+        }
+        return rule.bound(c)(**inputs)
+
+    return for_kernels(lay)
 
 
 def reward(rule: OwnRule | None) -> Callable[..., Any] | None:
@@ -76,7 +105,7 @@ def reward(rule: OwnRule | None) -> Callable[..., Any] | None:
             "next_percept": lambda: next_percept,
             "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, seen, tick + 1),
             "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick + 1),
-            "tick": lambda: tick,
+            **_of_ants(c, v, w, ant, tick),
         }
         return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, seen, tick + 1))
 
@@ -101,12 +130,39 @@ def _made(
         if name in make:
             inputs[name] = make[name]()
         else:
-            number = v.field_numbers[field_of(name)]
-            if name.startswith("levels_"):
+            if name.startswith(LEVELS):
+                number = v.field_numbers[field_of(name)]
                 inputs[name] = _levels(c, v, cues, w, ant, number, seen, percept, tick)
             else:
-                inputs[name] = level_of(v.field(c, number), _place(c, w, ant), tick)
+                inputs[name] = _level(c, v, name, _place(c, w, ant), tick)
     return inputs
+
+
+def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> dict[str, Callable[[], Any]]:
+    """Return the inputs of all kinds of rules that ants follow."""
+    return {
+        "trait": lambda: individual(c, w, ant),
+        "threshold": lambda: _threshold(c, ant),
+        "stimulus": lambda: _stimulus(c, v, w, ant),
+        "tick": lambda: tick,
+    }
+
+
+def _level(c: Any, v: Any, name: str, place: Any, tick: Any) -> Any:
+    """Return the level of a cell in the pheromone that an input names."""
+    return level_of(v.field(c, v.field_numbers[field_of(name)]), place, tick)
+
+
+@ti.func
+def _threshold(c: ti.template(), ant):
+    """Return the response threshold of an ant, f32."""
+    return c.threshold[ant]
+
+
+@ti.func
+def _stimulus(c: ti.template(), v: ti.template(), w, ant):
+    """Return the stimulus of the nest of an ant, f64."""
+    return c.stimulus[w * v.n_nests + nest_of(c, v, ant)]
 
 
 @ti.func

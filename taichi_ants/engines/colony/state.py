@@ -993,6 +993,7 @@ def _caste_numbers(task: Task, discount: float) -> np.ndarray:
         own = (one.temperature, one.k, one.exponent)
         numbers[:, k] = (
             -1.0 if one.epsilon is None else one.epsilon,
+            one.epsilon_spread or 0.0,
             -1.0 if one.learning_rate is None else one.learning_rate,
             discount if one.discount is None else one.discount,
             *(usual[i] if own[i] is None else own[i] for i in range(3)),

@@ -164,6 +164,7 @@ def features_of(state: ColonyState) -> Features:
         n_castes=len(task.castes),
         cues=cues if len(cues) > 1 else (),
         has_labour=task.labour.divides,
+        epsilon_varies=any(one.epsilon_spread for one in task.castes.values()),
         **_own_rules(state),
     )
 

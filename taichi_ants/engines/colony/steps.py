@@ -12,13 +12,22 @@ tick. If ants can enter cells with ants, see `Traffic`, an additional phase mark
 all ants act.
 """
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.engines.colony import labour
-from taichi_ants.engines.colony.columns import group_of, nest_of, of_caste, put, trait
+from taichi_ants.engines.colony.columns import (
+    group_of,
+    individual,
+    nest_of,
+    of_caste,
+    put,
+    trait,
+)
 from taichi_ants.engines.colony.layout import (
     ANT_GROUND,
     ANT_STANDS,
@@ -55,6 +64,7 @@ from taichi_ants.task.constants import (
     SEES_LURE,
 )
 from taichi_ants.task.events import Event
+from taichi_ants.task.field import OCCASIONS
 from taichi_ants.task.rules import conflicts, noise, vision
 from taichi_ants.task.rules.actions import (
     MOVES,
@@ -327,7 +337,7 @@ def draw_action(c: ti.template(), v: ti.template(), w, ant, state, percept, tick
                     action = draw_by_cues(c, v, cues, w, ant, state, percept, tick, bits)
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
-        values, explore_below = values_of(c.q, table, state), explore_below_of(c, v, ant)
+        values, explore_below = values_of(c.q, table, state), explore_below_of(c, v, w, ant)
         if ti.static(v.choice == "softmax"):
             temperature = choice_number(c, v, ant, ti.static(CasteRow.TEMPERATURE))
             action = choose_softly(values, bits, explore_below, temperature)
@@ -390,12 +400,15 @@ def cell_ahead(
 
 
 @ti.func
-def explore_below_of(c: ti.template(), v: ti.template(), ant):
+def explore_below_of(c: ti.template(), v: ti.template(), w, ant):
     """Return the bound of a random 32-bit word below which an ant explores, u64."""
     bound = c.explore_below
     if ti.static(v.n_castes > 0):
         own = of_caste(c, ant, CasteRow.EPSILON)
         if own >= 0.0:
+            if ti.static(v.epsilon_varies):
+                spread = of_caste(c, ant, CasteRow.EPSILON_SPREAD)
+                own += spread * (2.0 * individual(c, w, ant) - 1.0)
             bound = ti.cast(own * 4294967296.0, ti.u64)
     return bound
 
@@ -594,8 +607,10 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if carries == 1:
         carried = age
         if goes != cell:
-            if lays(c, v, ant, 0):
-                deposit(trail, base + goes, tick, carried, carries, event, percept)
+            if ti.static(not v.lays_apart):
+                if lays(c, v, ant, 0):
+                    place = base + goes
+                    deposit(c, v, trail, w, ant, place, tick, carried, carries, event, percept)
         elif can_give(action, percept):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
@@ -609,20 +624,23 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         put(c.carries, ant, 1)
         c.carried[ant] = 1
         take_load(c, v, ant, base + wanted, tick)
-        if lays(c, v, ant, 0):
-            deposit(trail, base + wanted, tick, 0, carries, event, percept)
-            deposit(trail, base + cell, tick, 0, carries, event, percept)
+        if ti.static(not v.lays_apart):
+            if lays(c, v, ant, 0):
+                deposit(c, v, trail, w, ant, base + wanted, tick, 0, carries, event, percept)
+                deposit(c, v, trail, w, ant, base + cell, tick, 0, carries, event, percept)
         put(c.heading, ant, turn_round(heading))
     if ti.static(len(v.pheromones) > 1):
         age = ti.select(carries == had_food, age, 0)
         occasions = occasions_of(had_food, percept, action, event, goes != cell)
         if ti.static(v.has_labour):
             occasions *= 1 - trait(c.idle, ant)
-        fields = ti.static(v.further_fields(c))
+        fields = ti.static([] if v.lays_apart else v.further_fields(c))
         for i in ti.static(range(len(fields))):
             if lays(c, v, ant, i + 1):
+                field = ti.static(fields[i])
+                laid = field.laid & occasions  # a single one, see `Field.laid`
                 lay(
-                    *(ti.static(fields[i]), occasions, base, cell, goes, wanted, tick, age),
+                    *(c, v, field, w, ant, laid, cell, goes, wanted, tick, age),
                     *(carries, event, percept),
                 )
         if c.counts_without_food == 1:
@@ -639,6 +657,36 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     tally(c, Tally.BLOCKED, chunk, moves & (1 - enters))
     if ti.static(not v.has_own_reward):
         tally(c, Tally.RETURNS, chunk, reward_of(c, v, ant))
+
+
+@cache
+def lays_field(number: int) -> Callable[..., None]:
+    """Return the `do` of a phase after `act` in which ants lay a pheromone, see `lays_apart`."""
+
+    @ti.func
+    def lay_apart(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+        cell, goes, carries = c.want[ant], c.cell[ant], trait(c.carries, ant)
+        event, percept, had_food = trait(c.event, ant), trait(c.percept, ant), carries
+        if event == Event.PICKED_UP:
+            had_food = 0
+        if event == Event.DELIVERED:
+            had_food = 1
+        age = ti.select(carries == had_food, c.carried[ant] - 1, 0)
+        occasions = occasions_of(had_food, percept, executed_by(c, v, ant), event, goes != cell)
+        if ti.static(v.has_labour):
+            occasions *= 1 - trait(c.idle, ant)
+        food = cell + c.compass[conflicts.heading_taken(c, w * c.size + cell) + 1]
+        field = ti.static(v.field(c, number))
+        laid = occasions & ti.static(int(OCCASIONS["with_food"]))
+        if ti.static(number > 0):
+            laid = occasions & field.laid
+        if lays(c, v, ant, number):
+            lay(
+                *(c, v, field, w, ant, laid, cell, goes, food, tick, age),
+                *(carries, event, percept),
+            )
+
+    return lay_apart
 
 
 @ti.func

@@ -6,6 +6,7 @@ last or its present cell, or on the cell of the food that it takes, so that no t
 one cell of a field in a tick.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import taichi as ti
@@ -59,7 +60,7 @@ def pheromone_of(
     number: int,
     dense: bool,
     view: str,
-    own_deposit: OwnRule | None,
+    own_deposit: Callable[..., Any] | None,
     own_evaporation: OwnRule | None,
 ) -> Pheromone:
     """Return a pheromone with the arrays and numbers of an argument pack."""
@@ -72,7 +73,7 @@ def pheromone_of(
         getattr(c, f"spare{end}") if dense else None,
         *(getattr(c, name + end) for name in _NUMBERS),
         laid=getattr(c, f"laid{end}") if number else None,
-        own_deposit=own_deposit and own_deposit.bound(c),
+        own_deposit=own_deposit,
         own_evaporation=own_evaporation and own_evaporation.bound(c),
     )
 
@@ -104,16 +105,17 @@ def level_that_counts(c: ti.template(), field: ti.template(), place, tick):
 
 
 @ti.func
-def deposit(field: ti.template(), place, tick, carried, carries, event, percept):
+def deposit(
+    c: ti.template(), v: ti.template(), field: ti.template(), w, ant, place, tick, carried, carries,
+    event, percept
+):  # fmt: skip
     """Deposit, by the rule of a pheromone, what an ant lays after some ticks with its load.
 
     `carries` and `event` are those after the ant's action, `percept` is that before it.
     """
     if ti.static(field.has_own_deposit):
         level = level_of(field, place, tick)
-        laid = field.own_deposit(
-            level=level, carried=carried, carries=carries, event=event, percept=percept, tick=tick
-        )
+        laid = field.own_deposit(c, v, w, ant, level, place, carried, carries, event, percept, tick)
         if ti.static(field.dense):
             field.levels[place] = ti.cast(laid, ti.f32)
         else:
@@ -146,15 +148,17 @@ def occasions_of(had_food, percept, action, event, has_moved):
 
 @ti.func
 def lay(
-    field: ti.template(), occasions, base, cell, goes, food, tick, carried, carries, event, percept
+    c: ti.template(), v: ti.template(), field: ti.template(), w, ant, laid, cell, goes, food, tick,
+    carried, carries, event, percept
 ):  # fmt: skip
-    """Deposit in a further field on the cell that an ant leaves or enters, or on its food's."""
-    laid = field.laid & occasions  # a single one, see `Field.laid`
+    """Deposit on the cell that an ant leaves or enters, or on its food's, on an occasion `laid`."""
+    base = w * c.size
     if laid != 0:
         place = base + ti.select(laid == Occasion.DEAD_END, cell, goes)
-        deposit(field, place, tick, carried, carries, event, percept)
+        deposit(c, v, field, w, ant, place, tick, carried, carries, event, percept)
         if laid == Occasion.PICKED_UP:
-            deposit(field, base + food, tick, carried, carries, event, percept)
+            food_place = base + food
+            deposit(c, v, field, w, ant, food_place, tick, carried, carries, event, percept)
 
 
 @ti.func

@@ -104,6 +104,12 @@ def heading_wanted(c: ti.template(), place):
 
 
 @ti.func
+def heading_taken(c: ti.template(), place):
+    """Return the heading at which the ant on a cell takes food, if it does; 0 to 5 in any case."""
+    return ti.max((ti.cast(c.wants[place], ti.i32) & MARK) - TAKE, 0)
+
+
+@ti.func
 def way_is_free(c: ti.template(), traffic: ti.template(), base, cell, wanted):
     """Return whether the winner on `cell` can enter its cell, which is empty or becomes empty.
 

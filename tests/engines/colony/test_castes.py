@@ -81,6 +81,25 @@ def test_thresholds_have_their_distribution(threshold, law):
     assert (follows(rules, seeds=5, ants=2000).thresholds[0] == drawn[1]).all()
 
 
+def test_exploration_rates_differ_between_the_ants_of_a_caste():
+    """Ants that explore at random turn; each ant has the same rate in all episodes."""
+    castes = {"one": {"epsilon": 0.5, "epsilon_spread": 0.5}}
+    straight = np.zeros((128, 5), np.float32)
+    straight[:, 3] = 1.0  # without food in view, this action does nothing
+    rule, rates = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0), []
+    colony = Colony(WORLD, Task(castes=castes), rule, 7, 300, sharing="frozen", q_values=straight)
+    for _ in range(2):
+        colony.begin_episode()
+        others = np.zeros(300)
+        for _ in range(200):
+            colony.tick()
+            others += colony.actions[0] != 3
+        rates.append(others / 200 / 0.8)  # a fifth of random actions is the best one
+        colony.end_episode()
+    assert kstest(rates[0].clip(0, 1), uniform(0, 1).cdf).pvalue > 0.001
+    assert np.corrcoef(*rates)[0, 1] > 0.95
+
+
 @pytest.mark.parametrize("exponent", [1.0, 2.0, 2.5])
 def test_idle_ants_respond_to_the_stimulus(exponent):
     """After s^n / (s^n + t^n), with s = 6 in the second tick and t = 4."""

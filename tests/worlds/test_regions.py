@@ -1,0 +1,123 @@
+"""Regions of worlds: their forms, text maps, files, and their names as cells of interventions."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from taichi_ants import AntsError, At, Colony, Task, World, worlds
+from taichi_ants.interventions import Clear, Place, RemoveAnts, from_dict
+from taichi_ants.task.constants import EMPTY, OBSTACLE
+from taichi_ants.worlds import from_text, to_text
+
+MAP = """; Two regions with a cell in common.
+trail = 9
+region gate = % #
+region gate, left = !
+region left = $ F
+      F
+    .   .
+  .   t   $
+.   %   .   F
+  %   t   .
+.   !   .   .
+  .   t   .
+.   .   #   .
+  .   a   .
+    .   .
+      Q
+"""
+
+
+def test_a_text_map_draws_regions():
+    world = from_text(MAP)
+    plain = from_text(
+        MAP.replace("region gate = % #\nregion gate, left = !\nregion left = $ F\n", "")
+        .replace("%", "#").replace("!", ".").replace("$", "F")
+    )  # fmt: skip
+    assert plain == World.from_dict({**world.as_dict(), "regions": {}})
+    assert {name: len(cells) for name, cells in world.regions.items()} == {"gate": 3, "left": 2}
+    again = from_text(to_text(world))
+    assert again == world != plain
+    assert hash(again) == hash(world) == hash(pickle.loads(pickle.dumps(world)))
+    assert World.from_dict(world.as_dict()) == world
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("region = %\nQ", "sets 'region'; the only settings are trail and region"),
+        ("region a b = %\nQ", "is 'region a b = %'; write a name and a mark, such as"),
+        ("region a = Q\nQ", "has the mark 'Q', which has a meaning in maps; choose one of % [*]"),
+        ("region a = %\nregion b = %\n%", "has the mark '%', which is used already; choose one"),
+        ("region a = % z\nQ", "draws cells as 'z'; use only [.] #"),
+        ("region a = %\nQ", "has no cell '%' of the region a; draw one, or leave"),
+        ("Q\nregion a = %", "names a region; move it above the drawing"),
+        ("region a = % Q\n%\n\n%", "a second time; draw the queen of each nest once"),
+        ("region 1a = %\n%\n\nQ", "regions has the name '1a'; it must be a word of letters"),
+    ],
+)
+def test_a_wrong_line_of_a_region_is_named(text, says):
+    with pytest.raises(AntsError, match=says):
+        from_text(text)
+
+
+@pytest.mark.parametrize(
+    ("regions", "says"),
+    [
+        ([1], r"^regions are \[1\]; they must be cells by the names of regions\.$"),
+        ({"a": []}, r"^regions\.a is empty; give at least one cell\.$"),
+        ({"a": {"centre": (0, 0, 0)}}, r"^regions\.a has the settings centre; give centre"),
+        ({"a": {"centre": (0, 0, 0), "radius": -1}}, r"^regions\.a\.radius is -1; it must be at"),
+        ({"a": {"centre": (50, 0, 0), "radius": 1}}, r"^regions\.a\.centre is \(50, 0, 0\), outs"),
+        ({"a": [(50, 0, 0)]}, r"^regions\.a\[0\] is \(50, 0, 0\), outside the world"),
+        ({"a": 3}, r"^regions\.a is 3; it must be a sequence of \(x, y, z\)\.$"),
+    ],
+)
+def test_a_wrong_region_is_named(regions, says):
+    with pytest.raises(AntsError, match=says):
+        worlds.paper().with_regions(regions)
+
+
+def test_a_disc_has_the_cells_within_a_radius():
+    world = worlds.paper().with_regions({"disc": {"centre": (-1, -1, 0), "radius": 2}})
+    far = world.grid.distances((0, 0, 1))
+    assert set(world.region("disc")) == set(np.flatnonzero(world.grid.exists & (far <= 2)))
+    both = world.with_regions({"one": [(0, 0, 0), (1, 1, 1)]})
+    assert list(both.regions) == ["disc", "one"]
+    assert len(both.regions["one"]) == 1
+
+
+def test_interventions_take_the_regions_of_each_world(tmp_path):
+    """Worlds of a colony can have different cells in a region of the same name."""
+    shared = worlds.open_world(3, (6, 6, 6))
+    some = [shared.with_regions({"gate": [cell]}) for cell in ((5, 0, 0), (0, 5, 0))]
+    task = Task(choice="deneubourg")
+    colony = Colony(some, task, None, (1, 2), ants=3, sharing="frozen")
+    protocol = [At(1, place={"what": "rock", "cells": "gate"}), At(2, clear="gate")]
+    for ticks, ground in ((2, OBSTACLE), (3, EMPTY)):
+        colony.run(1, ticks, protocol=protocol[: ticks - 1])
+        for w, world in enumerate(some):
+            assert colony.snapshot(w).ground[world.region("gate")] == ground
+    colony.save(tmp_path / "colony.npz")
+    assert Colony.load(tmp_path / "colony.npz").worlds == tuple(some)
+    with pytest.raises(AntsError, match=r"no region 'gte' in the world, whose regions are: gate"):
+        colony.run(1, 5, protocol=[At(1, clear="gte")])
+
+
+def test_the_name_of_a_region_stands_for_its_cells():
+    assert from_dict({"clear": "gate"}) == Clear("gate")
+    assert from_dict({"remove_ants": "gate"}) == RemoveAnts(cells="gate")
+    assert Clear("gate").facts() == {"clear": {"cells": "gate"}}
+    with pytest.raises(AntsError, match=r"^`place\.cells` is 'gate'; give a list of a single cell"):
+        Place("queen", "gate")
+    with pytest.raises(AntsError, match=r"^`move\.cells` is 'gate'; give the cell to move from"):
+        from_dict({"move": "gate"})
+
+
+def test_the_measure_needs_regions():
+    colony = Colony(worlds.paper(), Task(choice="deneubourg"), None, 0, sharing="frozen")
+    with pytest.raises(AntsError, match=r"needs a world with regions; add them with World\.with_"):
+        colony.run(1, 1, measures=["regions"])
