@@ -76,7 +76,7 @@ def _numbers(rng: np.random.Generator, drawn: RandomColony) -> dict[str, Any]:
     if task.life.lifespan is None and not task.life.births:
         del able["lifespan"]
     found |= {name: one for name, one in able.items() if rng.random() < 0.5}
-    if found.get("epsilon") == 0.2 and rng.random() < 0.5:
+    if found.get("epsilon") == 0.2 and "discount" not in found:  # without a draw
         found["epsilon_spread"] = 0.15
     return found
 

@@ -60,8 +60,8 @@ def _intervention(
     ground, grid = world.ground(), world.grid
     there = grid.cells(np.flatnonzero(grid.exists))
     some: Any = rng.permutation(there)[: rng.integers(1, 5)].tolist()
-    if world.regions and some[0][0] % 2 and name not in ("move",):
-        some = "ab"[some[0][1] % 2]  # without a draw, so that other protocols stay the same
+    if world.regions and some[0][1] % 2 and name != "move":
+        some = "ab"[some[0][0] % 2]  # without a draw, so that other protocols stay the same
     free = grid.cells(np.flatnonzero((ground == EMPTY) & grid.exists)).tolist()
     full = grid.cells(np.flatnonzero((ground != EMPTY) & grid.exists)).tolist()
     if name in ("remove_ants", "add_ants"):
