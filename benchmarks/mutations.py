@@ -23,6 +23,7 @@ ROOT = Path(__file__).parent.parent
 TIMEOUT = 300.0  # seconds; a mutation that makes tests take longer counts as noticed
 
 RUNS = "tests/engines/runs/test_against_reference.py"
+BATCHED = "tests/engines/runs/test_batched.py"
 COLONY = "tests/engines/colony/test_against_reference.py"
 CONFLICTS = "tests/engines/colony/test_conflicts.py"
 NESTS = "tests/engines/colony/test_nests.py"
@@ -191,6 +192,8 @@ MUTATIONS = [
     ("engines/runs/kernels.py", "clock += a.evaporates", "clock += 1", RUNS),
     ("engines/runs/rollout_kernel.py", "steps == a.max_steps", "steps > a.max_steps", ROLLOUT),
     ("engines/runs/rollout_kernel.py", "base = own", "base = origin", ROLLOUT),
+    ("engines/runs/step.py", "enters & ant.carries", "moves & ant.carries", BATCHED),
+    ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),
     ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", ROLLOUT),
     ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
     ("envs/vector.py", "else rows.any(0)", "else rows[-1]", ROLLOUT),

@@ -179,9 +179,10 @@ def test_policies_choose_by_their_values(make):
     assert best[greedy.observations[:-1], greedy.actions].all()
 
 
-def test_ants_alone_and_in_colonies_draw_the_same_actions():
+@pytest.mark.parametrize("values", [[0.0], [0.0, 1.0], [0.0, 0.5, 1.0]])
+def test_ants_alone_and_in_colonies_draw_the_same_actions(values):
     """A world in which no ant can meet another; both start with the same states."""
-    table = np.zeros((128, 5), np.float32)
+    table = np.random.default_rng(0).choice(np.array(values, np.float32), (128, 5))
     several = lone(6, world="paper", autoreset_mode=SAME)
     one_each = colony(6, ants=1, world="paper", task=Task(), autoreset_mode=SAME)
     made = []

@@ -85,13 +85,15 @@ def choose_in_crowd(compass: ti.template(), values, bits, explore_below):
 @ti.func
 def choose_from_masks(compass: ti.template(), best: ti.template(), state, bits, explore_below):
     """Return the action of `choose`; `best` has the best actions of each state, as bits."""
-    action, mask = 0, (1 << N_ACTIONS) - 1
-    if not high_word(bits) < explore_below:
-        mask = ti.cast(best[state], ti.i32)
-    if mask & (mask - 1) == 0:
-        action = lowest_bit_number(mask)
+    action = 0
+    if high_word(bits) < explore_below:
+        action = below(low_word(bits), N_ACTIONS)
     else:
-        action = bit_number_in(compass, mask, below(low_word(bits), popcnt(mask)))
+        mask = ti.cast(best[state], ti.i32)
+        if mask & (mask - 1) == 0:
+            action = lowest_bit_number(mask)
+        else:
+            action = bit_number_in(compass, mask, below(low_word(bits), popcnt(mask)))
     return action
 
 
