@@ -2,10 +2,11 @@
 
 Ants are spread over open worlds, with eight cells per ant, and learn into one table by Q-learning,
 under the rules of `paper()` and of `foraging()`. The program colony.c does the same with as many
-threads, and its results are bit-for-bit equal. CC sets its compiler; else it is clang, which makes
-it faster than gcc does. The command measures both in turn, several times. The table contains
-medians, and ratios above 1 where Taichi Ants is faster. On a busy machine, use `--threads 1`, which
-is measured by processor time; several threads in C wait long for each other.
+threads, and its results are bit-for-bit equal. CC sets its compiler. Otherwise it is clang, which
+makes it faster than gcc does, or gcc if threads need OpenMP and clang has none. The command
+measures both in turn, several times. The table contains medians, and ratios above 1 where Taichi
+Ants is faster. On a busy machine, use `--threads 1`, which is measured by processor time; several
+threads in C wait long for each other.
 """
 
 from __future__ import annotations
@@ -190,7 +191,7 @@ def compare(
         AntsError: A ratio is below `least`, or results differ.
     """
     threads = runtime.start(threads).threads
-    if (command := compiler()) is None:
+    if (command := compiler(threads)) is None:
         print("There is no C compiler (CC, clang, gcc or cc), so the comparison is skipped.")
         return
     with tempfile.TemporaryDirectory() as folder:

@@ -92,10 +92,26 @@ class Trained(NamedTuple):
 Yardstick = Callable[[Any, Any, Any], int]  # a function of C
 
 
-def compiler() -> str | None:
-    """Return the C compiler of this machine: CC, clang, gcc or cc; None if there is none."""
-    names = (os.environ.get("CC"), "clang", "gcc", "cc")
-    return next((found for name in names if name and (found := shutil.which(name))), None)
+def compiler(threads: int) -> str | None:
+    """Return the C compiler of this machine: CC, or else the first of clang, gcc and cc.
+
+    For several threads, it is the first that has OpenMP, if there is one. CC is not checked. None
+    if there is no compiler.
+    """
+    if own := shutil.which(os.environ.get("CC", "")):
+        return own
+    found = [one for name in ("clang", "gcc", "cc") if (one := shutil.which(name))]
+    usable = (one for one in found if threads == 1 or _has_openmp(one))
+    return next(usable, found[0] if found else None)
+
+
+def _has_openmp(command: str) -> bool:
+    """Return whether a compiler can compile and link OpenMP, which clang has as its own package."""
+    with tempfile.TemporaryDirectory() as folder:
+        source, library = Path(folder, "openmp.c"), Path(folder, "openmp.so")
+        source.write_text("#include <omp.h>\nint threads(void) { return omp_get_max_threads(); }\n")
+        built = [command, "-fopenmp", "-shared", "-fPIC", "-o", library, source]
+        return subprocess.run(built, capture_output=True).returncode == 0
 
 
 def compile_c(command: str, sources: Sequence[Path], library: Path, threads: int) -> ctypes.CDLL:
@@ -265,7 +281,7 @@ def compare(seeds: int, rounds: int, threads: int, least: float, publishes: bool
     """
     threads = runtime.start(threads).threads
     with tempfile.TemporaryDirectory() as folder:
-        command = compiler()
+        command = compiler(threads)
         yardsticks = load_yardsticks(command, folder, threads) if command else {}
         steps, seconds = measured(yardsticks, range(seeds), rounds, threads)
     compiled = [compiler_note(command, threads)] if command else []

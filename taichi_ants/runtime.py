@@ -13,6 +13,7 @@ import os
 import textwrap
 import threading
 import time
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -155,7 +156,8 @@ def quiet() -> Iterator[None]:
 
     Our kernels narrow numbers on purpose. Errors show their line without a mark of the place,
     because marks for all expressions take half of the time in which Taichi loads a cached kernel.
-    Taichi reads the source of a function at each call of it in a kernel; here, once.
+    Taichi reads the source of a function at each call of it in a kernel; here, once. It warns of
+    long loops that are unrolled.
     """
     from taichi._lib import core
     from taichi.lang import kernel_impl
@@ -168,7 +170,9 @@ def quiet() -> Iterator[None]:
     reads = kernel_impl.getsourcelines, kernel_impl.textwrap
     kernel_impl.getsourcelines, kernel_impl.textwrap = _source_lines, _Textwrap
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SyntaxWarning)
+            yield
     finally:
         Context.get_pos_info = marked
         kernel_impl.getsourcelines, kernel_impl.textwrap = reads

@@ -15,7 +15,7 @@ import numpy as np
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.learner import Memory
-from taichi_ants.task.constants import EMPTY, N_ACTIONS
+from taichi_ants.task.constants import BEST_AT, EMPTY, N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 # The settings of a run: columns before the hyperparameters of its learner.
@@ -75,6 +75,13 @@ def compass_of(grid: AxialGrid) -> np.ndarray:
         (numbers,) = np.nonzero(mask >> np.arange(N_ACTIONS) & 1)
         bits[mask, : len(numbers)] = numbers
     return np.concatenate([steps, *turns, bits.reshape(-1)]).astype(np.int32)
+
+
+def note_best_actions(q: np.ndarray) -> None:
+    """Store the best actions of each state, see `BEST_AT`, in tables of f32 (..., ROW) or flat."""
+    rows = q.reshape(-1, ROW)
+    values = rows[:, :N_ACTIONS]
+    rows[:, BEST_AT] = (values >= values.max(axis=1, keepdims=True)) @ (1 << np.arange(N_ACTIONS))
 
 
 def padded(memory: Memory) -> Memory:

@@ -24,8 +24,11 @@ MAX_CASTES = 16
 LEFT, FORWARD, RIGHT, PICK_UP, GIVE = 0, 1, 2, 3, 4
 ACTION_NAMES: tuple[str, ...] = ("left", "forward", "right", "pick up", "give")
 N_ACTIONS = 5
-# Numbers in a row of action values: 5, and 3 unused, so that no row straddles a cache line.
+# Numbers in a row of action values: 5, and 3 more, so that no row straddles a cache line.
 ROW = 8
+# In a colony, unless each ant learns into its own table, one of these numbers is the state's best
+# actions: the sum of 2^a for each action a with the largest value.
+BEST_AT = N_ACTIONS
 
 # State = (carries, left, forward, right); index = 64 * carries + 16 * left + 4 * forward + right.
 N_STATES = 128

@@ -11,15 +11,15 @@ from throughput import compiler
 
 from taichi_ants import AntsError
 
-pytestmark = pytest.mark.skipif(compiler() is None, reason="there is no C compiler")
+pytestmark = pytest.mark.skipif(compiler(1) is None, reason="there is no C compiler")
 
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory):
     try:
-        return colony_in_c.load(compiler(), tmp_path_factory.mktemp("c"), 2)
-    except AntsError:  # without OpenMP
-        return colony_in_c.load(compiler(), tmp_path_factory.mktemp("c"), 1)
+        return colony_in_c.load(compiler(2), tmp_path_factory.mktemp("c"), 2)
+    except AntsError:  # no compiler has OpenMP
+        return colony_in_c.load(compiler(1), tmp_path_factory.mktemp("c"), 1)
 
 
 @pytest.mark.parametrize("rules", colony_in_c.TASKS)
@@ -85,7 +85,7 @@ def test_a_compiler_that_fails_is_named(threads, advice, tmp_path):
 
 
 def test_without_a_compiler(capsys, monkeypatch):
-    monkeypatch.setattr(colony_in_c, "compiler", lambda: None)
+    monkeypatch.setattr(colony_in_c, "compiler", lambda threads: None)
     code, said = run(["--ants", "10"], capsys)
     assert code == 0
     assert said.out.startswith("There is no C compiler")

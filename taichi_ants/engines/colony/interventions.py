@@ -37,6 +37,7 @@ from taichi_ants.engines.colony.layout import (
     WorldRow,
     array_of,
 )
+from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, checked_whole, count, entries_of, shown
 from taichi_ants.grid.constants import (
     N_HEADINGS,
@@ -278,6 +279,7 @@ class Interventions:
         self.check_follow()
         for one in self._each():
             one.view("q").reshape(-1, len(q_values), ROW)[..., :N_ACTIONS] = q_values
+            note_best_actions(one.view("q"))
 
     def check_follow(self) -> None:
         """Raise an AntsError unless the ants follow a policy and do not learn."""
@@ -616,6 +618,7 @@ class _World:
         self.view("first_streams")[numbers[first]] = self.view("streams")[slots[first]]
         self.view("ground")[self.cells[slots]] = EMPTY
         self.view("stage")[slots] = Stage.VACANT
+        colony.close_gaps()
         self._count_ants()
 
     def _count_ants(self) -> None:

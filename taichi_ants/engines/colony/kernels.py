@@ -13,6 +13,7 @@ from itertools import chain, groupby
 from typing import Any, NamedTuple
 
 import taichi as ti
+from taichi.lang.any_array import AnyArray
 
 from taichi_ants.engines import views
 from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
@@ -129,6 +130,8 @@ class Variant:
         self.has_foods, self.has_loads = features.has_foods, features.has_loads
         # Whether deliveries are counted by nest and kind.
         self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
+        # Only then can slots before the last ant be vacant; see `ColonyState.slots_matter`.
+        self.slots_matter = features.ants_change or features.own_tables or features.is_given_actions
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
         own, none = partial(own_rule, features.rules), ("",) * len(features.dense)
@@ -248,7 +251,7 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
         first, last = share_of(c, chunk, c.n_slots)
         last = ti.min(last, c.worlds[WorldRow.TOP, w]) * running
         for ant in range(w * c.n_slots + first, w * c.n_slots + last):
-            if columns.trait(c.stage, ant) != Stage.VACANT:
+            if is_taken(c, v, ant):
                 phase.do(c, v, w, chunk, ant, tick)
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
@@ -256,6 +259,15 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
             phase.do(c, v, place, tick)
     elif running == 1:
         phase.do(c, v, w, tick)
+
+
+@ti.func
+def is_taken(c: ti.template(), v: ti.template(), ant):
+    """Return whether an ant is in a slot; without vacant slots, always, while a kernel compiles."""
+    taken = True
+    if ti.static(v.slots_matter):
+        taken = columns.trait(c.stage, ant) != Stage.VACANT
+    return taken
 
 
 @ti.func
@@ -328,6 +340,23 @@ def wait_for_all(c: ti.template(), part, parts, number):
     return goes_on
 
 
+@ti.func
+def read_ahead(c: ti.template()):
+    """Read all arguments before the loops of a kernel.
+
+    Otherwise the compiler reads the numbers and the addresses of arrays again after each write into
+    an array, because the write could change them. It removes what the kernel does not use: also the
+    values read here.
+    """
+    value = 0.0
+    for one in ti.static(c._members):
+        if ti.static(not isinstance(one, AnyArray)):
+            value = ti.cast(one, ti.f32)
+        else:
+            value = ti.cast(one[[0] * ti.static(len(one.shape))], ti.f32)
+    return value
+
+
 @cache
 def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
     """Return a kernel of whole ticks whose work is divided into parts, see `Order`.
@@ -367,6 +396,7 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
     def advance_colony(c: arguments):
         ti.loop_config(block_dim=1)
         for i in range(c.orders[Order.PARTS]):
+            read_ahead(c)
             part, parts, at = i, c.orders[Order.PARTS], 0
             if ti.static(waits):
                 part = ti.cast(ti.atomic_add(c.barrier[Barrier.STARTED], 1), ti.i32)

@@ -12,9 +12,10 @@ from taichi_ants.engines.colony import columns, labour, steps
 from taichi_ants.engines.colony.layout import CasteRow, Stage, SumRow, Tally
 from taichi_ants.learners import model
 from taichi_ants.learners.memory import At, LearnerArrays, Transition, discount_of, values_of
-from taichi_ants.task.constants import N_ACTIONS, ROW
+from taichi_ants.task.constants import BEST_AT, N_ACTIONS, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.rules.delivery import step_end, terminates
+from taichi_ants.task.rules.policy import best_actions
 from taichi_ants.task.rules.random_bits import advance, draw_below
 
 _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
@@ -65,7 +66,9 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 @ti.func
 def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Observe, choose the next action if the learner needs it, and learn."""
-    lives, marked = columns.trait(c.stage, ant) != Stage.NEWBORN, w * c.size + c.want[ant]
+    lives, marked = True, w * c.size + c.want[ant]
+    if ti.static(v.ants_change):  # else no ant is born within a tick
+        lives = columns.trait(c.stage, ant) != Stage.NEWBORN
     acts, stops = lives, False
     if ti.static(v.has_labour):
         acts = acts & (columns.trait(c.idle, ant) == 0)
@@ -357,8 +360,16 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
         mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
         error = ti.select(count > 1, ti.cast(mean, ti.f32), error)
         c.q[value] = c.q[value] + rate * error
+        note_best_actions(c, value)
         c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
     c.touched[listed] = 0
+
+
+@ti.func
+def note_best_actions(c: ti.template(), place):
+    """Store the best actions of a state, of which one value is at a place in `q`."""
+    row = place & -ROW
+    c.q[row + BEST_AT] = ti.cast(best_actions(values_of(c.q, row, 0)), ti.f32)
 
 
 @ti.func

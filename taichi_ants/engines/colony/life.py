@@ -35,22 +35,24 @@ from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below, hig
 @ti.func
 def count(c: ti.template(), v: ti.template(), w, tick):
     """Add the tallies of all chunks to the counts of a world, and reset them."""
+    # No `+=`, which would be atomic and slower: one thread processes a world.
     gives = 0
     for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
         first = chunk * TALLY_WIDTH
-        deaths = ti.cast(c.tallies[first + Tally.DEATHS], ti.i32)
         gives += ti.cast(c.tallies[first + Tally.DELIVERIES], ti.i32)
         for row in ti.static(TOTALS):
-            c.totals[row, w] += c.tallies[first + row]
-        c.worlds[WorldRow.DEATHS, w] += deaths
-        c.worlds[WorldRow.LIVING, w] -= deaths
+            c.totals[row, w] = c.totals[row, w] + c.tallies[first + row]
+        if ti.static(v.ants_change):
+            deaths = ti.cast(c.tallies[first + Tally.DEATHS], ti.i32)
+            c.worlds[WorldRow.DEATHS, w] = c.worlds[WorldRow.DEATHS, w] + deaths
+            c.worlds[WorldRow.LIVING, w] = c.worlds[WorldRow.LIVING, w] - deaths
         for row in ti.static(range(len(Tally))):
             c.tallies[first + row] = 0
-    c.worlds[WorldRow.DELIVERIES, w] += gives
+    c.worlds[WorldRow.DELIVERIES, w] = c.worlds[WorldRow.DELIVERIES, w] + gives
     if ti.static(v.counts_apart):
         count_by_nest(c, v, w)
     else:
-        c.nests[NestRow.STORE, w] += gives * c.births
+        c.nests[NestRow.STORE, w] = c.nests[NestRow.STORE, w] + gives * c.births
         if ti.static(v.has_labour):
             labour.relieve(c, w, gives)
     if ti.static(v.n_castes > 0):

@@ -33,7 +33,7 @@ from taichi_ants.engines.colony.layout import (
     chunks_of,
     usual_schedule,
 )
-from taichi_ants.engines.layout import compass_of, padded
+from taichi_ants.engines.layout import compass_of, note_best_actions, padded
 from taichi_ants.engines.records import Snapshot, same
 from taichi_ants.errors import (
     AntsError,
@@ -69,7 +69,7 @@ _NO_TRAINING = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 
 _UNKNOWN = ("number", "action", "executed", "next_action")  # columns that are -1 at first
 
-_KIND = Kind("colony", 13, "Colony.save")
+_KIND = Kind("colony", 14, "Colony.save")
 # The contents of a file in addition to arrays: arguments of `Colony`, and progress.
 _OPTIONS = ("seeds", "ants", "capacity", "start", "ends_at_delivery", "sharing", "schedule")
 _PROGRESS = ("epsilon", "learning_rate", "length", "ticks")
@@ -554,19 +554,32 @@ class ColonyState:
             kept = self.arrays["weights"] = np.empty(min(2 * len(weights), most + 1), np.float32)
         kept[: len(weights)], kept[len(weights) :] = weights, weights[-1]
 
+    @property
+    def slots_matter(self) -> bool:
+        """Whether an ant must stay in its slot; else vacant slots are always the last ones."""
+        return self.ants_change or self.one_a_slot or self.is_given_actions
+
     def sort_ants(self) -> None:
         """Sort the ants of a world roughly by cell, so that neighbours share caches.
 
         Ants have numbers, so their order does not change results. They are not sorted if slots
         matter, or if some slots are vacant, because vacant slots must be the last ones.
         """
-        slots_matter = self.ants_change or self.one_a_slot or self.is_given_actions
-        if slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
+        if self.slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
             return
         # Keys of 16 bits, which NumPy sorts in a tenth of the time.
         near = self.cells >> max(0, self.grid.size.bit_length() - 16)
+        self._sort_slots(near.astype(np.uint16))
+
+    def close_gaps(self) -> None:
+        """Move vacant slots behind those with ants, unless slots matter."""
+        if not self.slots_matter:
+            self._sort_slots(self._stages == Stage.VACANT)
+
+    def _sort_slots(self, keys: np.ndarray) -> None:
+        """Sort the slots of each world by keys (W, capacity), equal ones in their present order."""
         first = np.arange(len(self.seeds))[:, None] * self.capacity
-        order = (np.argsort(near.astype(np.uint16), axis=1, kind="stable") + first).ravel()
+        order = (np.argsort(keys, axis=1, kind="stable") + first).ravel()
         for name in self.columns():
             self.arrays[name][:] = self.arrays[name][order]
 
@@ -789,6 +802,7 @@ class ColonyState:
         for number, table in checks.caste_policies(self.task).items():
             of_groups = q.reshape(n_worlds, self.n_nests, -1, *q.shape[2:])
             of_groups[:, :, number, 0, :, :N_ACTIONS] = table
+        note_best_actions(q)
         return q.reshape(-1)
 
     def _constants(self) -> Arrays:

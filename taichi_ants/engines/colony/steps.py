@@ -52,6 +52,7 @@ from taichi_ants.engines.views import judge
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import (
+    BEST_AT,
     EMPTY,
     FORWARD,
     GIVE,
@@ -61,6 +62,7 @@ from taichi_ants.task.constants import (
     PICK_UP,
     QUEEN,
     RIGHT,
+    ROW,
     SEES_LURE,
 )
 from taichi_ants.task.events import Event
@@ -78,6 +80,7 @@ from taichi_ants.task.rules.actions import (
 from taichi_ants.task.rules.delivery import can_give, heading_after_delivery
 from taichi_ants.task.rules.policy import (
     attraction,
+    best_actions,
     bit_number,
     choose_cell,
     choose_in_crowd,
@@ -337,13 +340,25 @@ def draw_action(c: ti.template(), v: ti.template(), w, ant, state, percept, tick
                     action = draw_by_cues(c, v, cues, w, ant, state, percept, tick, bits)
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
-        values, explore_below = values_of(c.q, table, state), explore_below_of(c, v, w, ant)
+        explore_below = explore_below_of(c, v, w, ant)
         if ti.static(v.choice == "softmax"):
             temperature = choice_number(c, v, ant, ti.static(CasteRow.TEMPERATURE))
-            action = choose_softly(values, bits, explore_below, temperature)
+            action = choose_softly(values_of(c.q, table, state), bits, explore_below, temperature)
         else:
-            action = choose_in_crowd(c.compass, values, bits, explore_below)
+            best = best_actions_of(c, v, table, state)
+            action = choose_in_crowd(c.compass, best, bits, explore_below)
     return action
+
+
+@ti.func
+def best_actions_of(c: ti.template(), v: ti.template(), table, state):
+    """Return the `best_actions` of a state; they are stored unless ants have their own tables."""
+    best = 0
+    if ti.static(v.alone):
+        best = best_actions(values_of(c.q, table, state))
+    else:
+        best = ti.cast(c.q[table + state * ROW + BEST_AT], ti.i32)
+    return best
 
 
 @ti.func
@@ -490,8 +505,8 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     enters &= MOVES >> action
     wanted = cell + enters * step
     mark = v.idle + enters * (conflicts.ENTER + heading - v.idle)
-    foods = vision.goals_in_view(percept)
-    if (foods != 0) & (action == PICK_UP) & (carries == 0):
+    foods = vision.goals_in_view(percept) * (1 - carries)  # no branch by `carries`
+    if (foods != 0) & (action == PICK_UP):
         position = lowest_bit_number(foods)
         if foods & (foods - 1) != 0:  # several food items in view
             k, random_state = draw_below(random_state, popcnt(foods))

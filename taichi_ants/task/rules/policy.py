@@ -49,6 +49,17 @@ def bit_number(mask, k):
 
 
 @ti.func
+def best_actions(values):
+    """Return a bit for each of the five actions with the largest value."""
+    best = best_value(values)
+    mask = (1 << N_ACTIONS) - 1
+    for a in ti.static(range(N_ACTIONS)):
+        # Not `values[a] == best`, which would leave no action if values are NaN.
+        mask ^= ti.cast(values[a] < best, ti.i32) << a
+    return mask
+
+
+@ti.func
 def choose(values, bits, explore_below):
     """Return an epsilon-greedy action from one draw of 64 bits, with ties broken at random.
 
@@ -59,11 +70,7 @@ def choose(values, bits, explore_below):
     if high_word(bits) < explore_below:
         action = below(low_word(bits), N_ACTIONS)
     else:
-        best = best_value(values)
-        mask = (1 << N_ACTIONS) - 1
-        for a in ti.static(range(N_ACTIONS)):
-            # Not `values[a] == best`, which would leave no action if values are NaN.
-            mask ^= ti.cast(values[a] < best, ti.i32) << a
+        mask = best_actions(values)
         if mask & (mask - 1) == 0:  # one best action: usual, so the branch is well predicted
             action = lowest_bit_number(mask)
         else:
@@ -72,13 +79,12 @@ def choose(values, bits, explore_below):
 
 
 @ti.func
-def choose_in_crowd(compass: ti.template(), values, bits, explore_below):
-    """Return the action of `choose`, without a branch: exploration in crowds is unpredictable."""
-    best = best_value(values)
-    mask = (1 << N_ACTIONS) - 1
-    for a in ti.static(range(N_ACTIONS)):
-        mask ^= ti.cast(values[a] < best, ti.i32) << a
-    mask = ti.select(high_word(bits) < explore_below, (1 << N_ACTIONS) - 1, mask)
+def choose_in_crowd(compass: ti.template(), best, bits, explore_below):
+    """Return the action of `choose`, without a branch: exploration in crowds is unpredictable.
+
+    `best` are the `best_actions` of the state.
+    """
+    mask = ti.select(high_word(bits) < explore_below, (1 << N_ACTIONS) - 1, best)
     return bit_number_in(compass, mask, below(low_word(bits), popcnt(mask)))
 
 

@@ -16,13 +16,14 @@ from same_colonies import assert_equal
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.timetable import Timetable
+from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.interventions import from_dict
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
 from taichi_ants.protocol import At, Every, When
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.protocol import Protocol
 from taichi_ants.task import foraging
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
+from taichi_ants.task.constants import BEST_AT, EMPTY, FOOD, OBSTACLE, ROW
 
 # Each entry takes kernels of its own, see test_against_reference.py.
 KERNELS = [
@@ -204,6 +205,24 @@ def test_interventions_by_hand_change_the_worlds_that_are_named():
     cells = colony.grid.index([cell, [4, 4, 0]])
     now = [colony.snapshot(w).ground[cells].tolist() for w in range(3)]
     assert now == [[EMPTY, FOOD]] * 3
+
+
+@pytest.mark.parametrize("schedule", ["by_world", "by_chunk"])
+def test_kernels_rely_on_stored_best_actions_and_on_slots_without_gaps(schedule):
+    """They would not notice if either was wrong."""
+    config = TrainingConfig("q_learning", 0.1, 0.9, 0.5, 1.0, initial_q=0.1)
+    colony = Colony(worlds.paper(), FORAGING, config, (1, 2), ants=30, schedule=schedule)
+    colony.begin_episode()
+    for number in (7, 3, 0):
+        colony.tick(40)
+        Interventions(colony, [1]).remove_ants(colony.cells[1, [number, 20]])
+        ants = 30 - np.array([[0], [30 - np.count_nonzero(colony.living[1])]])
+        assert np.array_equal(colony.living, np.arange(30) < ants)
+        stored = colony.arrays["q"].copy()
+        note_best_actions(stored)
+        assert np.array_equal(stored, colony.arrays["q"])
+    assert ants[1] < 30
+    assert len(np.unique(stored.reshape(-1, ROW)[:, BEST_AT])) > 5
 
 
 def test_a_policy_comes_from_a_file_a_name_or_a_table(tmp_path):
