@@ -183,6 +183,7 @@ def test_the_core_does_not_import_extras():
         assert not {part_of(module) for module in imported(path)} & EXTRAS, name(path)
 
 
+@pytest.mark.slow
 def test_ants_learn_without_the_extras(tmp_path):
     """Alone and in a colony, where importing the extras fails."""
     script = """

@@ -291,6 +291,7 @@ assert {settings["fast_math"] for settings in starts} == {False}
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
+@pytest.mark.slow
 def test_a_forked_process_is_told_to_be_spawned(tmp_path):
     """All that launches kernels, also what was made before; a fork before the start is fine."""
     script = """

@@ -86,7 +86,7 @@ def test_mistakes_end_in_a_sentence_and_nothing_else(
     assert said in err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_fixed_rules_prints_a_row_for_each_world_and_task(kernels: Path, tmp_path: Path) -> None:
     study = [
         *("world_kind,rules,regime,ants,seed,deliveries,greedy", "paper,queueing,joint,3,0,50,60"),

@@ -46,7 +46,7 @@ def run(arguments, capsys):
     return end.value.code, capsys.readouterr()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_command_and_its_guard(library, capsys, monkeypatch):
     monkeypatch.setattr(colony_in_c, "_SECONDS", 0.0)
     few = ["--ants", "300", "--rounds", "1", "--threads", "1"]

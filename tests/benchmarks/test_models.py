@@ -26,7 +26,7 @@ def test_its_table():
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_command(capfd, tmp_path, monkeypatch):
     page = tmp_path / "page.md"
     page.write_text("<!-- models -->\n<!-- /models -->\n")

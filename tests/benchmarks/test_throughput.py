@@ -76,7 +76,7 @@ def rows_of(said):
     return [["".join(lines[label][:-5]), *lines[label][-5:]] for label in labels]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @needs_c
 def test_its_table_and_its_guard(capsys):
     code, said = said_by(SMALL, capsys)

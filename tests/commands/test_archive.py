@@ -306,8 +306,13 @@ COLONY = [
 ]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "arguments"), [("compare", COMPARE), ("colony", COLONY)])
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        pytest.param("compare", COMPARE, marks=pytest.mark.slow),
+        pytest.param("colony", COLONY, marks=pytest.mark.long),
+    ],
+)
 def test_studies_with_pages_and_figures_repeat_themselves(
     name, arguments, tmp_path, capsys, monkeypatch
 ):

@@ -233,6 +233,7 @@ def test_only_the_beginning_is_read(kernels, tmp_path):
     assert contents(tmp_path / "out") == before
 
 
+@pytest.mark.slow
 def test_without_a_home(kernels, tmp_path):
     """Kernels are then kept among the temporary files."""
     places = {"HOME": None, "XDG_CACHE_HOME": None, "TMPDIR": str(kernels)}

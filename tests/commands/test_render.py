@@ -221,7 +221,7 @@ def test_mistakes_are_one_sentence(tmp_path, policy, name, run) -> None:
 @pytest.mark.parametrize(
     ("name", "sent", "status"),
     [
-        ("a.gif", signal.SIGINT, 130),
+        pytest.param("a.gif", signal.SIGINT, 130, marks=pytest.mark.slow),
         pytest.param("frames", signal.SIGTERM, 143, marks=pytest.mark.slow),
     ],
 )

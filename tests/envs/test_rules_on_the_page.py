@@ -168,7 +168,7 @@ def test_the_page_has_all_rules() -> None:
     assert compare(5_000, 1) > 25
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_page_has_all_rules_in_many_worlds() -> None:
     assert compare(60_000, 2) > 300
 

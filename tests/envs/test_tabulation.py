@@ -81,6 +81,7 @@ def test_observations_and_formats_are_checked() -> None:
         tabulate(network, observation_format="image")  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_network_is_rendered_put_into_a_colony_and_compared(
     kernels: Path, tmp_path: Path
 ) -> None:

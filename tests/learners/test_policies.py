@@ -131,7 +131,9 @@ def test_the_trail_follower_never_walks_into_what_blocks_unless_nothing_else_is_
 
 
 # What 64 ants of the least seeds deliver, less a margin; learned tables give 565 and 906 there.
-@pytest.mark.parametrize(("task", "least"), [(foraging(), 700), (queueing(), 930)])
+@pytest.mark.parametrize(
+    ("task", "least"), [pytest.param(foraging(), 700, marks=pytest.mark.slow), (queueing(), 930)]
+)
 def test_a_colony_of_trail_followers_delivers_more_than_learned_tables(
     task: Task, least: int
 ) -> None:

@@ -494,6 +494,7 @@ def test_a_change_is_undone_and_done_again(room):
         assert guest.state["can_go_back"]
 
 
+@pytest.mark.slow
 def test_what_several_in_a_row_have_replaced_comes_back(room):
     """Neither a second press nor a second page takes away the session that was there before."""
     with Guest(room) as guest, Guest(room) as other:
@@ -551,6 +552,7 @@ def test_the_first_session_has_none_before_it(shared):
         )
 
 
+@pytest.mark.slow
 def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
     from PIL import Image
 
@@ -572,6 +574,7 @@ def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
     assert state_of(room) == before
 
 
+@pytest.mark.slow
 def test_time_goes_on_while_a_file_is_made(room):
     with Guest(room) as guest:
         guest.ask("export", kind="gif")
@@ -642,6 +645,7 @@ def working(guest: Guest, kind: str, done: int = 1) -> dict:
         guest.until("state")
 
 
+@pytest.mark.slow
 def test_pages_are_answered_while_a_session_is_replayed(room, endless):
     with Guest(room) as guest, Guest(room) as other:
         guest.ask("step", ticks=3)
@@ -696,6 +700,7 @@ def test_a_replay_that_fails_leaves_the_session(room, tmp_path):
         guest.until("frame")
 
 
+@pytest.mark.slow
 def test_it_ends_while_a_session_is_replayed(shared, tmp_path):
     with running(shared.choices) as one, Guest(one) as guest:
         replace(one.session.log(), steps=10**8, ticks=10**8).write(tmp_path / "x.npz")

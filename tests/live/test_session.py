@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import math
 import subprocess
@@ -65,7 +66,8 @@ SETUPS = {
     "nests": Setup(TWO_NESTS, tasks.foraging(), LEARNS, 20, 40, 3, 25),
     "fields": Setup("open", HOMING, LEARNS, 20, world_settings=SMALL, pheromone="home"),
 }
-MARKED = [pytest.param(one, marks=[pytest.mark.slow] * (one == "queueing")) for one in SETUPS]
+LATER = ("queueing", "lively")
+MARKED = [pytest.param(one, marks=[pytest.mark.slow] * (one in LATER)) for one in SETUPS]
 
 
 def with_edits(setup: Setup, n: int, seed: int = 0) -> Session:
@@ -88,13 +90,14 @@ def replayed(content: bytes) -> Session:
 
 
 @pytest.fixture(scope="module")
-def edited() -> dict[str, Session]:
-    return {name: with_edits(setup, 60) for name, setup in SETUPS.items()}
+def edited():
+    """A function that returns the session of a setup after 60 edits."""
+    return functools.cache(lambda name: with_edits(SETUPS[name], 60))
 
 
 @pytest.mark.parametrize("name", MARKED)
 def test_edits_are_replayed_to_the_bit(edited, name, tmp_path):
-    session = edited[name]
+    session = edited(name)
     assert session.colony.episode > 2 or not session.setup.ticks_per_episode
     done = {name for _, edit in session.edits for name in edit}
     assert done >= {"place", "clear", "trail", "add_ants", "remove_ants", "episode", "ants"}
@@ -192,7 +195,7 @@ def test_a_file_knows_what_was_one_change(tmp_path):
     assert len(again.edits) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
     script = (
         "import sys; from taichi_ants import runtime; from taichi_ants.live.session import Session;"
@@ -202,7 +205,7 @@ def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
     names = ("foraging", "lively")
     paths = [str(tmp_path / f"{name}.npz") for name in names]
     for name, path in zip(names, paths, strict=True):
-        edited[name].save(path)
+        edited(name).save(path)
     for threads in ("1", "2"):
         done = subprocess.run(
             [sys.executable, "-c", script, threads, *paths],
@@ -213,7 +216,7 @@ def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
             text=True,
         )
         assert done.returncode == 0, done.stderr
-        assert done.stdout.split() == [edited[name].interventions.state() for name in names]
+        assert done.stdout.split() == [edited(name).interventions.state() for name in names]
 
 
 def test_pieces_of_time_do_not_matter():
@@ -277,7 +280,7 @@ def test_states_have_names_before_they_are_seen_on_pages():
 
 
 def test_a_recording_holds_what_happened(edited):
-    session = edited["foraging"]
+    session = edited("foraging")
     before = session.interventions.state()
     whole = recording(session.log(), most_frames=10_000)
     few = recording(session.log(), most_frames=50)
@@ -295,14 +298,15 @@ def test_a_recording_holds_what_happened(edited):
 
 
 def test_exports_are_files_of_the_project(edited, tmp_path):
-    session = edited["foraging"]
+    session = edited("foraging")
     (tmp_path / "x").write_bytes(session.policy_bytes())
     policy = load_policy(tmp_path / "x")
     assert np.array_equal(policy.q_values, session.colony.q_values[0])
     assert policy.task == session.colony.task
     with pytest.raises(AntsError, match="has its own table"):
-        edited["paper"].policy_bytes()
-    for name, one in edited.items():
+        edited("paper").policy_bytes()
+    for name in ("foraging", "paper", "nests"):
+        one = edited(name)
         (tmp_path / name).write_bytes(one.colony_bytes())
         colony = Colony.load(tmp_path / name)
         assert colony == one.colony
@@ -465,7 +469,7 @@ def test_edits_without_room_change_nothing():
 )
 def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
     path = tmp_path / "x.npz"
-    edited["foraging"].save(path)
+    edited("foraging").save(path)
     arrays = archives.read(path)
     facts = {**json.loads(arrays["facts"].item()), **changes}
     archives.write(path, {**arrays, "facts": np.array(json.dumps(facts))})
@@ -479,7 +483,7 @@ def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
 def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
     monkeypatch.setattr(session_module, "KIND", replace(session_module.KIND, most=1000))
     with pytest.raises(AntsError, match=r"unpacks to .* bytes, and at most 1000 are allowed"):
-        replayed(edited["foraging"].to_bytes())
+        replayed(edited("foraging").to_bytes())
 
 
 @pytest.mark.parametrize("content", [b"", b"nothing", b"PK\3\4" + bytes(100)])
@@ -587,7 +591,7 @@ def test_what_a_hand_has_set_stays_in_later_episodes():
 
 def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
     """And a page that joins late is told the same."""
-    session = edited["foraging"]
+    session = edited("foraging")
     counted, again = 0, Session(session.setup)
     for steps, edit in session.edits:
         while again.steps < steps:

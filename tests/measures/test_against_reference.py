@@ -48,10 +48,10 @@ def expected(plain: ReferenceColony) -> list[dict]:
 @pytest.mark.parametrize(
     ("schedule", "threads", "changes"),
     [
-        ("by_world", 1, False),
         ("by_chunk", 2, True),
-        pytest.param("by_chunk", 2, False, marks=pytest.mark.slow),
-        pytest.param("by_world", 2, True, marks=pytest.mark.slow),
+        pytest.param("by_world", 1, False, marks=pytest.mark.slow),
+        pytest.param("by_chunk", 2, False, marks=pytest.mark.long),
+        pytest.param("by_world", 2, True, marks=pytest.mark.long),
     ],
 )
 def test_measures_equal_the_reference(schedule, threads, changes):

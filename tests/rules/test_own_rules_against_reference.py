@@ -34,13 +34,8 @@ MODELS = {
         {"sharing": "independent", "learner": "n_step_sarsa", "fields": "a", "changes": True},
     ),
 }
-MARKED = [
-    pytest.param(
-        name,
-        marks=[pytest.mark.slow] * (name != "weber") + [pytest.mark.optimised] * (name == "shaped"),
-    )
-    for name in MODELS
-]
+MARKS = {"weber": (), "shaped": pytest.mark.optimised}
+MARKED = [pytest.param(name, marks=MARKS.get(name, pytest.mark.slow)) for name in MODELS]
 
 
 @pytest.mark.parametrize("model", MARKED)

@@ -97,6 +97,7 @@ MODELS = {
         {},
     ),
 }
+SLOW = ("deneubourg", "rules of users", "labour of users", "choice by labour")
 
 
 def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[Event]] | None:
@@ -185,7 +186,7 @@ def steps_compared(drawn: RandomColony, protocol: list[Event], schedule: str, se
 @pytest.mark.parametrize(
     ("name", "ant_steps"),
     [
-        *(pytest.param(name, 2_500, marks=pytest.mark.slow) for name in MODELS),
+        *(pytest.param(name, 2_500, marks=pytest.mark.slow) for name in SLOW),
         # Two million in all, in ten minutes.
         *(pytest.param(name, 340_000, marks=pytest.mark.long) for name in MODELS),
         pytest.param("softmax", 2_500, marks=pytest.mark.optimised),

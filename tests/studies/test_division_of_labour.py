@@ -13,6 +13,7 @@ from command_lines import ROOT
 from taichi_ants import files
 
 
+@pytest.mark.slow
 def test_thresholds_divide_labour(tmp_path, capsys, monkeypatch):
     """More ants forage at a higher demand, and those with low thresholds forage more."""
     script = ROOT / "experiments" / "models" / "division_of_labour.py"

@@ -17,6 +17,7 @@ from taichi_ants.studies.model_script import table
 DOCS = (ROOT / "docs" / "protocol.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_colony_recovers_after_a_removal(tmp_path, capsys, monkeypatch):
     script = ROOT / "experiments" / "models" / "recovery.py"
     monkeypatch.setattr(sys, "argv", [str(script), "--seeds", "2", "--out", str(tmp_path)])

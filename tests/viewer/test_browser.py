@@ -639,7 +639,7 @@ def test_one_moment_has_no_time_line(browser, folder):
     opened.close()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_frames_per_second(browser, folder):
     """A hundred thousand cells and five thousand ants, drawn without a graphics processor."""
     world = worlds.open_world(1, (183, 183, 183))

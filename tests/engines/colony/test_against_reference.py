@@ -134,16 +134,19 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK = (0, 1, 10, 11, 13, 14)
+QUICK = (0, 1, 10, 14)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
+LONG = (12, 15, 17, 18, 19, 20, 21, 22)  # each of their features is in another entry as well
 OPTIMISED = ("dyna_q", "independent", "ants_seen", False)
-MARKED = [
-    pytest.param(
-        one,
-        marks=[pytest.mark.slow] * (one in SLOW) + [pytest.mark.optimised] * (one == OPTIMISED),
-    )
-    for one in KERNELS
-]
+
+
+def marks_of(k: int) -> list[pytest.MarkDecorator]:
+    if KERNELS[k] == OPTIMISED:
+        return [pytest.mark.optimised]
+    return [] if k in QUICK else [pytest.mark.long if k in LONG else pytest.mark.slow]
+
+
+MARKED = [pytest.param(one, marks=marks_of(k)) for k, one in enumerate(KERNELS)]
 
 
 @pytest.mark.parametrize("kernel", MARKED, ids=str)
@@ -199,7 +202,8 @@ NESTS = [
     ("q_learning", "frozen", "strangers", False, "right_of_way", "half", 2, 2, True),
 ]
 QUICK_NESTS = [
-    one if k in (1, 4) else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(NESTS)
+    pytest.param(one, marks={0: [pytest.mark.long], 1: [], 4: []}.get(k, [pytest.mark.slow]))
+    for k, one in enumerate(NESTS)
 ]
 
 
@@ -288,7 +292,10 @@ CASTES = [
     ("dyna_q", "independent", "paper", False, "blocking", "half", 1, True, 1, SOFT),
 ]
 QUICK_CASTES = [
-    one if 0 < k < 4 else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(CASTES)
+    one
+    if k in (1, 3)
+    else pytest.param(one, marks=[pytest.mark.slow, pytest.mark.long][k in (0, 4, 8)])
+    for k, one in enumerate(CASTES)
 ]
 
 

@@ -164,6 +164,7 @@ def drawn() -> list:
     return found[:1]
 
 
+@pytest.mark.slow
 def test_schedules_threads_and_files_change_nothing(tmp_path):
     for one in drawn():
         results = []

@@ -137,6 +137,7 @@ def test_ants_deliver_to_their_own_queen_alone():
     assert happened.min() > 3
 
 
+@pytest.mark.slow
 def test_schedules_threads_and_files_change_nothing(tmp_path):
     drawn = next(drawn_nests("shared"))
     results = []

@@ -38,8 +38,14 @@ KERNELS = [
 ]  # fmt: skip
 WITH_CASTES = ("sarsa", "shared", "paper", False, "right_of_way", "half", "a", ("trail", "a"))
 KERNELS.append(WITH_CASTES)
-QUICK = (KERNELS[0], KERNELS[4], WITH_CASTES)
-MARKED = [one if one in QUICK else pytest.param(one, marks=pytest.mark.slow) for one in KERNELS]
+QUICK = (KERNELS[4], WITH_CASTES)
+LONG = (KERNELS[1], KERNELS[3])
+MARKED = [
+    pytest.param(
+        one, marks=[pytest.mark.long if one in LONG else pytest.mark.slow] * (one not in QUICK)
+    )
+    for one in KERNELS
+]
 TICKS = 14
 FOLLOWS = TrainingConfig("q_learning", 1.0, 1.0, 0.05, 1.0)
 

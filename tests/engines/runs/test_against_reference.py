@@ -50,7 +50,7 @@ NOISY = [
     pytest.param("sarsa_lambda", "trail_levels", "set", "greedy", "slip", marks=pytest.mark.slow),
     pytest.param(
         *("dyna_q", "six_cells", "set", "softmax", "misread"),
-        marks=[pytest.mark.slow, pytest.mark.optimised],
+        marks=pytest.mark.optimised,
     ),
 ]
 
