@@ -147,8 +147,8 @@ MUTATIONS = [
     ("task/rules/policy.py", "larger(values[2], values[3])", "values[2]", RUNS),
     (
         "task/rules/policy.py",
-        "    if high_word(bits) < explore_below:",
-        "    if low_word(bits) < explore_below:",
+        "action = below(low_word(bits), N_ACTIONS)\n    else:\n        mask = best_actions",
+        "action = below(high_word(bits), N_ACTIONS)\n    else:\n        mask = best_actions",
         RUNS,
     ),
     (
@@ -167,7 +167,7 @@ MUTATIONS = [
         "observation.reads[i])[k] += 0",
         f"{COLONY}::test_misread_cells_show_no_further_pheromone",
     ),
-    ("engines/colony/steps.py", "ti.select(is_true, level, 0)", "level", COLONY),
+    ("engines/colony/steps.py", "ti.select(is_true == 1, level, 0)", "level", COLONY),
     (
         "engines/colony/learning.py",
         "c.streams[ant] == c.first",
@@ -355,7 +355,7 @@ MUTATIONS = [
     ("measures/activity.py", "(one - mean) ** 2", "abs(one - mean)", MEASURES),
     ("measures/series.py", "if self._read.get(world) == tick:", "if False:", MEASURES),
     ("measures/ants.py", "snapshot.distances[snapshot.ant_cells]", "snapshot.distances", MEASURES),
-    ("measures/tidy.py", "[last[key] == tick", "[last[key] >= tick", RESULTS_OF_RUNS),
+    ("measures/tidy.py", "ticks == last[which", "ticks <= last[which", RESULTS_OF_RUNS),
     ("analysis/results.py", "goes_on, np.roll(begins, -1)", "goes_on, begins + 1", RESULTS_OF_RUNS),
     ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
     ("studies/sweep.py", "last = array[..., -1]", "last = array[..., 0]", SWEEPS),
