@@ -126,7 +126,7 @@ MUTATIONS = [
     (
         "engines/colony/learning.py",
         "n + ti.cast(known == 0, ti.i32)",
-        "n + ti.cast(known <= 1, ti.i32)",
+        "n + ti.cast(known != 0, ti.i32)",
         COLONY,
     ),
     ("task/rules/conflicts.py", "stays = had_ant(", "stays = not had_ant(", TRAFFIC),

@@ -73,7 +73,10 @@ KERNELS = [
         "strongest",
         with_fields("A", homing="A"),
     ),
-    ("sarsa", "shared", "ants", False, "right_of_way", "strongest", with_fields("ab", homing="b")),
+    (
+        *("n_step_sarsa", "independent", "ants", False, "right_of_way", "strongest"),
+        with_fields("ab", homing="b"),
+    ),
     ("q_learning", "shared", "queues", False, "following", UNDER, with_fields("Ab", "A", "b")),
     ("q_learning", "frozen", "paper", True, "following", UNDER, with_fields("ab", "b", "b")),
     ("sarsa", "shared", "ants", False, "right_of_way", "half", SOFT | {"noise": NOISE}),
@@ -269,7 +272,7 @@ CASTES = [
     ("sarsa", "shared", "ants", False, "right_of_way", "half", 2, True, 1, {}),
     (
         *("dyna_q", "shared", "paper", True, "following", "strongest", 3, True, 2),
-        with_fields("ab", "a") | {"cues_of": [("a", "compass"), ("b", "trail")]},
+        with_fields("ac", "a") | {"cues_of": [("a", "compass"), ("c", "trail")]},
     ),
     ("n_step_sarsa", "independent", "paper", False, "blocking", "half", 2, True, 1, {}),
     (

@@ -179,8 +179,9 @@ def test_a_run_leaves_no_trace_of_its_protocol():
 
 def test_half_of_the_ants_are_removed_and_food_is_added_in_each_episode():
     colony = followers(range(3))
-    found = colony.run(2, 50, protocol=[At(20, remove_ants=0.5), At(21, remove_ants=1)])
-    assert (found.living == 9).all()
+    removals = [At(20, remove_ants=0.5), At(21, remove_ants=1), At(22, remove_ants=0.5)]
+    found = colony.run(2, 50, protocol=removals)
+    assert (found.living == 4).all()  # 20 - 10 - 1 - 5: a half of nine is rounded up
     cells = [[1, 2, 0], [1, 3, 0]]
     colony.run(1, 50, protocol=[At(10, place={"what": "food", "cells": cells})])
     assert (colony.snapshot(1).ground[colony.grid.index(cells)] != OBSTACLE).all()
