@@ -494,7 +494,6 @@ def test_a_change_is_undone_and_done_again(room):
         assert guest.state["can_go_back"]
 
 
-@pytest.mark.slow
 def test_what_several_in_a_row_have_replaced_comes_back(room):
     """Neither a second press nor a second page takes away the session that was there before."""
     with Guest(room) as guest, Guest(room) as other:
@@ -645,7 +644,6 @@ def working(guest: Guest, kind: str, done: int = 1) -> dict:
         guest.until("state")
 
 
-@pytest.mark.slow
 def test_pages_are_answered_while_a_session_is_replayed(room, endless):
     with Guest(room) as guest, Guest(room) as other:
         guest.ask("step", ticks=3)
