@@ -107,6 +107,16 @@ def check_castes(task: Task, sharing: str, is_given_actions: bool) -> None:
         )
 
 
+def check_nests_of_castes(task: Task, n_nests: int) -> None:
+    """Raise AntsError if a caste belongs to a nest that worlds with so many nests do not have."""
+    for name, caste in task.castes.items():
+        if caste.nest is not None and caste.nest >= n_nests:
+            raise AntsError(
+                f"`task.castes.{name}.nest` is {caste.nest}, but the world has "
+                f"{count(n_nests, 'nest')}, numbered from 0; choose one of them."
+            )
+
+
 def caste_policies(task: Task) -> dict[int, np.ndarray]:
     """Return the tables of the castes that follow a policy, by the numbers of castes.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from taichi_ants import rules, runtime, worlds
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.errors import checked_whole, listing
+from taichi_ants.errors import AntsError, checked_whole, listing
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.reference import ReferenceColony
@@ -102,8 +102,10 @@ def _compared(task_of: Callable[[int], Task]) -> tuple[int, str]:
                 if found:
                     return ticks, found
                 ticks += 1
-    except (ArithmeticError, ValueError, IndexError) as error:
-        return ticks, f"seed {seed} fails: {error}"
+    except AntsError:
+        raise
+    except Exception as error:  # of the twin or the observation
+        return ticks, f"seed {seed} fails: {type(error).__name__}: {error}"
     return ticks, ""
 
 

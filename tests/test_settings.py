@@ -234,7 +234,7 @@ def test_cues_are_fields_of_the_task():
         assert refused(lambda wrong=wrong: task.but(homing_cue=wrong)) == says
     says = f"`task.outbound_cue` is 'compass'; it must be one of trail, {end}"
     assert refused(lambda: Task(outbound_cue="compass")) == says
-    for name in ("trail", "compass"):
+    for name in ("trail", "compass", "all", "none"):
         says = f"`task.fields` has a field {name!r}, but that name is taken; choose another name."
         assert refused(lambda name=name: Task(fields={name: {}})) == says
     says = "`task.fields.home.laid` is 'often'; it must be one of with_food, without_food, "

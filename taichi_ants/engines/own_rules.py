@@ -15,7 +15,7 @@ import taichi as ti
 from taichi_ants import runtime
 from taichi_ants.engines.plugin_check import fault_apart, last_line
 from taichi_ants.errors import unusable
-from taichi_ants.rules.inputs import KINDS
+from taichi_ants.rules.inputs import KINDS, values_shown
 from taichi_ants.rules.registry import TRIES, Rule, tries
 from taichi_ants.task.rules.numbers import exponential, logarithm, power
 
@@ -116,10 +116,14 @@ def difference(rule: Rule, n: int = TRIES) -> str:
     except Exception as error:
         return last_line(error)
     for (inputs, parameters), result in zip(drawn, found.tolist(), strict=True):
-        twin = float(rule.twin(**inputs, **parameters))
+        try:
+            twin = float(rule.twin(**inputs, **parameters))
+        except Exception as error:
+            said = f"{type(error).__name__}: {error}"
+            return f"its twin fails ({said}) for {values_shown(inputs, parameters)}"
         if result != twin:
-            shown = ", ".join(f"{k}={v}" for k, v in {**inputs, **parameters}.items())
-            return f"its kernel returns {result!r}, but its twin {twin!r}, for {shown}"
+            given = values_shown(inputs, parameters)
+            return f"its kernel returns {result!r}, but its twin {twin!r}, for {given}"
     return ""
 
 

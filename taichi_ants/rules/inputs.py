@@ -142,6 +142,11 @@ def drawn(inputs: Mapping[str, Input], n: int, seed: int = 0) -> Iterator[dict[s
         }
 
 
+def values_shown(*values: Mapping[str, Any]) -> str:
+    """Return the values of inputs and parameters for a message."""
+    return ", ".join(f"{name}={value}" for one in values for name, value in one.items())
+
+
 def _drawn(rng: np.random.Generator, name: str) -> float:
     """Return a value that an input of this name, or an entry of it, can have."""
     import numpy as np
@@ -156,7 +161,8 @@ def _drawn(rng: np.random.Generator, name: str) -> float:
         return float(rng.integers(-MOST_REWARD, MOST_REWARD + 1))
     if name == "values":
         return float(np.float32(rng.choice([0.0, 1.0, rng.normal(scale=30)])))
-    level = rng.choice([0.0, 250.0, 10 ** rng.uniform(0, 6)])
+    # Usual ones are often drawn, and the largest ones sometimes.
+    level = rng.choice([0.0, 250.0, 10 ** rng.uniform(0, 6), 10 ** rng.uniform(0, 9)])
     return float(np.float32(level) if rng.random() < 0.5 else int(level))
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from taichi_ants.errors import AntsError, check_new_name, check_one_of, expect, shown
-from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of
+from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of, values_shown
 from taichi_ants.rules.language import LanguageError, kernel_source
 from taichi_ants.settings import Is, Settings, declared
 
@@ -243,14 +243,18 @@ def _try(rule: Rule) -> None:
     kind = KINDS[rule.kind]
     try:
         for inputs, parameters in tries(rule):
-            result = rule.function(**inputs, **parameters)
+            try:
+                result = rule.function(**inputs, **parameters)
+            except ArithmeticError as error:
+                shows = values_shown(inputs, parameters)
+                raise ValueError(f"{type(error).__name__}: {error}, for {shows}") from error
             is_number = isinstance(result, (bool, int, float))
             whole = is_number and (
                 not kind.is_whole or (math.isfinite(result) and result == math.floor(result))
             )
             if whole and kind.least <= result <= kind.most:
                 continue
-            shows = ", ".join(f"{k}={v}" for k, v in {**inputs, **parameters}.items())
+            shows = values_shown(inputs, parameters)
             if not is_number:
                 raise ValueError(f"it returns {shown(result)}, which is not a number, for {shows}")
             form = "a whole number" if kind.is_whole else "a number"

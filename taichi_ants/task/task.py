@@ -13,7 +13,7 @@ from taichi_ants.rules.inputs import LABOUR
 from taichi_ants.rules.registry import Parameters, Rule, own, words
 from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
-from taichi_ants.task.caste import Caste, shares_in
+from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
 from taichi_ants.task.constants import MAX_CASTES, MAX_FOOD_KINDS, MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL, Field
@@ -349,7 +349,7 @@ class Task(Settings, path="task"):
             )
 
     def _check_fields(self) -> None:
-        for name in (TRAIL, COMPASS):
+        for name in (TRAIL, COMPASS, ALL, NOTHING):  # the last two have a meaning in `lays`
             if name in self.fields:
                 raise AntsError(
                     f"`task.fields` has a field {name!r}, but that name is taken; choose another "

@@ -130,7 +130,7 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn], dict[str, _Mark]]:
     for number, line in enumerate(re.split("\r\n|\r|\n", text), start=1):
         if line.lstrip().startswith(";"):
             continue
-        if setting := _SETTING.fullmatch(line):
+        if (setting := _SETTING.fullmatch(line)) and setting[1] != "region":
             if level is not None or drawn:
                 raise AntsError(
                     f"line {number} of {source} is {shown(line.strip())}; only one such line is "
@@ -138,7 +138,7 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn], dict[str, _Mark]]:
                 )
             level = _read_level(f"line {number} of {source}", *setting.groups())
             continue
-        if line.split()[:1] == ["region"]:
+        if re.match(r"\s*region\b", line):
             where = f"line {number} of {source}"
             if drawn:
                 raise AntsError(f"{where} names a region; move it above the drawing.")

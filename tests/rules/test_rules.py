@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -190,7 +191,7 @@ WRONG = [
     ("evaporation", imports, "`import math`, is not allowed"),
     ("evaporation", writes, "assign to one name at a time"),
     ("evaporation", text, "`'level'`, is not a number"),
-    ("evaporation", divides, "ZeroDivisionError"),
+    ("evaporation", divides, "ZeroDivisionError: float division by zero, for level="),
     ("deposit", roots, "x must be above 0"),
     ("evaporation", undefined, "`nowhere`, is not defined"),
     ("evaporation", bits, "`level & 3`, is not allowed"),
@@ -315,6 +316,24 @@ def test_a_rule_that_differs_from_its_twin_is_refused(clean):
     task = Task(pheromone=Pheromone("same"), evaporation_in_training=True)
     with pytest.raises(AntsError, match="rule 'same' cannot be used: its kernel returns"):
         Colony(worlds.paper(), task, own_config(), 0).run(1, 1)
+
+
+def fails_at_large(level):
+    if level > 5e8:
+        raise KeyError("a twin")
+    return level
+
+
+def differs_in_places(level):
+    return level if not 1e6 < level < 2e6 else 0
+
+
+def test_twins_are_asked_for_all_levels_that_occur_and_named_if_they_fail(clean):
+    rules.register("evaporation", twin=fails_at_large)(same)
+    says = "its twin fails (KeyError: 'a twin') for level="
+    assert check_rule("same").difference.startswith(says)
+    registry._RULES["same"] = replace(rules.get("same"), twin=differs_in_places)
+    assert "but its twin 0.0" in check_rule("same").difference
 
 
 def test_rules_that_read_labour_or_fields_need_them(clean):

@@ -48,7 +48,7 @@ def test_a_text_map_draws_regions():
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("region = %\nQ", "sets 'region'; the only settings are trail and region"),
+        ("region = %\nQ", "line 1 of the map is 'region = %'; write a name and a mark, such as"),
         ("region a b = %\nQ", "is 'region a b = %'; write a name and a mark, such as"),
         ("region a = Q\nQ", "has the mark 'Q', which has a meaning in maps; choose one of % [*]"),
         ("region a = %\nregion b = %\n%", "has the mark '%', which is used already; choose one"),

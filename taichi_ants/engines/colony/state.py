@@ -171,6 +171,7 @@ class ColonyState:
         )
         self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(self.task.foods))
         self.n_groups = self.n_nests * max(1, len(self.task.castes))
+        checks.check_nests_of_castes(self.task, self.n_nests)
         self.take_task(self.task)
         self.memory = Memory()
         if self.learner and (self.one_a_slot or self.plans_together):

@@ -252,7 +252,7 @@ GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
         ),
         (
             lambda: follows(Task(castes={"a": {"nest": 1}}), ants=5),
-            "`task.castes` has no caste for nest 0",
+            "`task.castes.a.nest` is 1, but the world has 1 nest, numbered from 0; choose one",
         ),
     ],
 )
