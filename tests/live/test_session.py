@@ -603,6 +603,11 @@ def test_a_policy_of_several_nests_is_exported_if_they_share_it(tmp_path):
     assert np.array_equal(load_policy(tmp_path / "policy.npz").q_values, table)
 
 
+def test_worlds_with_kinds_of_food_are_refused_with_what_to_do():
+    with pytest.raises(AntsError, match=r"2 kinds of food, but .* draw all food as F"):
+        Session(replace(SETUPS["nests"], world="Q   G   F\n"))
+
+
 def test_the_queen_of_any_nest_moves():
     session = Session(SETUPS["nests"])
     session.advance(10)
