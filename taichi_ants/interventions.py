@@ -490,21 +490,22 @@ def from_dict(facts: Any) -> Intervention:
     return INTERVENTIONS[name].from_dict(settings)
 
 
+def flat_index(grid: AxialGrid, cell: Any) -> int:
+    """Return the flat index of a cell or of a flat index; AntsError if it does not exist."""
+    flat = int(cell if np.ndim(cell) == 0 else grid.index(cell))
+    if not 0 <= flat < grid.size or not grid.exists[flat]:
+        raise AntsError(
+            f"the cell {cell} is outside the world; choose a cell within the ranges {grid.ranges}."
+        )
+    return flat
+
+
 def indices(grid: AxialGrid, cells: Sequence[Any]) -> np.ndarray:
     """Return the flat indices of cells or of flat indices, without duplicates.
 
     AntsError if a cell does not exist.
     """
-    found: list[int] = []
-    for cell in cells:
-        flat = int(cell if np.ndim(cell) == 0 else grid.index(cell))
-        if not 0 <= flat < grid.size or not grid.exists[flat]:
-            raise AntsError(
-                f"the cell {cell} is outside the world; choose a cell within the ranges "
-                f"{grid.ranges}."
-            )
-        found.append(flat)
-    return np.array(list(dict.fromkeys(found)), np.int64)
+    return np.array(list(dict.fromkeys(flat_index(grid, cell) for cell in cells)), np.int64)
 
 
 def _checked_cells(path: str, cells: Sequence) -> tuple:

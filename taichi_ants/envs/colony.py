@@ -183,7 +183,7 @@ class ColonyWorlds(Ants):
         from taichi_ants.rendering import Scene, Status
 
         if self._scene is None:
-            self._scene = Scene(self.colony.grid)
+            self._scene = Scene(self.colony.grid, task=self.colony.task)
         snapshot = self.colony.snapshot(world)
         lines = {
             "step": self.colony.episode_ticks[world],

@@ -1,25 +1,23 @@
 """Edits: the interventions that pages send, and the numbers that their sliders change.
 
 An edit is JSON, a mapping from the name of an intervention to its settings or its short form, see
-`taichi_ants.interventions`. Its cells are flat indices. Pages may send the interventions of
-`ALLOWED`; "episode" ends the episode and begins the next one.
+`taichi_ants.interventions`. In the log of a session, its cells are flat indices. "policy" is not
+allowed, because a page must not name files. "episode" ends the episode and begins the next one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.errors import AntsError
 from taichi_ants.interventions import Intervention
 from taichi_ants.task import Pheromone
 
 Edit = dict[str, Any]
-# All but "policy", because a page must not name files.
-ALLOWED = tuple(name for name in language.INTERVENTIONS if name != "policy")
 
 
 class Value(NamedTuple):
@@ -93,42 +91,27 @@ def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pherom
 
 
 def checked(edit: object, interventions: Interventions) -> Intervention:
-    """Return the intervention of an edit; the world may still not allow it.
+    """Return the intervention of an edit, its cells as flat indices; the world may still refuse it.
 
     Raises:
         AntsError: The edit is not valid; the message says why.
     """
-    expect("an edit", edit, Mapping)
-    assert isinstance(edit, Mapping)
-    if len(edit) != 1:
+    if isinstance(edit, Mapping) and "policy" in edit:
         raise AntsError(
-            f"an edit has the names {shown(list(edit))}; it must have the name of one intervention."
+            "a session cannot change the policy of its ants; begin a session with the other "
+            "policy, or use a Colony."
         )
-    ((name, settings),) = edit.items()
-    check_one_of("the name of an edit", name, ALLOWED)
-    if isinstance(settings, list) and issubclass(language.INTERVENTIONS[name], language.OfCells):
-        settings = {"cells": settings}
-    if isinstance(settings, Mapping) and settings.get("cells") is not None:
-        _check_cells(settings["cells"], interventions)
-    one = language.from_dict({name: settings})
-    if one.facts().get("place", {}).get("what") == "queen":
-        (cell,) = settings["cells"]
-        if not interventions.is_empty(cell):
-            where = tuple(interventions.colony.grid.cells(cell).tolist())
-            raise AntsError(
-                f"the queen cannot move to cell {where}, because it is not empty; choose an empty "
-                "cell."
-            )
+    one, colony = language.from_dict(edit), interventions.colony
+    if (cells := getattr(one, "cells", None)) is None:
+        return one
+    if isinstance(cells, str):
+        flat = colony.worlds[0].region(cells).tolist()
+    else:
+        flat = [language.flat_index(colony.grid, cell) for cell in cells]
+    one = replace(cast(language.Clear, one), cells=flat)  # or another one with cells
+    if one.facts().get("place", {}).get("what") == "queen" and not interventions.is_empty(flat[0]):
+        where = tuple(colony.grid.cells(flat[0]).tolist())
+        raise AntsError(
+            f"the queen cannot move to cell {where}, because it is not empty; choose an empty cell."
+        )
     return one
-
-
-def _check_cells(cells: Any, interventions: Interventions) -> None:
-    """Raise AntsError unless these are flat indices of cells of the world, in a list."""
-    most, exists = interventions.colony.grid.count, interventions.colony.grid.exists
-    if not isinstance(cells, list) or not 1 <= len(cells) <= most:
-        raise AntsError(f"cells is {shown(cells)}; it must be a list of 1 to {most} cells.")
-    for cell in cells:
-        if type(cell) is not int or not 0 <= cell < len(exists) or not exists[cell]:
-            raise AntsError(
-                f"cells holds {shown(cell)}; each must be the flat index of a cell of this world."
-            )

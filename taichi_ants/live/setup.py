@@ -16,6 +16,7 @@ from taichi_ants.checks import (
     checked_share,
     checked_table,
     refuse_castes,
+    refuse_foods,
 )
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, listing, shown
@@ -74,6 +75,7 @@ class Setup:
         check_own_rules(self.task, "the live page")
         check_one_of("pheromone", self.pheromone, (TRAIL, *self.task.fields))
         refuse_castes(self.task, "the live page")
+        refuse_foods(self.task, "the live page")
         if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "independent"))
             learners.get(self.policy.learner)
@@ -141,7 +143,12 @@ class Setup:
         else:
             training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
             options |= {"sharing": "frozen", "q_values": self.policy}
-        return Colony(self.build_world(), self.task, training, self.seed, **options)
+        if (world := self.build_world()).n_food_kinds > 1:
+            raise AntsError(
+                f"the world has {world.n_food_kinds} kinds of food, but the live page supports "
+                "only one; draw all food as F, or use a Colony."
+            )
+        return Colony(world, self.task, training, self.seed, **options)
 
     def to_json(self) -> dict[str, Any]:
         """Return the setup, JSON-compatible; a table of action values becomes the word "table"."""

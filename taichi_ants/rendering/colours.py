@@ -61,7 +61,7 @@ def field_ramp(number: int) -> np.ndarray:
 # The colours of the queens and ants of nests, and of kinds of food, by number, which repeat.
 _QUEENS = (CELL_QUEEN, 0xC1121F, 0x7A4A00, 0xE0559A, 0x2B4BFF, 0x6B7A00, 0x3A3A3A)
 _ANTS = (ANT, 0x7A0F18, 0x4D2F00, 0x8F2C5C, 0x1A2A8F, 0x444D00, 0x5A5A5A)
-_FOODS = (CELL_FOOD, 0xE07FB4, 0x8C1C13, 0xB8960B, 0x5C4033, 0x5E8C31, 0x3D5A80, 0x000000)
+_FOODS = (CELL_FOOD, 0x8C1C13, 0x5E8C31, 0xF2D53C, 0x5C4033, 0x3D5A80, 0x000000, 0xE9A6A6)
 QUEENS, ANTS, FOODS = (np.array(each, np.uint32) for each in (_QUEENS, _ANTS, _FOODS))
 
 

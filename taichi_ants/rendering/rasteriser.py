@@ -90,6 +90,16 @@ def cell(letter: str, centre: npt.ArrayLike, hexagon: float) -> np.ndarray:
     return table if stands is None else np.concatenate([table, thing(centre, hexagon, stands)])
 
 
+def numbered(centre: npt.ArrayLike, hexagon: float, mark: Mark, number: int) -> list[np.ndarray]:
+    """Return marks of a cell with a queen or food of this number of nest or kind."""
+    floor, several = (colours.FLOOR_QUEEN, colours.QUEENS)
+    if mark == Mark.FOOD:
+        floor, several = (colours.FLOOR_FOOD, colours.FOODS)
+    n = number % len(several)
+    cell = marks(centre, hexagon, Mark.HEXAGON, int(colours.floors(several, floor)[n]))
+    return [cell, thing(centre, hexagon, mark, several[[n]])]
+
+
 def ants(
     places: npt.ArrayLike,
     headings: npt.ArrayLike,

@@ -12,7 +12,8 @@ from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, s
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
+from taichi_ants.rendering.colours import Mark
+from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks, numbered
 from taichi_ants.task import Observation, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.field import COMPASS, TRAIL
@@ -94,8 +95,8 @@ class Scene:
         overlay: Draw the panel and the marks; False draws the world alone.
         view: Leave space for cells in view outside the border of the world.
         strongest: The trail level, 1 or more, at and above which trails have the darkest colour.
-        task: The task of the ants, from which the legend takes cues, and fields their strongest
-            levels; it replaces `strongest`.
+        task: The task of the ants, from which the legend takes cues and the names of kinds of
+            food, and fields their strongest levels; it replaces `strongest`.
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
@@ -116,6 +117,7 @@ class Scene:
         expect("task", task, Task, type(None))
         strongest = task.pheromone.darkest if task else strongest
         of_fields = {name: one.darkest for name, one in task.fields.items()} if task else {}
+        self._foods = list(task.foods) if task else []
         width, height = check_size(size)
         expect("title", title, str)
         view = checked_flag("view", view)
@@ -167,23 +169,34 @@ class Scene:
     def _draw_more_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
         """Draw an entry for each further field, nest and kind of food above the legend."""
         left, _, _, size = self._status_place
+        radius = 0.82 * size
+        kinds = 1 if snapshot.world is None else snapshot.world.n_food_kinds
+        foods = self._foods or [f"of kind {n}" for n in range(kinds)]
         entries = [
-            (f"field {name}", int(colours.field_ramp(number)[-1]))
-            for number, name in enumerate(snapshot.further_fields)
+            (word, mark, number, name)
+            for word, mark, least, names in (
+                ("field", Mark.HEXAGON, 1, list(snapshot.further_fields)),
+                ("nest", Mark.QUEEN, 2, range(len(snapshot.queens))),
+                ("food", Mark.FOOD, 2, foods),
+            )
+            for number, name in enumerate(names if len(names) >= least else ())
         ]
-        kinds = 0 if snapshot.world is None else int(snapshot.world.food_kinds.max(initial=0))
-        for word, number, several in (
-            ("nest", len(snapshot.queens), colours.QUEENS),
-            ("food of kind", kinds + 1, colours.FOODS),
-        ):
-            numbers = range(number if number > 1 else 0)
-            entries += [(f"{word} {n}", int(several[n % len(several)])) for n in numbers]
-        for row, (label, colour) in enumerate(entries):
+        for row, (word, mark, number, name) in enumerate(entries):
             y = self._legend_top - (len(entries) - row) * round(1.55 * size)
-            centre = left + 0.85 * size, y + 0.75 * size
-            draw_marks(frame, marks(centre, 0.82 * size, colours.Mark.HEXAGON, colour))
-            baseline = round(y + 1.11 * size)
-            text.write(frame, label, left + round(2.1 * size), baseline, size)
+            x, middle, end = left + 0.85 * size, y + 0.75 * size, left + round(2.1 * size)
+            if mark == Mark.HEXAGON:
+                strongest = int(colours.field_ramp(number)[-1])
+                tables = [marks((x, middle), radius, mark, strongest)]
+            else:
+                tables = numbered((x, middle), radius, mark, number)
+            if mark == Mark.QUEEN:
+                ant = colours.ANTS[[number % len(colours.ANTS)]]
+                place = x + 1.7 * size, middle
+                look = np.array([False]), self._rasteriser.hexagon, 0.83 * radius
+                tables.append(ants(place, 1, *look, colour=ant))
+                end += round(1.7 * size)
+            draw_marks(frame, *tables)
+            text.write(frame, f"{word} {name}", end, round(y + 1.11 * size), size)
 
     def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
         """Draw the world, with outlines and letters on the cells that ant number 0 sees."""

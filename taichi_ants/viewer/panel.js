@@ -217,21 +217,25 @@ class Panel {
   showLegend() {
     const cell = (fill, more = "") =>
       `<svg viewBox="-1.1 -1 2.2 2" aria-hidden="true"><path d="${HEXAGON}" fill="${fill}"/>${more}</svg>`;
-    const drawing = (name, outline) => `<path transform="scale(.72)" fill="var(--${name})" d="${outline}"/>`;
+    const drawing = (colour, outline) => `<path transform="scale(.72)" fill="${colour}" d="${outline}"/>`;
     const samples = [0, 64, 128, 192, 255].map((i) => `rgb(${this.stage.ramp[i].join(" ")})`);
     const bodies = [false, true].map((loaded) => `<svg viewBox="-1 -1 2 2" aria-hidden="true">${antShape(loaded)}</svg>`);
+    const nests = Array.from({ length: this.history.header.nests > 1 ? this.history.header.nests : 0 }, (_, n) => {
+      const [queen, ant] = ["queen", "ant"].map((name) => this.stage.colours[ofNest(name, n)]);
+      return `${cell("var(--queen-floor)", drawing(queen, CROWN))}<svg viewBox="-1 -1 2 2" aria-hidden="true">${antShape(false, ant)}</svg>nest ${n}`;
+    });
     byId("legend").innerHTML = [
-      `${bodies[0]}ant`, `${bodies[1]}ant with food`, `${cell("var(--food-floor)", drawing("food", CRUMBS))}food`,
-      `${cell("var(--queen-floor)", drawing("queen", CROWN))}queen`, `${cell("var(--rock)")}rock`,
-      `<span class="ramp"></span>${safe(this.history.header.pheromone)}`,
+      `${bodies[0]}ant`, `${bodies[1]}ant with food`, `${cell("var(--food-floor)", drawing("var(--food)", CRUMBS))}food`,
+      `${cell("var(--queen-floor)", drawing("var(--queen)", CROWN))}queen`, `${cell("var(--rock)")}rock`,
+      `<span class="ramp"></span>${safe(this.history.header.pheromone)}`, ...nests,
     ].map((item) => `<li>${item}</li>`).join("");
     document.querySelector(".ramp").style.background = `linear-gradient(to right,${samples.join()})`;
   }
 }
 
 /* An ant with heading up, as part of an SVG. */
-function antShape(loaded) {
-  const half = `<path d="${LIMBS}" fill="none" stroke="var(--ant)" stroke-width=".07" stroke-linecap="round"/>`;
+function antShape(loaded, colour = "var(--ant)") {
+  const half = `<path d="${LIMBS}" fill="none" stroke="${colour}" stroke-width=".07" stroke-linecap="round"/>`;
   const crumb = loaded ? '<circle cy="-.7" r=".25" fill="var(--food)"/>' : "";
-  return `${half}<g transform="scale(-1 1)">${half}</g><path d="${BODY}" fill="var(--ant)"/>${crumb}`;
+  return `${half}<g transform="scale(-1 1)">${half}</g><path d="${BODY}" fill="${colour}"/>${crumb}`;
 }

@@ -145,6 +145,7 @@ class Recorder:
             "types": self.types,
             "strongest": self._rule.darkest,
             "pheromone": self.pheromone,
+            "nests": colony.n_nests,
             "n_states": self._n_states,
             "names": self.names(),
             "view": list(task.sees.cells),

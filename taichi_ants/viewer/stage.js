@@ -450,9 +450,9 @@ const CRUMBS = disc(0, -0.36, 0.36) + disc(0.4, 0.3, 0.36) + disc(-0.4, 0.3, 0.3
 const CROWN = "M-.8-.28-.32-.02 0-.5.32-.02.8-.28.6.6h-1.2z"
   + disc(0, -0.6, 0.12) + disc(0.84, -0.38, 0.12) + disc(-0.84, -0.38, 0.12);
 
-/* The name of a colour of a nest. */
+/* The name of a colour of a nest; the seven colours repeat, as in pictures. */
 function ofNest(name, nest) {
-  return nest > 0 ? `${name} ${nest}` : name;
+  return nest % 7 > 0 ? `${name} ${nest % 7}` : name;
 }
 
 function circle(x, y, radius) {

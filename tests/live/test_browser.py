@@ -248,6 +248,7 @@ def test_several_nests_are_shown_and_the_nearest_queen_moves(browser, shared):
         assert queens == colony.snapshot().queens.tolist()
         nests = page.read("[...viewer.history.frames.at(-1).poses].map((pose) => pose >> 4)")
         assert sorted(nests) == sorted(colony.nests[0, colony.living[0]].tolist())
+        assert page.text("#legend").endswith("trail nest 0 nest 1")
         far = colony.grid.distances((6, 0, 3))
         free = [c for c in np.flatnonzero(far == 1) if shared.session.interventions.is_empty(c)]
         page.press("7")

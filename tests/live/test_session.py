@@ -25,6 +25,7 @@ from taichi_ants import (
     Task,
     TrainingConfig,
     World,
+    interventions,
     load_policy,
 )
 from taichi_ants import task as tasks
@@ -50,6 +51,13 @@ HOMING = tasks.foraging().but(
 )
 TWO_NESTS = text_map.to_text(
     World((7, 7, 7), [(0, 6, 0), (6, 0, 3)], [(0, 0, 5), (1, 0, 5), (5, 5, 0)], [(0, 3, 0)])
+)
+GATE = [(3, 0, 0), (3, 1, 0)]  # a rock and an empty cell
+FOODS = [(2, 0, 0), (0, 3, 0)]
+GATED = Setup(
+    text_map.to_text(World((5, 5, 5), (0, 0, 0), FOODS, GATE[:1], regions={"gate": GATE})),
+    *(tasks.foraging(), LEARNS),
+    ants=2,
 )
 SETUPS = {
     "foraging": Setup("open", tasks.foraging(), LEARNS, 20, 40, 3, 25, world_settings=SMALL),
@@ -338,38 +346,41 @@ def test_what_a_hand_has_put_stays_and_what_is_of_an_episode_goes():
 
 
 WRONG = [
-    (None, "an edit is None"),
-    ([], "an edit is"),
-    ({}, "must have the name of one intervention"),
-    ({"explode": {}}, "name of an edit is 'explode'"),
-    ({"policy": "random"}, "name of an edit is 'policy'"),
+    (None, "an intervention is None"),
+    ([], "an intervention is []"),
+    ({}, "with the name of one intervention"),
+    ({"explode": {}}, "name of an intervention is 'explode'"),
+    ({"policy": "random"}, "cannot change the policy"),
     ({"place": {}}, "`place.what` is missing"),
     ({"episode": {"now": 1}}, "`episode.now` is not a setting"),
-    ({"episode": {}, "ants": 1}, "must have the name of one intervention"),
-    ({"remove_ants": [0]}, "cells holds 0"),
-    ({"clear": {"cells": [[1, 2, 0]]}}, "cells holds [1, 2, 0]"),
+    ({"episode": {}, "ants": 1}, "with the name of one intervention"),
+    ({"remove_ants": [0]}, "the cell 0 is outside the world"),
+    ({"clear": {"cells": [[1, 2]]}}, "has the cell [1, 2]"),
+    ({"clear": [[10**9, 0, 0]]}, "the cell (1000000000, 0, 0) is outside the world"),
+    ({"clear": "gate"}, "there is no region 'gate'"),
+    ({"place": {"what": "queen", "cells": [60, 61]}}, "a single cell for the queen"),
     ({"task": {"observation": "paper"}}, "cannot change its observation"),
     ({"place": {"what": "lava", "cells": [60]}}, "what` is 'lava'"),
     ({"place": {"what": 5, "cells": [60]}}, "what` is 5"),
-    ({"place": {"what": "rock", "cells": []}}, "cells is []"),
-    ({"place": {"what": "rock", "cells": "60"}}, "cells is '60'"),
-    ({"place": {"what": "rock", "cells": {"60": 1}}}, "cells is"),
-    ({"place": {"what": "rock", "cells": [60] * 10**6}}, "a list of 1 to"),
-    ({"place": {"what": "rock", "cells": [60, True]}}, "cells holds True"),
-    ({"place": {"what": "rock", "cells": [60.0]}}, "cells holds 60.0"),
-    ({"place": {"what": "rock", "cells": [math.nan]}}, "cells holds nan"),
-    ({"place": {"what": "rock", "cells": [-1]}}, "cells holds -1"),
-    ({"place": {"what": "rock", "cells": [0]}}, "cells holds 0"),  # of the border
-    ({"place": {"what": "rock", "cells": [10**30]}}, "cells holds 10000"),
-    ({"place": {"what": "rock", "cells": "all"}}, "cells is 'all'"),
+    ({"place": {"what": "rock", "cells": []}}, "cells` is empty"),
+    ({"place": {"what": "rock", "cells": "60"}}, "no region '60'"),
+    ({"place": {"what": "rock", "cells": {"60": 1}}}, "cells` is"),
+    ({"place": {"what": "rock", "cells": [60] * 10**6}}, "at most 10000 edits of"),
+    ({"place": {"what": "rock", "cells": [60, True]}}, "cells` is True"),
+    ({"place": {"what": "rock", "cells": [60.0]}}, "cells` is 60.0"),
+    ({"place": {"what": "rock", "cells": [math.nan]}}, "cells` is nan"),
+    ({"place": {"what": "rock", "cells": [-1]}}, "the cell -1 is"),
+    ({"place": {"what": "rock", "cells": [0]}}, "the cell 0 is"),  # of the border
+    ({"place": {"what": "rock", "cells": [10**30]}}, "the cell 10000"),
+    ({"place": {"what": "rock", "cells": "all"}}, "no region 'all'"),
     ({"trail": {"level": -1, "cells": [60]}}, "level` is -1"),
     ({"trail": {"level": True, "cells": [60]}}, "level` is True"),
     ({"trail": {"level": 1.5, "cells": [60]}}, "level` is 1.5"),
     ({"trail": {"level": 10**7, "cells": [60]}}, "level` is 10000000"),
     ({"add_ants": {"cells": [60], "heading": 6}}, "heading` is 6"),
     ({"add_ants": {"cells": [60], "heading": "up"}}, "heading` is 'up'"),
-    ({"place": {"what": "queen", "cells": [None]}}, "cells holds None"),
-    ({"place": {"what": "queen", "cells": [[60]]}}, "cells holds"),
+    ({"place": {"what": "queen", "cells": [None]}}, "cells` is None"),
+    ({"place": {"what": "queen", "cells": [[60]]}}, "has the cell [60]"),
     ({"gravity": 1}, "'gravity'"),
     ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),  # trails fall by 1
     ({"epsilon": [1]}, "`epsilon.value` is [1]"),
@@ -398,6 +409,37 @@ def refused(session: Session, edit: object) -> str:
     assert "\n" not in text
     assert len(text) < 300
     return text
+
+
+@pytest.mark.parametrize("edit", [
+    *({"clear": "gate"}, {"clear": {"cells": "gate"}}, {"move": [[2, 0, 0], [1, 0, 0]]}),
+    {"trail": 5},
+    *({"trail": {"level": 7, "cells": "gate"}}, {"place": {"what": "food", "cells": "gate"}}),
+    *({"add_ants": "gate"}, {"add_ants": [[3, 1, 2], [1, 0, 0]]}, {"remove_ants": 0.5}),
+    *({"add_ants": 2}, {"clear": [[2, 0, 0], [2, 0, 0]]}, {"ants": np.int64(3)}),
+    *({"place": {"what": "queen", "cells": [[1, 0, 0]]}}, {"task": {"pheromone": {"level": 3}}}),
+])  # fmt: skip
+def test_sessions_replay_each_form_of_an_intervention(edit, tmp_path):
+    """Docs/protocol.md describes them; the colony is that to which the intervention applies."""
+    session = Session(GATED)
+    session.advance(5)
+    twin = Session(GATED)
+    twin.advance(5)
+    before = twin.interventions.state()
+    interventions.from_dict(edit).apply(twin.interventions)
+    session.apply(edit)
+    assert session.interventions.state() == twin.interventions.state() != before
+    session.save(tmp_path / "session.npz")
+    assert Session.load(tmp_path / "session.npz").same(session)
+
+
+def test_files_with_the_names_of_regions_are_replayed():
+    """Earlier versions saved them, and refused to load them."""
+    session = Session(GATED)
+    session.apply({"clear": "gate"})
+    named = replace(session.log(), edits=((0, {"clear": {"cells": "gate"}}),))
+    *_, again = Session.replay(named)
+    assert again.same(session)
 
 
 def test_wrong_edits_change_nothing():
@@ -559,6 +601,11 @@ def test_a_policy_of_several_nests_is_exported_if_they_share_it(tmp_path):
     follows = Session(replace(two, policy=table))
     (tmp_path / "policy.npz").write_bytes(follows.policy_bytes())
     assert np.array_equal(load_policy(tmp_path / "policy.npz").q_values, table)
+
+
+def test_worlds_with_kinds_of_food_are_refused_with_what_to_do():
+    with pytest.raises(AntsError, match=r"2 kinds of food, but .* draw all food as F"):
+        Session(replace(SETUPS["nests"], world="Q   G   F\n"))
 
 
 def test_the_queen_of_any_nest_moves():

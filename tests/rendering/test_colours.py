@@ -105,6 +105,16 @@ def test_nests_and_kinds_of_food_stay_apart(several) -> None:
         assert np.linalg.norm(apart) > 12, deficiency
 
 
+def test_fields_and_kinds_of_food_stay_apart() -> None:
+    """All of them, and for people with colour deficiencies the first field and two kinds."""
+    fields = [int(colours.field_ramp(number)[-1]) for number in range(4)]
+    for field, food in itertools.product(fields, colours.FOODS.tolist()):
+        assert np.linalg.norm(lab(field) - lab(food)) > 20, (hex(field), hex(food))
+    for deficiency in DEFICIENCIES:
+        for food in colours.FOODS[:2].tolist():
+            assert np.linalg.norm(lab(fields[0], deficiency) - lab(food, deficiency)) > 20
+
+
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)
 def test_lines_of_the_figures_stay_apart(deficiency) -> None:
     """Of the comparison and of the colony; with more lines, markers tell them apart, too."""

@@ -14,9 +14,9 @@ from PIL import Image
 
 from taichi_ants import runtime
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering import Scene, Snapshot, at_start, colours, rasteriser
+from taichi_ants.rendering import Scene, Snapshot, at_start, colours, rasteriser, text
 from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.task import Field, Task
+from taichi_ants.task import Field, Food, Task
 from taichi_ants.worlds import World, paper
 
 GOLDEN = Path(__file__).parent / "golden" / "world.png"
@@ -243,6 +243,23 @@ def test_nests_and_kinds_of_food_have_colours(hexagon) -> None:
         assert colour == colours.CELL_FOOD or not (frame == colours.channels(colour)).all(2).any()
     plain = scene.draw(start)
     assert not (plain == colours.channels(colours.ANTS[1])).all(axis=2).any()
+
+
+def test_the_legend_shows_queens_ants_and_foods_in_their_colours(monkeypatch) -> None:
+    """And the names of the foods, if the scene has the task."""
+    foods = [((0, 3, 0), 0), ((0, 0, 3), 1)]
+    start = at_start(World((6, 6, 6), queen=[(0, 0, 0), (3, 0, 0)], foods=foods))
+    task = Task(foods={"seed": Food(), "sap": Food()}, delivery="truncates")
+    written, write = [], text.write
+    monkeypatch.setattr(text, "write", lambda *a, **k: (written.append(a[1]), write(*a, **k)))
+    for known, names in ((task, ("seed", "sap")), (None, ("of kind 0", "of kind 1"))):
+        frame = Scene(start.grid, (1280, 720), task=known).draw(start)[:, 960:]
+        assert {"nest 0", "nest 1", *(f"food {name}" for name in names)} <= set(written)
+        assert ("food of kind 0" in written) == (known is None)
+        for several in (colours.QUEENS, colours.ANTS, colours.FOODS):
+            for colour in several[:2]:
+                assert (frame == colours.channels(colour)).all(axis=2).any(), hex(colour)
+        written.clear()
 
 
 def test_ants_that_are_dots_have_the_colour_of_their_food() -> None:

@@ -16,6 +16,7 @@ from taichi_ants import AntsError, Colony, TrainingConfig, World, rollout, task,
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import Episode, colours
+from taichi_ants.task import Caste, Food, Task
 from taichi_ants.viewer import page, record_colony, record_episode, save_page
 from taichi_ants.viewer.page import part
 
@@ -124,6 +125,14 @@ def test_notebooks_show_worlds_traces_and_colonies(monkeypatch):
     assert "<iframe " in html_of(colony)
     assert colony.ticks == 0
     assert "<iframe " in html_of(record_colony(colony, ticks=2))
+    of_castes = Task(castes={"a": Caste()})
+    of_foods = Task(foods={"seed": Food(), "sap": Food()}, delivery="truncates")
+    for several in (of_castes, of_foods):  # pages do not show these
+        begun = Colony(worlds.paper(), several, config, ants=3)
+        begun.begin_episode()
+        alternative, source = re.findall(r'"([^"]*)"', html_of(begun))
+        assert html.unescape(alternative) == repr(begun)
+        assert source.startswith("data:image/png;base64,")
     for world in (worlds.paper(), World((3, 4, 1), (0, 0, 0))):
         alternative, source = re.findall(r'"([^"]*)"', html_of(world))
         assert html.unescape(alternative) == repr(world)
