@@ -107,6 +107,25 @@ def check_castes(task: Task, sharing: str, is_given_actions: bool) -> None:
         )
 
 
+def check_learns(learns: bool) -> None:
+    """Raise AntsError unless ants learn, so that they have a learning rate."""
+    if not learns:
+        raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
+
+
+def check_follows(learns: bool, task: Task) -> None:
+    """Raise AntsError unless ants follow a policy and do not learn."""
+    if learns:
+        raise AntsError(
+            "the ants of this colony do not follow a policy; make a colony with "
+            'sharing="frozen" and q_values.'
+        )
+    if not task.choice.needs_table:
+        raise AntsError(
+            f"the ants choose by the rule {task.choice.rule!r}, which has no policy; leave it out."
+        )
+
+
 def check_nests_of_castes(task: Task, n_nests: int) -> None:
     """Raise AntsError if a caste belongs to a nest that worlds with so many nests do not have."""
     for name, caste in task.castes.items():

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
+from taichi_ants.checks import check_follows, check_learns
 from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
 from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
@@ -110,8 +111,11 @@ class Intervention(Record):
         """Return the name and the settings, JSON-compatible; see `from_dict`."""
         return {self.path: self.as_dict()}
 
-    def check_in(self, world: World, task: Task) -> None:
-        """Raise an AntsError if the change is impossible in worlds like this one."""
+    def check_in(self, world: World, task: Task, learns: bool) -> None:
+        """Raise an AntsError if the change is impossible in worlds like this one, with this task.
+
+        `learns` says whether ants learn, instead of following a policy.
+        """
         cells = getattr(self, "cells", None) or ()
         if isinstance(cells, str):
             world.region(cells)
@@ -239,8 +243,8 @@ class Place(OfCells, path="place"):
                     f"`place.{name}` is for what = {of!r}, not {self.what!r}; leave it out."
                 )
 
-    def check_in(self, world: World, task: Task) -> None:
-        super().check_in(world, task)
+    def check_in(self, world: World, task: Task, learns: bool) -> None:
+        super().check_in(world, task, learns)
         if self.kind is not None:
             check_one_of("place.kind", self.kind, tuple(task.foods))
 
@@ -249,7 +253,7 @@ class Place(OfCells, path="place"):
         if self.what == "queen":
             to.move_queen(int(cells[0]), self.nest or 0)
         else:
-            self.check_in(to.colony.worlds[0], to.colony.task)
+            self.check_in(to.colony.worlds[0], to.colony.task, to.colony.learns)
             kind = list(to.colony.task.foods).index(self.kind) if self.kind else 0
             to.put(cells, _GROUNDS[self.what], kind)
 
@@ -292,6 +296,8 @@ class Clear(OfCells, path="clear"):
 class Trail(OfCells, path="trail"):
     """Set the trail, or a further field, of cells without rock; level 0 clears it."""
 
+    form = "a level, which is a whole number, or a table of settings"
+
     level: Annotated[int, Is("trail level", least=0, most=MAX_DEPOSIT)]
     cells: Annotated[Sequence | None, _CELLS.but(Is("cells, or a region; all if left out"))] = None
     field: Annotated[str, Is("name of the field")] = TRAIL
@@ -300,12 +306,12 @@ class Trail(OfCells, path="trail"):
     def short(cls, value: Any) -> dict[str, Any] | None:
         return {"level": value} if isinstance(value, (int, np.integer)) else None
 
-    def check_in(self, world: World, task: Task) -> None:
-        super().check_in(world, task)
+    def check_in(self, world: World, task: Task, learns: bool) -> None:
+        super().check_in(world, task, learns)
         check_one_of("trail.field", self.field, (TRAIL, *task.fields))
 
     def apply(self, to: Interventions) -> None:
-        self.check_in(to.colony.worlds[0], to.colony.task)
+        self.check_in(to.colony.worlds[0], to.colony.task, to.colony.learns)
         cells = to.everywhere() if self.cells is None else to.index(self.cells)
         to.lay_trail(cells, self.level, self.field)
 
@@ -313,6 +319,8 @@ class Trail(OfCells, path="trail"):
 @dataclass(frozen=True)
 class Ants(Intervention, path="ants"):
     """Set the number of living ants; ants with the highest numbers are removed first."""
+
+    form = "a whole number of ants, or a table of settings"
 
     number: Annotated[int, Is("number of ants", least=1, most=_MOST)]
 
@@ -373,7 +381,7 @@ class TaskNumbers(Intervention, path="task"):
                 raise AntsError(f"`task.{name}` {not_a_setting(of, known, f'task.{group}')}")
         return task.but(**nested(dict(self.values)))
 
-    def check_in(self, world: World, task: Task) -> None:
+    def check_in(self, world: World, task: Task, learns: bool) -> None:
         self.changed(task)
 
     def apply(self, to: Interventions) -> None:
@@ -406,6 +414,9 @@ class LearningRate(_Rate, path="learning_rate"):
 
     value: Annotated[Share, Is("learning rate")]
 
+    def check_in(self, world: World, task: Task, learns: bool) -> None:
+        check_learns(learns)
+
     def apply(self, to: Interventions) -> None:
         to.set_learning_rate(self.value)
 
@@ -416,6 +427,8 @@ class Policy(Intervention, path="policy"):
 
     In Python, a table of action values or anything with `q_values` is a short form.
     """
+
+    form = "a policy file, the name of a hand-written policy, or a table of settings"
 
     source: Annotated[str, Is("policy file, or the name of a hand-written policy")]
     table: np.ndarray | None = field(default=None, compare=False, repr=False)
@@ -452,7 +465,8 @@ class Policy(Intervention, path="policy"):
         table = NAMED[self.source](task.observation) if self.table is None else self.table
         return checked_values(table, task)
 
-    def check_in(self, world: World, task: Task) -> None:
+    def check_in(self, world: World, task: Task, learns: bool) -> None:
+        check_follows(learns, task)
         self.table_for(task)
 
     def apply(self, to: Interventions) -> None:

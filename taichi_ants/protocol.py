@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 from typing import Annotated, Any
 
 from taichi_ants import measures
-from taichi_ants.errors import AntsError, entries_of, shown
+from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.interventions import (
     AddAnts,
     Ants,
@@ -31,6 +31,7 @@ from taichi_ants.interventions import (
     Trail,
 )
 from taichi_ants.settings import Is
+from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
 
 Tick = Annotated[int, Is(unit="ticks of the episode", least=0, most=MAX_STEPS)]
@@ -185,6 +186,23 @@ def checked_protocol(protocol: Any) -> tuple[Event, ...]:
     if events is None or not all(isinstance(one, Event) for one in events):
         raise AntsError(f"protocol is {shown(protocol)}; it must be a list of At, Every and When.")
     return tuple(events)
+
+
+def check_room(event: Event, of: Sequence[Event], task: Task, ants: int, capacity: int) -> None:
+    """Raise AntsError if an event adds more ants than can ever have room in a colony.
+
+    `ants` start in each world. If ants can die, or an event in `of` can remove some, there may be
+    room later.
+    """
+    lifespans = (task.life.lifespan, *(caste.lifespan for caste in task.castes.values()))
+    if any(lifespans) or any(one.remove_ants or one.ants for one in of):
+        return
+    number = event.add_ants and event.add_ants.number
+    if number and ants + number > capacity:
+        raise AntsError(
+            f"`add_ants.number` is {number}, but the {count(ants, 'ant')} at the start leave room "
+            f"for {capacity - ants}, because the capacity is {capacity}; set a larger capacity."
+        )
 
 
 def read(tables: Mapping[str, Sequence[Any]]) -> tuple[Event, ...]:

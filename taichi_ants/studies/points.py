@@ -18,7 +18,7 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder, stops
-from taichi_ants.protocol import Event, When, checked_protocol
+from taichi_ants.protocol import Event, When, check_room, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.task import Task
@@ -238,16 +238,29 @@ class ColonyPoint:
         checked_whole("rollouts", self.rollouts)
         object.__setattr__(self, "protocol", checked_protocol(self.protocol))
         check_one_of("during", self.during, DURING)
-        world = self.world[0] if isinstance(self.world, tuple) else self.world
-        for event in self.protocol:
-            event.times(self.ticks)
-            for one in event.interventions:
-                one.check_in(world, self.task)
+        self._check_protocol()
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
             raise AntsError(
                 "`after` has no shared table; it must be a point with sharing='shared' and at "
                 "least one episode."
             )
+
+    def _check_protocol(self) -> None:
+        """Raise an AntsError, which names the event, if it can never happen as it should."""
+        world = self.world[0] if isinstance(self.world, tuple) else self.world
+        capacity = self.capacity or self.ants
+        for learns in (True, False) if self.episodes else (False,):
+            for event in self.events(learns):
+                number = [one for one in self.protocol if one.path == event.path].index(event) + 1
+                try:
+                    event.times(self.ticks)
+                    check_room(event, self.events(learns), self.task, self.ants, capacity)
+                    for one in event.interventions:
+                        one.check_in(world, self.task, learns)
+                except AntsError as error:
+                    raise AntsError(
+                        f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
+                    ) from error
 
     alike = property(lambda self: self)  # each point has its own blocks
 

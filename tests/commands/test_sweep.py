@@ -527,6 +527,15 @@ WRONG_EVENTS = {
     "cell": ("trail = 0", "clear = [[9, 0]]", ["`clear.cells` has the cell [9, 0]"]),
     "no cells": ("trail = 0", 'place.what = "rock"', ["`place.cells` is missing; add it"]),
     "measure": ('"living"', '"height"', ["in [[when]] number 1", "'height'"]),
+    "learning rate": (
+        *("trail = 0", "learning_rate = 0.1"),
+        ["in [[at]] number 1, in the evaluation, the ants do not learn, so they have no"],
+    ),
+    "policy": (
+        *("trail = 0", 'policy = "random"'),
+        ["in [[at]] number 1, in the training, the ants of this colony do not follow a policy"],
+    ),
+    "region": ("trail = 0", 'clear = "gate"', ["in [[at]] number 1", "no region 'gate'"]),
     "during": ('"both"', '"day"', ["during is 'day'; it must be one of evaluation, training"]),
     "one table": ("[[every]]", "[every]", ["write [[every]] in double brackets"]),
     "number": ("at.1.remove", "at.2.remove", ["in [[at]] number 2, `at.tick` is missing"]),

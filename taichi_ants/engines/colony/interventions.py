@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants import files
+from taichi_ants.checks import check_follows, check_learns
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import (
     ANT_STANDS,
@@ -269,31 +270,17 @@ class Interventions:
         """Set the learning rate, which no longer decays; AntsError if no ant learns."""
         self._check_all("the learning rate")
         colony = self.colony
-        if not colony.learns:
-            raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
+        check_learns(colony.learns)
         colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
         colony.set_learning_rate(learning_rate)
 
     def set_policy(self, q_values: np.ndarray) -> None:
-        """Set the table (n_states, 5) that ants follow; see `check_follow`."""
-        self.check_follow()
+        """Set the table (n_states, 5) that ants follow; AntsError unless they follow one."""
+        colony = self.colony
+        check_follows(colony.learns or colony.is_given_actions, colony.task)
         for one in self._each():
             one.view("q").reshape(-1, len(q_values), ROW)[..., :N_ACTIONS] = q_values
             note_best_actions(one.view("q"))
-
-    def check_follow(self) -> None:
-        """Raise an AntsError unless the ants follow a policy and do not learn."""
-        colony = self.colony
-        if colony.learns or colony.is_given_actions:
-            raise AntsError(
-                "the ants of this colony do not follow a policy; make a colony with "
-                'sharing="frozen" and q_values.'
-            )
-        if not colony.task.choice.needs_table:
-            raise AntsError(
-                f"the ants choose by the rule {colony.task.choice.rule!r}, which has no policy; "
-                "leave it out."
-            )
 
     def state(self) -> str:
         """Return a hash of the whole state; colonies with equal hashes behave identically."""

@@ -11,7 +11,7 @@ from taichi_ants import measures
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.interventions import Policy, TaskNumbers
-from taichi_ants.protocol import Event, When, checked_protocol
+from taichi_ants.protocol import Event, When, check_room, checked_protocol
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
@@ -43,8 +43,9 @@ class Timetable:
 
     def _check_colony(self) -> None:
         """Raise an AntsError if an intervention cannot happen in this colony."""
-        colony, interventions = self._colony, Interventions(self._colony, lasting=False)
+        colony = self._colony
         for event in self._events:
+            check_room(event, self._events, colony.task, colony.ants, colony.capacity)
             for one in event.interventions:
                 if isinstance(event, When) and one.in_all_worlds and len(colony.worlds) > 1:
                     raise AntsError(
@@ -53,9 +54,8 @@ class Timetable:
                     )
                 if isinstance(one, TaskNumbers):
                     colony.check_same_kernels(one.changed(colony.task))
-                if isinstance(one, Policy):
-                    interventions.check_follow()
-                one.check_in(colony.worlds[0], colony.task)
+                learns = colony.learns or colony.is_given_actions
+                one.check_in(colony.worlds[0], colony.task, learns)
 
     def __enter__(self) -> None:
         if not self._events:

@@ -271,6 +271,12 @@ WRONG = [
     (lambda: from_dict({"explode": 1}), "the name of an intervention is 'explode'"),
     (lambda: from_dict(3), "an intervention is 3; it must be a table"),
 ]
+WRONG_FORMS = [
+    ({"trail": "gate"}, "`at.trail` is 'gate'; it must be a level, which is a whole number, or a"),
+    ({"trail": 2.5}, "`at.trail` is 2.5; it must be a level"),
+    ({"ants": 0.5}, "`at.ants` is 0.5; it must be a whole number of ants, or a table of settings"),
+    ({"policy": 3}, "`at.policy` is 3; it must be a policy file, the name of a hand-written"),
+]
 WRONG_IN_A_RUN = [
     (3, "protocol is 3; it must be a list of At, Every and When"),
     (At(100, trail=0), "`at.tick` is 100, but episodes have 100 ticks; choose at most 99"),
@@ -278,7 +284,8 @@ WRONG_IN_A_RUN = [
     (At(9, task={"observation": "paper"}), "cannot change its observation in an episode"),
     (At(9, task={"fields.a.level": 3}), "is not a setting of task.fields"),
     (At(9, task={"noise.slip": 0.1}), "cannot change its slips in an episode"),
-    (At(9, add_ants=5), "after 9 ticks, 5 ants cannot join 20 ants, because the capacity"),
+    (At(9, add_ants=5), "the 20 ants at the start leave room for 0, because the capacity is 20"),
+    ([At(9, add_ants=5), At(50, ants=9)], "after 9 ticks, 5 ants cannot join 20 ants, because"),
     (When("living", above=3, epsilon=0.3), "`when.epsilon` would change all 2 worlds"),
     (At(9, learning_rate=0.3), "the ants do not learn"),
     (At(9, place={"what": "queen", "cells": [[9, 0, 0]]}), "the queen cannot move to cell"),
@@ -291,6 +298,13 @@ def test_wrong_events_are_refused_in_one_sentence(make, said):
         make()
     assert said in str(caught.value)
     assert str(caught.value).endswith(".")
+
+
+@pytest.mark.parametrize(("given", "said"), WRONG_FORMS)
+def test_short_forms_that_are_not_allowed_name_the_allowed_ones(given, said):
+    with pytest.raises(AntsError) as caught:
+        At(3, **given)
+    assert str(caught.value).startswith(said)
 
 
 def test_wrong_protocols_are_refused_in_one_sentence():
