@@ -104,13 +104,16 @@ def do(of_study: tuple[str, str], plugins: Sequence[Plugin], pickled: bytes) -> 
         AntsError: The worker has other `versions` than the study.
     """
     check_versions(of_study, versions(), "a worker")
-    for name, text in plugins:
-        _load(name, text)
-    work: Work = pickle.loads(pickled)  # after the plugins, which can define its classes
-    compile_once(work, *plugins)
-    return work.do()
+    with _ONE_AT_A_TIME:
+        for name, text in plugins:
+            _load(name, text)
+        work: Work = pickle.loads(pickled)  # after the plugins, which can define its classes
+        compile_once(work, *plugins)
+        return work.do()
 
 
+# Taichi serves one thread of a process; workers of an executor can be threads.
+_ONE_AT_A_TIME = threading.Lock()
 _loaded: dict[str, str] = {}  # texts of plugins by name
 
 

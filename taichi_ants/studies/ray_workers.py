@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Future
 from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from taichi_ants.errors import AntsError, count
@@ -60,6 +61,8 @@ class RayWorkers:
         if self.address:
             _check_listens(self.address)
             os.environ.setdefault("RAY_NUM_REDIS_GET_RETRIES", "1")
+            if _has_token():  # `ray start` demands it then; clusters without tokens ignore it
+                os.environ.setdefault("RAY_AUTH_MODE", "token")
         try:
             import ray
         except ImportError as error:
@@ -75,8 +78,15 @@ class RayWorkers:
                 ray.init(**where, logging_level="ERROR", log_to_driver=False)
             except (Exception, SystemExit) as error:
                 ray.shutdown()
-                at = f"the Ray cluster at {self.address!r}" if self.address else "Ray"
-                raise AntsError(f"cannot use {at} ({_first_line(error)}).") from error
+                at, remedy = "Ray", ""
+                if self.address:
+                    at = f"the Ray cluster at {self.address!r}"
+                    remedy = (
+                        "; check it with `ray status`, and if it needs a token, set RAY_AUTH_MODE "
+                        "to token, and RAY_AUTH_TOKEN to the one that `ray get-auth-token` prints "
+                        "on the head"
+                    )
+                raise AntsError(f"cannot use {at} ({_first_line(error)}){remedy}.") from error
         try:
             self._check_machines()
         except BaseException:
@@ -175,6 +185,13 @@ def _call(pickled: bytes) -> bytes:
     """Return the pickled result of a pickled call; this is what workers run."""
     call, arguments = pickle.loads(pickled)
     return pickle.dumps(call(*arguments), -1)
+
+
+def _has_token() -> bool:
+    """Return whether this machine has a token of Ray, by which clusters know their users."""
+    if {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"} & os.environ.keys():
+        return True
+    return Path("~/.ray/auth_token").expanduser().exists()
 
 
 def _check_listens(address: str) -> None:

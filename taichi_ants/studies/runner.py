@@ -418,7 +418,8 @@ class FailedBlocksError(AntsError):
         more = f" and {len(several) - _NAMED} more" if len(several) > _NAMED else ""
         super().__init__(
             f"{count(len(several), 'block')} failed: {'; '.join(several[:_NAMED])}{more}; all "
-            "others are saved, so correct the cause and run the same command again."
+            "others are saved, so correct the cause and run the same command again, or with "
+            "another --out if you change a plugin."
         )
         self.several = list(several)
 

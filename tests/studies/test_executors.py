@@ -144,6 +144,12 @@ def test_what_fails_now_and_then_is_tried_again(tmp_path):
     )
 
 
+def test_workers_can_be_threads_of_this_process(tmp_path):
+    plain = RUNS.run(folder(tmp_path / "plain"))
+    with ThreadPoolExecutor(4) as executor:
+        assert same(plain, RUNS.run(folder(tmp_path / "other"), executor=executor))
+
+
 def test_a_block_that_always_fails_is_named_and_the_others_are_done(tmp_path, monkeypatch):
     monkeypatch.setattr(RunPoint, "runs_of_a_block", 2)
     executor = Fails(
@@ -155,7 +161,8 @@ def test_a_block_that_always_fails_is_named_and_the_others_are_done(tmp_path, mo
         RUNS.run(tmp_path, executor=executor)
     assert str(caught.value) == (
         "1 block failed: training.epsilon 0.3, seeds 8 to 1 (KeyError: 'x'); all others are saved, "
-        "so correct the cause and run the same command again."
+        "so correct the cause and run the same command again, or with another --out if you change "
+        "a plugin."
     )
     assert executor.calls == 3 + TRIES
     assert len(list(tmp_path.iterdir())) == 3

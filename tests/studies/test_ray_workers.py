@@ -24,7 +24,7 @@ from command_lines import (
 )
 
 from taichi_ants import AntsError
-from taichi_ants.studies import executors
+from taichi_ants.studies import executors, ray_workers
 from taichi_ants.studies.ray_workers import RayWorkers
 
 SWEEP = """
@@ -115,6 +115,16 @@ def test_ray_is_an_extra(monkeypatch, sweep):
     assert status == 2
     assert_one_sentence(err)
     assert 'Ray is not installed; run pip install "taichi_ants[ray]"' in err
+
+
+def test_a_token_of_this_machine_is_found(monkeypatch, tmp_path):
+    for name in ("RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert not ray_workers._has_token()
+    (tmp_path / ".ray").mkdir()
+    (tmp_path / ".ray" / "auth_token").write_text("a")
+    assert ray_workers._has_token()
 
 
 # The slow tests, which start Ray, and the long ones, which start a cluster.
