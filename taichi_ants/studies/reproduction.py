@@ -6,7 +6,7 @@ import platform
 import re
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -111,12 +111,20 @@ def manifest_of(bundle: bundles.Bundle) -> dict[str, Any]:
                 f"{files.named(bundle.path)} has no {RESULTS}{MANIFEST}; get another copy of it."
             )
         bundle.unpack(RESULTS + MANIFEST, Path(place, MANIFEST))
-        manifest = read_manifest(Path(place))
+        manifest: dict[str, Any] = {}
+        with suppress(AntsError):
+            manifest = read_manifest(Path(place))
     try:
         known = manifest["asked"]["command"] in COMMANDS
+        known &= {RESULTS + name for name in (MANIFEST, *manifest["files"])} == {
+            name for name in bundle.names if name.startswith(RESULTS)
+        }
         for name, checksum in manifest["files"].items():
             known = known and bundle.checksum_of(RESULTS + name) == checksum
         known = known and {*manifest["inputs"].values()} <= manifest["files"].keys()
+        options = manifest["asked"]["options"]
+        read = (options.get(name) for name in ("file", "plugin"))
+        known = known and all(path is None or path in manifest["inputs"] for path in read)
     except (LookupError, TypeError, AttributeError):
         known = False
     if not known:

@@ -289,6 +289,32 @@ def test_an_archive_without_a_new_option_uses_its_default(copy, capsys):
     assert "1 of 9 files differ" in out
 
 
+@pytest.mark.parametrize(
+    ("options", "more"),
+    [({"plugin": "other.py"}, {}), ({"file": ["my.toml"]}, {}), ({}, {"results/more.csv": "x"})],
+)
+def test_an_archive_that_reads_or_holds_other_files_than_its_study_is_refused(
+    options, more, copy, capsys
+):
+    """Also with valid checksums."""
+    manifest = read_manifest(copy)
+    manifest["asked"]["options"] |= options
+    _write(copy, manifest)
+    assert call("archive", ["copy"], capsys)[0] == 0
+    with bundles.reading(Path("copy.zip")) as bundle:
+        texts = {name: bundle.read(name) for name in bundle.names}
+    contents = {}
+    for name, content in texts.items():
+        path = Path("unpacked", name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        contents[name] = path
+    bundles.write(Path("other.zip"), contents | more, {})
+    assert "does not fit its files" in refused(
+        "reproduce", ["other.zip", "--trust-plugins"], capsys
+    )
+
+
 def test_an_index_that_declares_less_than_is_there_is_refused(here):
     with bundles.reading(here / "done.zip") as bundle:
         bundle._listed["results/runs.csv"]["bytes"] -= 1
