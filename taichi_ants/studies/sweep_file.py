@@ -10,7 +10,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from taichi_ants import checks, files, learners, measures, protocol, worlds
+from taichi_ants import checks, files, learners, measures, protocol, rules, worlds
 from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
@@ -271,12 +271,16 @@ def _whole_numbers(kind: str) -> set[str]:
 
 
 def check_entries(file: Settings, varied: Iterable[str]) -> None:
-    """Raise AntsError if [vary] names a field or a kind of food for which the file has no table."""
+    """Raise AntsError if [vary] names a field or a kind of food for which the file has no table.
+
+    The parameters of a registered rule need none.
+    """
     for group in named_groups(Task):
         one: Any = file
         for key in group.path.split("."):
             one = one.get(key, {}) if isinstance(one, dict) else {}
         listed = list(one) if isinstance(one, dict) else []
+        listed += rules.names() if group.path == "task.rules" else []
         for name in sorted(varied):
             entry = name.removeprefix(f"{group.path}.").partition(".")[0]
             if name.startswith(f"{group.path}.") and entry not in listed:
@@ -318,10 +322,10 @@ def _point(
     world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
     preset = task.pop("preset", "paper")
     check_one_of("task.preset", preset, tuple(Task.named()))
-    rules = Task.named()[preset].but(**task)
+    chosen = Task.named()[preset].but(**task)
     if "policy" in tree:
-        tree["policy"] = FixedPolicy.named(tree["policy"], rules)
-    if "policy" in tree or (kind == "colony" and not rules.choice.needs_table):
+        tree["policy"] = FixedPolicy.named(tree["policy"], chosen)
+    if "policy" in tree or (kind == "colony" and not chosen.choice.needs_table):
         training = {**_WITHOUT_LEARNING, **training}
     for name in _OF_LEARNERS[:5]:  # the others have defaults
         if name not in training:
@@ -331,7 +335,7 @@ def _point(
         built[key] = _world(kind, world, seeds)
     if events:
         tree["protocol"] = protocol.read(events)
-    return KINDS[kind](built[key], rules, TrainingConfig(**training), **tree, **reading)
+    return KINDS[kind](built[key], chosen, TrainingConfig(**training), **tree, **reading)
 
 
 def _without_events(settings: Settings) -> tuple[Settings, dict[str, list[Any]]]:

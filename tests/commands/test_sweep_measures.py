@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from command_lines import assert_one_sentence, call
 
-from taichi_ants import Colony, TrainingConfig, measures, save_policy, worlds
+from taichi_ants import AntsError, Colony, TrainingConfig, measures, rules, save_policy, worlds
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.measures import registry
 from taichi_ants.studies.points import EVALUATION_SEEDS
@@ -164,6 +164,23 @@ def test_policies_can_vary(sweep):
     status, _, err = sweep(text, "--no-figures")
     assert status == 2
     assert "policy.sha256" in err
+
+
+def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
+    monkeypatch.setattr(rules.registry, "_RULES", dict(rules.registry._RULES))
+    rules.register("evaporation")(weaker)
+    text = FILE.replace("[vary]", '[task]\npheromone.evaporation = "weaker"\n\n[vary]')
+    text += "task.rules.weaker.rate = [0.1, 0.5]\n"
+    Path("my.toml").write_text(text)
+    rates = [one.task.rules["weaker"].rate for one in read_sweep(Path("my.toml")).study.points]
+    assert set(rates) == {0.1, 0.5}
+    Path("my.toml").write_text(text.replace("rules.weaker", "rules.weakr"))
+    with pytest.raises(AntsError, match=r"no table \[task\.rules\.weakr\]; choose weaker, or add"):
+        read_sweep(Path("my.toml"))
+
+
+def weaker(level, rate=0.2):
+    return level * (1 - rate)
 
 
 def test_a_plugin_can_register_a_measure(sweep):
