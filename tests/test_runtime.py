@@ -159,7 +159,7 @@ assert same()
     python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_loud_taichi_of_the_callers_is_no_louder_for_our_kernels(tmp_path):
     """And is as loud as before afterwards; `python` demands that nothing is on stderr."""
     script = """

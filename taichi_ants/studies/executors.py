@@ -30,7 +30,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 
 from taichi_ants import __version__, files
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.studies.command_line import load_plugin
@@ -224,10 +224,13 @@ class LocalWorkers:
     """Worker processes on this machine, which are replaced if they die.
 
     They end with the `with` block; in case of an error, or if this process is killed, at once.
+
+    Raises:
+        AntsError: The number of workers is not a whole number above 0.
     """
 
     def __init__(self, workers: int) -> None:
-        self.num_workers = workers
+        self.num_workers = checked_whole("workers", workers)
         self._pool: ProcessPoolExecutor | None = None
         # The workers have one end. They see that the other one is closed, also by a crash.
         self._end, self._line = multiprocessing.Pipe(duplex=False)

@@ -19,7 +19,7 @@ from typing import Any, Generic, NamedTuple
 import numpy as np
 
 from taichi_ants import __version__, checks, files
-from taichi_ants.errors import AntsError, count, shown
+from taichi_ants.errors import AntsError, checked_whole, count, shown
 from taichi_ants.studies.blocks import Blocks, Outcome
 from taichi_ants.studies.executors import Executor, Plugin, Reduce, Work, completed
 from taichi_ants.studies.interruption import stop_if_noted
@@ -284,6 +284,8 @@ class Study(Generic[PointKind]):
             AntsError: The disk is too small for all blocks, or an argument is not allowed.
             FailedBlocksError: Some blocks cannot be computed; the others are finished.
         """
+        if in_flight is not None:
+            checked_whole("in_flight", in_flight)
         order, weights = self.in_order, self.weights
         place_of: dict[Any, int] = {point: place for place, point in enumerate(order)}
         after = [place_of.get(point.after, -1) for point in order]

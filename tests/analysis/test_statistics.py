@@ -259,7 +259,7 @@ def test_resamples_that_are_too_many_to_be_kept_are_the_same(
     assert resampling_counts.cache_info().currsize == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_memory_of_resamples_does_not_grow_with_seeds() -> None:
     values = np.zeros((1, 50_000))
     values[0, ::2] = 1.0

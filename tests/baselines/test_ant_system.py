@@ -58,7 +58,7 @@ def test_tours_of_the_reference_lead_to_food_without_loops() -> None:
             assert list(ahead[-1]) in world.foods.tolist()
 
 
-@pytest.mark.parametrize("mirrored", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.parametrize("mirrored", [pytest.param(False, marks=pytest.mark.long), True])
 def test_all_colonies_find_the_shorter_branch(mirrored: bool) -> None:
     result = search(double_bridge(10, 15, mirrored), iterations=200)
     assert result.shortest == 6 + 10 + 3  # to the junction, over the bridge, to the pile

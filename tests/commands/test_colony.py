@@ -237,7 +237,7 @@ def test_other_arenas_are_the_only_difference_and_their_order_is_none(
     assert "(training.discount differ)" in err
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("fault", [faults.killed, faults.full])
 def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
     fault, remembered, tmp_path
@@ -586,7 +586,7 @@ def test_rules_are_those_named_else_the_policys_else_the_papers(
     assert command.rules(settings, policy) == replace(expected, **LASTING)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_figure_shows_what_all_colonies_deliver_by_tick(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     policy = EXPERIMENTS / "policies" / "queueing.npz"

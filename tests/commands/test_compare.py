@@ -536,8 +536,13 @@ def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
     assert "trace_decay=0.5" in " ".join(out.split())
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("fault", [faults.killed, faults.full])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(faults.killed, marks=pytest.mark.slow),
+        pytest.param(faults.full, marks=pytest.mark.long),
+    ],
+)
 def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
     fault, tmp_path, monkeypatch
 ):

@@ -74,7 +74,7 @@ def test_an_interruption_before_the_first_block_leaves_nothing(kernels, tmp_path
         assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_finished_blocks_are_kept_and_a_damaged_one_is_done_again(kernels, tmp_path):
     folder, arguments = tmp_path / "out", [*MANY, "--out", "out"]
     process = start("compare", arguments, kernels, tmp_path)
@@ -117,7 +117,7 @@ def test_an_interruption_of_the_pictures_keeps_the_runs(kernels, tmp_path):
     assert len(blocks_in(tmp_path / "out")) == 2 * 2
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_second_process_at_the_same_work_may_finish_it(kernels, tmp_path):
     arguments = [*MANY, "--out", "out"]
     process = start("compare", arguments, kernels, tmp_path)
@@ -163,7 +163,7 @@ print(late)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_is_prepared_beside_has_all_kernels_that_drawing_needs(kernels, tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", REHEARSED],
@@ -233,7 +233,7 @@ def test_only_the_beginning_is_read(kernels, tmp_path):
     assert contents(tmp_path / "out") == before
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_without_a_home(kernels, tmp_path):
     """Kernels are then kept among the temporary files."""
     places = {"HOME": None, "XDG_CACHE_HOME": None, "TMPDIR": str(kernels)}
@@ -270,7 +270,7 @@ class Hysteretic(QLearning):
         return error * np.float32(0.25) if error < 0 else error
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_learner_from_a_file_of_ones_own(kernels, tmp_path, monkeypatch):
     (tmp_path / "own.py").write_text(HYSTERETIC)
     arguments = [

@@ -268,8 +268,13 @@ def workers_of(pid):
     return found
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(signal.SIGINT, marks=pytest.mark.slow),
+        pytest.param(signal.SIGKILL, marks=pytest.mark.long),
+    ],
+)
 def test_worker_processes_end_with_the_command_and_work_resumes(number, sweep, tmp_path):
     long = RUNS.replace("episodes = 6", "episodes = 6000").replace("= 60", "= 600")
     long = long.replace("[7, 2, 5, 1]", "400")

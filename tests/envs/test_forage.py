@@ -340,7 +340,7 @@ def test_what_is_returned_is_not_written_again():
         np.testing.assert_array_equal(one, other)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_thousand_environments_leave_no_memory_behind():
     def one_life(make: Any) -> None:
         env = make()

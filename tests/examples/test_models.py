@@ -50,7 +50,7 @@ def test_two_nests(tmp_path, monkeypatch):
     assert 0.53 < share[8] + 0.02 < share[6] < 0.65
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_colonies_on_a_double_bridge_choose_the_short_branch_and_keep_a_long_one(
     kernels: Path, tmp_path: Path
 ) -> None:
@@ -68,7 +68,7 @@ def test_colonies_on_a_double_bridge_choose_the_short_branch_and_keep_a_long_one
     assert (tmp_path / "double_bridge.png").stat().st_size > 10_000
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_ants_that_misread_cells(kernels: Path, tmp_path: Path) -> None:
     small = ["--seeds", 2, "--episodes", 6, "--ticks", 300, "--out", tmp_path]
     done = run("models/misreading", small, kernels, tmp_path)

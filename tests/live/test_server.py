@@ -551,7 +551,7 @@ def test_the_first_session_has_none_before_it(shared):
         )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
     from PIL import Image
 
@@ -573,7 +573,7 @@ def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
     assert state_of(room) == before
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_time_goes_on_while_a_file_is_made(room):
     with Guest(room) as guest:
         guest.ask("export", kind="gif")

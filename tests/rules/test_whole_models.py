@@ -97,7 +97,7 @@ MODELS = {
         {},
     ),
 }
-SLOW = ("deneubourg", "rules of users", "labour of users", "choice by labour")
+SLOW = ("deneubourg", "labour of users")
 
 
 def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[Event]] | None:

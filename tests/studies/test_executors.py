@@ -144,6 +144,13 @@ def test_what_fails_now_and_then_is_tried_again(tmp_path):
     )
 
 
+def test_numbers_of_workers_and_blocks_are_checked(tmp_path):
+    with pytest.raises(AntsError, match=r"^workers is 0; it must lie between 1 and"):
+        LocalWorkers(0)
+    with pytest.raises(AntsError, match=r"^in_flight is 0; it must lie between 1 and"):
+        RUNS.run(tmp_path, executor=Here(), in_flight=0)
+
+
 def test_workers_can_be_threads_of_this_process(tmp_path):
     plain = RUNS.run(folder(tmp_path / "plain"))
     with ThreadPoolExecutor(4) as executor:

@@ -90,7 +90,7 @@ def test_deliveries_against_the_number_of_ants(rows) -> None:
             assert line.get_xydata().tolist() == [*map(list, zip(SIZES, expected, strict=True))]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_path: Path) -> None:
     save_all(figures.draw_all(rows), tmp_path / "new")
     for name in ("rules", "scaling", "training", "elsewhere"):

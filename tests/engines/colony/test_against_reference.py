@@ -139,7 +139,7 @@ def without_rocks(world: World) -> World:
 # The others come later: what they add, the tests of independent runs and of pages have as well.
 QUICK = (0, 1, 10, 14)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
-LONG = (12, 15, 17, 18, 19, 20, 21, 22)  # each of their features is in another entry as well
+LONG = (12, 15, 16, 17, 18, 19, 20, 21, 22)  # each of their features is in another entry as well
 OPTIMISED = ("dyna_q", "independent", "ants_seen", False)
 
 
@@ -297,7 +297,7 @@ CASTES = [
 QUICK_CASTES = [
     one
     if k in (1, 3)
-    else pytest.param(one, marks=[pytest.mark.slow, pytest.mark.long][k in (0, 4, 8)])
+    else pytest.param(one, marks=[pytest.mark.slow, pytest.mark.long][k in (0, 4, 7, 8)])
     for k, one in enumerate(CASTES)
 ]
 

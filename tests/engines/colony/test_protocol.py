@@ -39,7 +39,7 @@ KERNELS = [
 WITH_CASTES = ("sarsa", "shared", "paper", False, "right_of_way", "half", "a", ("trail", "a"))
 KERNELS.append(WITH_CASTES)
 QUICK = (KERNELS[4], WITH_CASTES)
-LONG = (KERNELS[1], KERNELS[3])
+LONG = (*KERNELS[:4],)
 MARKED = [
     pytest.param(
         one, marks=[pytest.mark.long if one in LONG else pytest.mark.slow] * (one not in QUICK)
