@@ -161,8 +161,8 @@ def _drawn(rng: np.random.Generator, name: str) -> float:
         return float(rng.integers(-MOST_REWARD, MOST_REWARD + 1))
     if name == "values":
         return float(np.float32(rng.choice([0.0, 1.0, rng.normal(scale=30)])))
-    # Usual ones are often drawn, and the largest ones sometimes.
-    level = rng.choice([0.0, 250.0, 10 ** rng.uniform(0, 6), 10 ** rng.uniform(0, 9)])
+    # Usual levels are often drawn, and the largest ones sometimes.
+    level = rng.choice([0.0, 250.0, 10 ** rng.uniform(0, 9 if rng.random() < 0.25 else 6)])
     return float(np.float32(level) if rng.random() < 0.5 else int(level))
 
 

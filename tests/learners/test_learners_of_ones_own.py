@@ -121,6 +121,7 @@ def of_its_own_value_kept_inside(value, reward, discount, next_values, next_acti
 
 @pytest.mark.filterwarnings("ignore:overflow encountered in exp")
 @pytest.mark.parametrize("engine", ONE_ENGINE)
+@pytest.mark.slow
 def test_a_number_of_pythons_is_a_td_error(engine):
     register(td_learner("mine", of_zero))
     assert not engine().any()

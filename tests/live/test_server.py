@@ -785,6 +785,7 @@ def test_it_ends_when_a_page_asks(shared):
         guest.until_cut_off()
 
 
+@pytest.mark.slow
 def test_the_fastest_pages_see_moments_from_inside_episodes(room):
     with Guest(room) as guest:
         guest.ask("speed", value=server.FASTEST)

@@ -240,6 +240,7 @@ def test_the_bar_of_a_state_is_as_long_as_its_choice_is_clear() -> None:
     assert 15 <= coloured(policy_sheet(table), CHOSEN).sum(axis=1).max() < 40  # a fifth of 112
 
 
+@pytest.mark.slow
 def test_only_states_that_can_occur_are_on_a_sheet() -> None:
     table = all_known()
     table[[index for index in range(128) if index not in REACHABLE_STATES]] = (1, 0, 0, 0, 0)

@@ -53,9 +53,8 @@ def assert_same(one: Colony, other: Colony) -> None:
         assert np.array_equal(one.arrays[name], other.arrays[name]), name
 
 
-@pytest.mark.parametrize(
-    "task", [pytest.param(LIVELY, marks=pytest.mark.slow), Task()], ids=["births", "paper"]
-)
+@pytest.mark.parametrize("task", [LIVELY, Task()], ids=["births", "paper"])
+@pytest.mark.slow
 def test_threads_and_schedules_give_the_same(task, monkeypatch):
     """Many chunks; without births ants would be sorted, if nobody gave their actions by slot."""
     monkeypatch.setattr(layout, "_CHUNKS_PER_THREAD", 8)
