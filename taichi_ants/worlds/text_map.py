@@ -116,7 +116,7 @@ class _Drawn:
 
 
 class _Mark(NamedTuple):
-    """What the mark of a region draws: the character of the cell, and the names of the regions."""
+    """A mark of regions: the character of the cell that it draws, and the names of the regions."""
 
     cell: str
     names: tuple[str, ...]

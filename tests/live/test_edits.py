@@ -23,7 +23,7 @@ from taichi_ants.reference.interventions import Interventions as PlainInterventi
 from taichi_ants.task import foraging
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
-# Each entry takes kernels of its own, see tests/engines/colony/test_against_reference.py.
+# Each entry needs its own kernels, see tests/engines/colony/test_against_reference.py.
 KERNELS = [
     ("sarsa", "shared", "ants", False, "right_of_way", "strongest", "ab", ("trail", "b")),
     ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),

@@ -195,7 +195,7 @@ def steps_compared(drawn: RandomColony, protocol: list[Event], schedule: str, se
 def test_every_tick_of_whole_models(name, ant_steps):
     steps, seed, seen = 0, 0, Counter()
     schedules = ("by_world", "by_chunk")
-    if ant_steps < 10_000:  # each takes kernels of its own
+    if ant_steps < 10_000:  # each needs its own kernels
         schedules = schedules[list(MODELS).index(name) % 2 :][:1]
     while steps < ant_steps:
         assert seed < 100 or steps > 10 * seed, (steps, seed, seen)

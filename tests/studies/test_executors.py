@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -151,10 +152,22 @@ def test_numbers_of_workers_and_blocks_are_checked(tmp_path):
         RUNS.run(tmp_path, executor=Here(), in_flight=0)
 
 
-def test_workers_can_be_threads_of_this_process(tmp_path):
-    plain = RUNS.run(folder(tmp_path / "plain"))
+def test_workers_can_be_threads_of_this_process(tmp_path, monkeypatch):
+    """Taichi serves one of them at a time."""
+    monkeypatch.setattr(RunPoint, "runs_of_a_block", 2)
+    plain, busy, most = RUNS.run(folder(tmp_path / "plain")), [], []
+
+    def notes(*_):
+        busy.append(1)
+        most.append(len(busy))
+        time.sleep(0.02)  # for others to come, if they can
+        busy.pop()
+
+    monkeypatch.setattr(executors, "compile_once", notes)
     with ThreadPoolExecutor(4) as executor:
         assert same(plain, RUNS.run(folder(tmp_path / "other"), executor=executor))
+    assert len(most) > 2
+    assert max(most) == 1
 
 
 def test_a_block_that_always_fails_is_named_and_the_others_are_done(tmp_path, monkeypatch):

@@ -112,7 +112,7 @@ def with_nests(drawn: RandomColony, seed: int, nests: int, kinds: int, loads: bo
         f"kind_{k}": Food(
             pick_up=int(rng.integers(-2, 9)),
             deliver=int(rng.integers(-2, 30)),
-            # Of the first kind always, because each other model takes kernels of its own.
+            # Of the first kind always, because each other model needs its own kernels.
             loads=int(rng.integers(1 + (k == 0), 5)) if loads else 1,
             regrowth=int(rng.choice([0, 1, 4])) if k == 0 or rng.random() < 0.7 else None,
         )

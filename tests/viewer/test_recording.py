@@ -35,7 +35,7 @@ from taichi_ants.viewer import (
 )
 from taichi_ants.viewer.frames import types_of
 
-# Each entry takes kernels of its own: learner, sharing, observation, dense, traffic.
+# Each entry needs its own kernels: learner, sharing, observation, dense, traffic.
 KERNELS = [
     ("q_learning", "shared", "paper", False, "blocking"),
     pytest.param("sarsa", "shared", "ants_seen", True, "blocking", marks=pytest.mark.slow),

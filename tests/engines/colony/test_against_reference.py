@@ -19,7 +19,7 @@ from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import registry
 
-# Each entry takes kernels of its own, so that there are few: learner, sharing, observation, dense,
+# Each entry needs its own kernels, so that there are few: learner, sharing, observation, dense,
 # and where these are not the paper's the traffic, which trails are seen, and further `MORE`.
 # For all but the first, ants and food come and go: what stays the same is left out of kernels.
 UNDER = "strongest_under_carriers"

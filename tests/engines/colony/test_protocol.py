@@ -25,7 +25,7 @@ from taichi_ants.reference.protocol import Protocol
 from taichi_ants.task import foraging
 from taichi_ants.task.constants import BEST_AT, EMPTY, FOOD, OBSTACLE, ROW
 
-# Each entry takes kernels of its own, see test_against_reference.py.
+# Each entry needs its own kernels, see test_against_reference.py.
 KERNELS = [
     ("q_learning", "frozen", "queues", False, "following", "strongest_under_carriers"),
     ("sarsa", "shared", "ants", False, "right_of_way", "strongest", "ab", ("trail", "b")),
