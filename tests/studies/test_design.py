@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
+from taichi_ants.files.results import MANIFEST, _write_manifest
 from taichi_ants.studies import design
 from taichi_ants.studies.design import Choices, Design, Range
 from taichi_ants.studies.sweep import read_sweep, sweep_of
@@ -202,14 +203,13 @@ def test_a_missing_extra_is_named_with_the_command(monkeypatch):
         Design.of({"design": "sobol", "samples": 8, "sensitivity": True})
 
 
-def test_a_hypercube_of_another_size_is_refused(tmp_path, monkeypatch):
+def test_a_hypercube_of_another_size_is_refused(tmp_path):
     manifest = {"settings": {"design": Design("latin_hypercube", 8).facts()["design"]}}
-    monkeypatch.setattr(design, "read_manifest", lambda folder: manifest)
     for place in (tmp_path, tmp_path / "unfinished"):
         place.mkdir(exist_ok=True)
-        Path(place, design.MANIFEST).touch()
+        _write_manifest(manifest, place)
         Design("latin_hypercube", 8).check_folder(tmp_path)
         Design("sobol", 16).check_folder(tmp_path)
         with pytest.raises(AntsError, match="8 samples, which cannot be extended to 16"):
             Design("latin_hypercube", 16).check_folder(tmp_path)
-        Path(place, design.MANIFEST).unlink()
+        Path(place, MANIFEST).unlink()
