@@ -32,6 +32,8 @@ def parse_arguments(
     command_line.add_machines(parser)
     name = f"sweep-{file.stem}" if file else "sweep-NAME for the file NAME.toml"
     command_line.add_results(parser, name, quick=False)
+    also = "write the tables as Parquet, too, while the sweep runs and at the end (extra parquet)"
+    parser.add_argument("--parquet", action="store_true", help=also)
     settings = parser.parse_args(arguments)
     settings.command, settings.text = "sweep", None
     return command_line.with_folder(settings, f"sweep-{settings.file.stem}")
@@ -41,6 +43,7 @@ def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
     from taichi_ants.files import read_text
     from taichi_ants.files.inputs import recorded
+    from taichi_ants.files.parquet import check_installed
     from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
     from taichi_ants.studies.search import Search, read
@@ -49,6 +52,8 @@ def sweep(settings: argparse.Namespace) -> None:
         command_line.load_plugin(settings.plugin)
         settings.text = settings.text or read_text(settings.file)
         asked = read(settings.file, settings.text)
+    if settings.parquet:
+        check_installed()
     if isinstance(asked, Search):
         return _search(settings, asked, inputs)
     if not settings.force:
@@ -57,13 +62,14 @@ def sweep(settings: argparse.Namespace) -> None:
     def work(blocks: Path, ready: Path) -> None:
         bar = command_line.progress_bar
         with chosen(settings) as how, bar("sweep", how.get("executor")) as progress:
-            values = asked.measured(blocks, progress, **how)
+            values = asked.measured(blocks, progress, settings.parquet, **how)
         if settings.shard:
             return
         asked.write(values, ready, draws=not settings.no_figures)
         asked.write_series(blocks, ready)
 
     more: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
+    more |= {"as_parquet": asked.write_parquet} if settings.parquet else {}
     work_or_show(settings, asked.facts(), work, **more)
 
 
@@ -72,6 +78,8 @@ def _search(settings: argparse.Namespace, asked: Search, inputs: Mapping[str, by
     from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
 
+    if settings.parquet:
+        raise AntsError("--parquet is for sweeps with [vary], but this is a search; leave it out.")
     if settings.shard:
         raise AntsError(
             "a search cannot be split into shards, because each trial depends on those before it; "

@@ -163,10 +163,18 @@ class GrowingTable:
 
     def append(self, rows: Iterable[Mapping[str, Any]], header: bool = False) -> None:
         """Append rows, all at once."""
-        text = io.BytesIO()
-        _write_rows(text, rows, self._columns, header)
+        text = csv_text(rows, self._columns, header)
         with writing(self._path):
-            self._file.write(text.getvalue())
+            self._file.write(text)
+
+
+def csv_text(
+    rows: Iterable[Mapping[str, Any]], columns: Sequence[str], header: bool = True
+) -> bytes:
+    """Return the text that `write_csv` writes, with or without the header."""
+    text = io.BytesIO()
+    _write_rows(text, rows, columns, header)
+    return text.getvalue()
 
 
 def _write_rows(
@@ -228,6 +236,12 @@ def read_csv(path: PathLike) -> list[dict[str, Any]]:
         if isinstance(error, AntsError):
             raise
         raise AntsError(f"{named(path)} is not a table (CSV); name another file.") from error
+
+
+def csv_columns(path: PathLike) -> list[str]:
+    """Return the names of the columns of a file that `write_csv` wrote."""
+    with opened(path) as file:
+        return next(csv.reader([file.readline().decode("utf-8", "replace")]), [])
 
 
 def smallest(array: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -225,17 +225,20 @@ class ResultFolder:
         _write_manifest(contents, ready).replace(self.path / MANIFEST)
         self._clear()
 
-    def add(self, name: str, text: str) -> None:
-        """Add a file to finished results, or replace it."""
+    def add(self, write: Callable[[Path], object], **facts: Any) -> None:
+        """Add files to finished results, or replace them, and replace facts in the manifest.
+
+        `write` writes the files to a new folder.
+        """
         self._ready.mkdir(parents=True, exist_ok=True)
         with files.writing(self.path), tempfile.TemporaryDirectory(dir=self._ready) as place:
-            file = Path(place, name)
-            files.write_text(file, text)
-            manifest = read_manifest(self.path)
-            manifest["files"][name] = checksum_of(file)
-            # The manifest first, so that the file can be missing but never differ from it.
+            write(Path(place))
+            manifest, made = read_manifest(self.path) | facts, sorted(Path(place).iterdir())
+            manifest["files"] |= {file.name: checksum_of(file) for file in made}
+            # The manifest first, so that a file can be missing but never differ from it.
             _write_manifest(manifest, Path(place)).replace(self.path / MANIFEST)
-            file.replace(self.path / name)
+            for file in made:
+                file.replace(self.path / file.name)
         self.tidy()
 
     def tidy(self) -> None:

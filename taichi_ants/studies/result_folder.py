@@ -10,6 +10,7 @@ import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from operator import methodcaller
 from pathlib import Path
 from typing import Any, TypeVar
@@ -48,6 +49,7 @@ def work_or_show(
     take: Take | None = None,
     inputs: Mapping[str, bytes] | None = None,
     grows_in: Sequence[str] = (),
+    as_parquet: Callable[[Path, Path], None] | None = None,
 ) -> None:
     """Compute the results of a command unless its folder has them, and print the report.
 
@@ -62,6 +64,8 @@ def work_or_show(
         inputs: The contents of the files that the study has read, by path, except the plugin and
             the sweep file. The results contain copies of them.
         grows_in: The argument of `ResultFolder`.
+        as_parquet: A function that writes Parquet files from the tables in a folder of results to
+            another folder; None without such files.
     """
     given = {**(inputs or {}), **_given(settings)}
     plugin = hashlib.sha256(given[settings.plugin]).hexdigest() if settings.plugin else None
@@ -70,7 +74,7 @@ def work_or_show(
     runs = study.runs(shard or (1, 1)) if study else None
     folder = ResultFolder(settings.out, facts, leading, runs, take is not None, grows_in)
     if not settings.force and folder.is_finished():
-        _show(settings, folder, page)
+        _show(settings, folder, page, as_parquet)
     else:
         began = time.perf_counter()
         with folder.work(settings.force, _asked(settings)) as (blocks, ready):
@@ -84,6 +88,8 @@ def work_or_show(
             report = files.read_text(ready / REPORT)
             seconds = folder.seconds_before + time.perf_counter() - began
             made = provenance(sys.argv) | {"seconds": seconds, "figures": not settings.no_figures}
+            if as_parquet:
+                as_parquet(ready, ready)
             made |= {"asked": _again(settings), "inputs": _copied(given, ready)}
             if page:
                 files.write_text(ready / PAGE, page(ready, results, made))
@@ -157,14 +163,24 @@ def _of_shard(settings: Namespace, number: int, shards: int) -> str:
     )
 
 
-def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None) -> None:
-    """Print the report of finished results, and make a missing page again."""
+def _show(
+    settings: Namespace,
+    folder: ResultFolder,
+    page: Pages[Results] | None,
+    as_parquet: Callable[[Path, Path], None] | None,
+) -> None:
+    """Print the report of finished results, and make a missing page or missing tables again."""
     folder.check(may_lack=PAGE if page else None)
     folder.tidy()
     manifest = read_manifest(settings.out)
     is_missing = not (settings.out / PAGE).exists()
     if page and is_missing:
-        folder.add(PAGE, page(settings.out, None, manifest))
+        text = page(settings.out, None, manifest)
+        folder.add(lambda place: files.write_text(place / PAGE, text))
+    if as_parquet and not any(name.endswith(".parquet") for name in manifest["files"]):
+        asked = manifest["asked"]
+        options = {**asked["options"], "parquet": True}
+        folder.add(partial(as_parquet, settings.out), asked={**asked, "options": options})
     print(files.read_text(settings.out / REPORT))
     print(f"{settings.out}/ already has these results; use --force to compute them again.")
     if not (settings.no_figures or manifest["figures"]):

@@ -19,6 +19,7 @@ from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.files import parquet
 from taichi_ants.files.results import REPORT, ROWS
 from taichi_ants.measures.series import stops
 from taichi_ants.settings import flat
@@ -77,14 +78,18 @@ class Sweep:
         own |= {"measure_every": self.measure_every} if self.measure_every else {}
         return {**self.study.settings(), **own, **self.design.facts(), "vary": self.settings}
 
-    def measured(self, blocks: Path, progress: Progress, **how: Any) -> dict[str, np.ndarray]:
+    def measured(
+        self, blocks: Path, progress: Progress, as_parquet: bool = False, **how: Any
+    ) -> dict[str, np.ndarray]:
         """Return each measure, float64 (points, seeds); arguments as of `Study.in_blocks`.
 
-        The value of a registered measure is its mean over rollouts, at the last tick of each.
+        The value of a registered measure is its mean over rollouts, at the last tick of each. The
+        rows of finished blocks are written to tables beside the blocks, with `as_parquet` also as
+        Parquet.
         """
         reduce = partial(_measured, self.kind, self.measures, self.measure_every is not None)
         how = {"bytes_of_a_run": self._bytes_of_a_run, **how}
-        with self._rows_as_they_come(blocks.parent / ROWS) as each:
+        with self._rows_as_they_come(blocks.parent / ROWS, as_parquet) as each:
             return self.study.reduced(blocks, reduce, progress, each, **how)
 
     def _bytes_of_a_run(self, point: Any) -> int:
@@ -96,20 +101,27 @@ class Sweep:
         return values * (8 + 2 * _BYTES_OF_A_NUMBER)
 
     @contextmanager
-    def _rows_as_they_come(self, folder: Path) -> Iterator[Callable[[Block], None]]:
+    def _rows_as_they_come(
+        self, folder: Path, as_parquet: bool
+    ) -> Iterator[Callable[[Block], None]]:
         """Yield a function that appends the rows of a block to tables in a folder.
 
         The tables have the columns of `RUNS` and `SERIES_FILE`, and rows in the order of blocks.
         """
-        tables: dict[str, files.GrowingTable] = {}
+        tables: dict[str, list[Any]] = {}
         settings, order = self._settings_of_points, self.study.in_order
         columns, seeds = sweeps.columns_of(self.settings), self.study.seeds
 
         def append(name: str, rows: Iterable[dict[str, Any]], more: Iterable[str]) -> None:
             if name not in tables:
-                path = files.check_writable_folder(folder) / name
-                tables[name] = stack.enter_context(files.GrowingTable(path, [*columns, *more]))
-            tables[name].append(rows)
+                path, names = files.check_writable_folder(folder) / name, [*columns, *more]
+                tables[name] = [stack.enter_context(files.GrowingTable(path, names))]
+                if as_parquet:
+                    types = self._types(names)
+                    tables[name] += [parquet.GrowingDataset(path.with_suffix(".parquet"), types)]
+            several = list(rows)
+            for table in tables[name]:
+                table.append(several)
 
         def each(block: Block) -> None:
             values, of_seeds = values_in(block.outcome), [seeds[s] for s in block.seeds]
@@ -131,6 +143,20 @@ class Sweep:
         for point, one in zip(self.study.points, self.settings, strict=True):
             settings.setdefault(point, []).append(one)
         return settings
+
+    def _types(self, columns: Iterable[str]) -> dict[str, str]:
+        """Return the types of columns of tables, as `parquet.types_of` does."""
+        known = parquet.types_of(self.settings)
+        known |= parquet.types_of([{"seed": seed} for seed in self.study.seeds])
+        known |= {"seeds": "int64", "episode": "int64", "tick": "int64", "measure": "string"}
+        return {name: known.get(name, "double") for name in columns}
+
+    def write_parquet(self, source: Path, folder: Path) -> None:
+        """Write Parquet files to a folder from the tables in a folder of results."""
+        for name in (RUNS, SUMMARY, SERIES_FILE):
+            if (source / name).exists():
+                types = self._types(files.csv_columns(source / name))
+                parquet.convert(source / name, (folder / name).with_suffix(".parquet"), types)
 
     def take(self, folder: Path, runs: Mapping[str, Any], blocks: Blocks) -> None:
         """Add finished results, whose `Study.runs` were `runs`, to the blocks.

@@ -145,8 +145,12 @@ def test_a_difference_is_named_with_its_place(copy, capsys, monkeypatch):
     folder = ResultFolder(copy, read_manifest(copy)["settings"])
     text = (copy / "runs.csv").read_text()
     at = text.index("\n") + 3
-    folder.add("runs.csv", f"{text[:at]}?{text[at + 1 :]}")
-    folder.add("more.txt", "more")
+
+    def write(place):
+        (place / "runs.csv").write_text(f"{text[:at]}?{text[at + 1 :]}")
+        (place / "more.txt").write_text("more")
+
+    folder.add(write)
     assert call("archive", [copy], capsys)[0] == 0
     known = reproduction.packages()
     monkeypatch.setattr(reproduction, "packages", lambda: {**known, "numpy": "0", "scipy": None})
@@ -371,7 +375,8 @@ def test_a_search_is_archived_and_reproduced(tmp_path, capsys, monkeypatch):
     assert '"strongest"' in odd
     folder = ResultFolder(Path("done"), read_manifest(Path("done"))["settings"])
     trials = Path("done/optuna.journal").read_text()
-    folder.add("optuna.journal", trials.replace('"value":', '"value":1', 1))
+    other = trials.replace('"value":', '"value":1', 1)
+    folder.add(lambda place: (place / "optuna.journal").write_text(other))
     assert call("archive", ["done", "--force"], capsys)[0] == 0
     status, out, _ = call("reproduce", ["done.zip", "--out", "again"], capsys)
     assert status == 1

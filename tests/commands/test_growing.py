@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -292,6 +293,52 @@ def test_status_and_rows_of_work_in_progress(sweep, capsys, monkeypatch):
     _, out, _ = call("status", ["a"], capsys)
     assert "finished: results with 24 runs, since" in out
     assert call("status", ["nothing"], capsys)[0] == 2
+
+
+def test_tables_are_written_as_parquet_too(sweep, capsys, monkeypatch):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    with monkeypatch.context() as patch:
+        patch.setitem(sys.modules, "pyarrow", None)
+        status, _, err = sweep(COLONY, "whole", "--parquet")
+        assert status == 2
+        assert "pip install 'taichi-ants[parquet]'" in err
+    assert sweep(COLONY, "plain")[0] == 0
+    before = contents(Path("plain"))
+    real, seen = ColonyPoint.do, []
+
+    def looks(*arguments):
+        rows = Path("whole/unfinished/rows")
+        if rows.exists():
+            seen.append([pandas.read_parquet(rows / f"{n}.parquet") for n in ("runs", "series")])
+        return real(*arguments)
+
+    monkeypatch.setattr(ColonyPoint, "do", staticmethod(looks))
+    assert sweep(COLONY, "whole", "--parquet")[0] == 0
+    assert sweep(COLONY, "plain", "--parquet")[0] == 0  # added to finished results
+    assert sweep(COLONY, "plain", "--parquet")[0] == 0
+    tables = {"runs", "series", "summary"}
+    assert {one.stem for one in Path("plain").glob("*.parquet")} == tables
+    assert (
+        before.items() - {("manifest.json", before["manifest.json"])}
+        <= contents(Path("plain")).items()
+    )
+    for name in tables:
+        table = pandas.read_parquet(f"whole/{name}.parquet")
+        pandas.testing.assert_frame_equal(table, pandas.read_parquet(f"plain/{name}.parquet"))
+        text = pandas.read_csv(f"plain/{name}.csv")
+        pandas.testing.assert_frame_equal(table, text, check_dtype=False)
+    runs, series = seen[-1]
+    assert len(runs) == 7  # of 8, in blocks of 3 seeds and of 1
+    assert runs.dtypes["deliveries"] == "float64"
+    assert series.dtypes["tick"] == series.dtypes["seed"] == "int64"
+    whole = pandas.read_parquet("whole/runs.parquet")
+    parts = runs.merge(whole, "inner")
+    assert len(parts) == len(runs)
+    assert call("archive", ["plain"], capsys)[0] == 0
+    status, out, _ = call("reproduce", ["plain.zip"], capsys)
+    assert status == 0
+    assert "equal      series.parquet" in out
 
 
 def blocks_of(folder):
