@@ -245,8 +245,13 @@ class Place(OfCells, path="place"):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
+        if self.kind is not None and not task.foods:
+            raise AntsError(
+                f"`place.kind` is {self.kind!r}, but the task has no kinds of food; leave it out, "
+                "or add kinds to `task.foods`."
+            )
         if self.kind is not None:
-            check_one_of("place.kind", self.kind, tuple(task.foods))
+            check_one_of("`place.kind`", self.kind, tuple(task.foods))
 
     def apply(self, to: Interventions) -> None:
         cells = to.index(self.cells)
@@ -308,7 +313,7 @@ class Trail(OfCells, path="trail"):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
-        check_one_of("trail.field", self.field, (TRAIL, *task.fields))
+        check_one_of("`trail.field`", self.field, (TRAIL, *task.fields))
 
     def apply(self, to: Interventions) -> None:
         self.check_in(to.colony.worlds[0], to.colony.task, to.colony.learns)
@@ -354,8 +359,10 @@ class TaskNumbers(Intervention, path="task"):
             if rest and group in _NAMED:
                 entry = _NAMED[group].entry.entry_named(of)  # type: ignore[attr-defined]
                 before = f"{entry.path}."
+                inner = ((one.path.removeprefix(before), one) for one in all_of(entry))
                 here = {
-                    f"{group}.{of}.{one.path.removeprefix(before)}": one for one in all_of(entry)
+                    f"{group}.{of}.{key}": one._replace(path=f"task.{group}.{of}.{key}")
+                    for key, one in inner
                 }
             if name not in here:
                 raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")

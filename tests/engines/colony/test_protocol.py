@@ -268,6 +268,7 @@ WRONG = [
     (lambda: When("living", trail=0), "`when` needs a bound"),
     (lambda: When("synchrony", above=1, trail=0), "needs the series of 'activity'"),
     (lambda: At(3, task={"fields.a.levl": 3}), "`task.fields.a.levl` is not a setting"),
+    (lambda: At(3, task={"castes.a.epsilon": -1}), "`task.castes.a.epsilon` is -1; it must be"),
     (lambda: from_dict({"explode": 1}), "the name of an intervention is 'explode'"),
     (lambda: from_dict(3), "an intervention is 3; it must be a table"),
 ]
@@ -288,6 +289,10 @@ WRONG_IN_A_RUN = [
     ([At(9, add_ants=5), At(50, ants=9)], "after 9 ticks, 5 ants cannot join 20 ants, because"),
     (When("living", above=3, epsilon=0.3), "`when.epsilon` would change all 2 worlds"),
     (At(9, learning_rate=0.3), "the ants do not learn"),
+    (
+        At(9, place={"what": "food", "cells": [[1, 0, 0]], "kind": "seed"}),
+        "`place.kind` is 'seed', but the task has no kinds of food; leave it out, or add",
+    ),
     (At(9, place={"what": "queen", "cells": [[9, 0, 0]]}), "the queen cannot move to cell"),
 ]
 
