@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from taichi_ants.checks import check_follows, check_learns
+from taichi_ants.checks import check_follows, check_learns, check_same_kernels
 from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
 from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
@@ -389,7 +389,7 @@ class TaskNumbers(Intervention, path="task"):
         return task.but(**nested(dict(self.values)))
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
-        self.changed(task)
+        check_same_kernels(task, self.changed(task), learns)
 
     def apply(self, to: Interventions) -> None:
         to.set_task(self.changed(to.colony.task))

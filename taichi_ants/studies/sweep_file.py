@@ -20,7 +20,6 @@ from taichi_ants.studies import design
 from taichi_ants.studies.design import Axis, Choices, Range
 from taichi_ants.studies.points import ColonyPoint, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
-from taichi_ants.task.field import TRAIL
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = (  # keys that are not settings of points
@@ -77,7 +76,7 @@ def measure_of(kind: str, name: str) -> Measure:
 
 def _registered(kind: str) -> set[str]:
     """Return the names of registered measures that sweeps of this kind can have."""
-    return set(measures.names()) - {"occupancy"} if kind == "colony" else set()
+    return set(measures.names()) - set(measures.ARRAYS) if kind == "colony" else set()
 
 
 def _names_of(kind: str) -> str:
@@ -164,10 +163,8 @@ class Base(NamedTuple):
                 raise AntsError(
                     f"{name} needs {least} episodes; use more or choose another measure."
                 )
-            whole, _, part = name.partition(".")
-            if whole == "entropy" and part and part not in (TRAIL, *point.task.fields):
-                allowed = ", ".join(f"{whole}.{one}" for one in (TRAIL, *point.task.fields))
-                raise AntsError(f"{name!r} is not a part of {whole}; choose one of {allowed}.")
+            if isinstance(point, ColonyPoint):
+                measures.check_part(name, point.places_of_evaluation[0], point.task)
         return point
 
 
