@@ -242,8 +242,8 @@ def check_queen(event: Event, of: Sequence[Event], world: World, length: int) ->
     cell = indices(world.grid, place.cells)
     if np.isin(cell, world.grid.index(np.vstack([world.obstacles, world.queens]))):
         raise AntsError(
-            f"`place.cells` is {shown(place.cells)}, where the world has rock or a queen, so the "
-            "queen cannot move there; choose an empty cell."
+            f"`place.cells` has the cell {place.cells[0]}, where the world has rock or a queen, so "
+            "the queen cannot move there; choose an empty cell."
         )
     if not isinstance(event, When) and len(event.times(length)) > 1:
         raise AntsError(

@@ -561,7 +561,7 @@ WRONG_EVENTS = {
     ),
     "queen": (
         *("trail = 0", 'place = { what = "queen", cells = [[0, 0, 0]] }'),
-        ["in [[at]] number 1, in the training, `place.cells` is ((0, 0, 0),), where the world has"],
+        ["in [[at]] number 1, in the training, `place.cells` has the cell (0, 0, 0), where"],
     ),
     "queen again": (
         *("add_ants = 1", 'place = { what = "queen", cells = [[0, 0, 1]] }'),
