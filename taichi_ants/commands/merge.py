@@ -29,6 +29,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add = parser.add_argument
     add("folders", type=Path, nargs="+", metavar="FOLDER", help="folders of shards")
     add("--out", type=Path, required=True, metavar="FOLDER", help="write the results here")
+    add("--force", action="store_true", help="replace other results in the folder of --out")
     return parser.parse_args(arguments)
 
 
@@ -36,7 +37,7 @@ def merge(settings: argparse.Namespace) -> None:
     """Join the blocks of shards, then run their command, which finds all blocks."""
     from taichi_ants.studies.shards import join
 
-    manifest = join(settings.folders, settings.out)
+    manifest = join(settings.folders, settings.out, settings.force)
     options = {**manifest["options"], "shard": None, "workers": None, "ray": None, "force": False}
     options |= {name: Path(options[name]) for name in ("file",) if options.get(name)}
     started(manifest["command"], {**options, "out": settings.out})

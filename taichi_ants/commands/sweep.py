@@ -84,7 +84,8 @@ def _search(settings: argparse.Namespace, asked: Search, inputs: Mapping[str, by
             found = asked.measured(blocks, progress, **how)
         asked.write(found, ready, draws=not settings.no_figures)
 
-    more: dict[str, Any] = {"take": asked.take, "inputs": inputs, "grows_in": "search.trials"}
+    more: dict[str, Any] = {"take": asked.take, "inputs": inputs}
+    more |= {"grows_in": ("search.trials", "search.held_out")}
     work_or_show(settings, asked.facts(), work, **more)
 
 

@@ -1,14 +1,14 @@
 """Folders of results, which never mix results of different settings.
 
 Work in progress is in the subfolder `unfinished`: blocks, ready results, and a manifest with the
-settings. At the end the results move up. The manifest moves last, which marks the work as finished.
+settings, in two copies. At the end the results move up. The manifest moves last, which marks the
+work as finished.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import math
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,9 +17,10 @@ from pathlib import Path
 from typing import Any
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, count, shown
 
 MANIFEST = "manifest.json"
+SPARE = "manifest-copy.json"  # in UNFINISHED, because blocks are of no use without a manifest
 REPORT = "report.txt"  # the text that commands print
 PAGE = "report.html"  # the whole result as a page
 INPUTS = "inputs"  # in finished results: copies of the files that the study has read
@@ -27,6 +28,7 @@ UNFINISHED, BLOCKS = "unfinished", "blocks"  # the folder of work in progress, a
 ROWS, FAILED = "rows", "failed.json"  # in UNFINISHED: tables of finished blocks, failed blocks
 # Settings that results of the same runs can differ in, with checksums of plugins.
 _OF_ALL_RUNS = ("version", "kind", "measures", "measure_every", "arch", "plugin")
+_SHOWN = 3  # values of a setting, at most, in a message
 
 
 class ResultFolder:
@@ -38,8 +40,8 @@ class ResultFolder:
         leading: Settings that determine others; if they differ, messages name only these.
         runs: The result of `Study.runs`, if the work is a study.
         grows: Whether finished results of a part of these runs can become a part of the results.
-        grows_in: The name of a setting, a number, instead of runs: results of a smaller number are
-            a part of those of a larger one.
+        grows_in: The names of settings, instead of runs: results with smaller numbers, or with a
+            part of a list, are a part of those with larger ones.
     """
 
     def __init__(
@@ -49,7 +51,7 @@ class ResultFolder:
         leading: Sequence[str] = (),
         runs: Mapping[str, Any] | None = None,
         grows: bool = False,
-        grows_in: str = "",
+        grows_in: Sequence[str] = (),
     ) -> None:
         self.path = Path(path)
         self._runs, self._grows, self._grows_in = {"runs": runs} if runs else {}, grows, grows_in
@@ -66,9 +68,9 @@ class ResultFolder:
         on them.
         """
         for place, what in ((self._unfinished, "unfinished work"), (self.path, "results")):
-            if not (place / MANIFEST).exists():
+            manifest = manifest_in(place)
+            if not manifest:
                 continue
-            manifest = read_manifest(place)
             other = manifest["settings"]
             if other == self._settings:
                 return place == self.path
@@ -76,12 +78,15 @@ class ResultFolder:
                 return False
             if place == self._unfinished and self._is_part(manifest):
                 continue
-            keys = dict.fromkeys([*self._settings, *other])
-            different = [key for key in keys if self._settings.get(key) != other.get(key)]
-            different = [key for key in different if key in self._leading] or different
+            name = files.named(self.path)
+            if lost := self._lost(manifest):
+                raise AntsError(
+                    f"{name} contains {what} that this study lacks ({', '.join(lost)}); add them, "
+                    "choose another --out, or give --force to replace all."
+                )
             raise AntsError(
-                f"{str(self.path)!r} contains {what} of other settings ({', '.join(different)} "
-                "differ); choose another --out, or give --force to replace them."
+                f"{name} contains {what} of other settings ({self._differences(other)}); choose "
+                "another --out, or give --force to replace them."
             )
         if self.path.is_dir() and any(item != self._unfinished for item in self.path.iterdir()):
             raise AntsError(
@@ -92,18 +97,17 @@ class ResultFolder:
 
     def part(self) -> dict[str, Any] | None:
         """Return the manifest of finished results that are a part of these; None without any."""
-        if self._grows and (self.path / MANIFEST).exists():
-            manifest = read_manifest(self.path)
-            if manifest["settings"] != self._settings and self._is_part(manifest):
-                return manifest
+        manifest = manifest_in(self.path) if self._grows else None
+        if manifest and manifest["settings"] != self._settings and self._is_part(manifest):
+            return manifest
         return None
 
     def _is_part(self, manifest: Mapping[str, Any]) -> bool:
         """Return whether all that a manifest has is also a part of this work."""
         if self._grows_in:
-            smaller, larger = dict(manifest["settings"]), dict(self._settings)
-            size, most = smaller.pop(self._grows_in, math.inf), larger.pop(self._grows_in)
-            return smaller == larger and size <= most
+            other, this = dict(manifest["settings"]), dict(self._settings)
+            sizes = [(other.pop(name, None), this.pop(name)) for name in self._grows_in]
+            return other == this and all(_is_within(*pair) for pair in sizes)
         settings, own, theirs = manifest["settings"], self._runs.get("runs"), manifest.get("runs")
         if any(settings.get(name) != self._settings.get(name) for name in _OF_ALL_RUNS):
             return False
@@ -112,6 +116,36 @@ class ResultFolder:
         wanted, nothing = seeds_by_point(own), frozenset[str]()
         found = seeds_by_point(theirs).items()
         return all(seeds <= wanted.get(point, nothing) for point, seeds in found)
+
+    def _lost(self, manifest: Mapping[str, Any]) -> list[str]:
+        """Return in words what a manifest has that this study lacks, if it has runs of both."""
+        runs, others = self._runs.get("runs"), manifest.get("runs")
+        if not (runs and others and {*runs["points"]} & {*others["points"]}):
+            return []
+        own, theirs = self._settings, manifest["settings"]
+        here, there, found = *(_varied(one, self._leading) for one in (own, theirs)), list[str]()
+        if theirs.get("design"):  # each sample has its own values
+            samples = [row for row in theirs["vary"] if row not in own["vary"]]
+            found += [count(len(samples), "sample")] if samples else []
+            there = {"seed": there["seed"]}
+        for name, values in there.items():
+            lost = [shown(one) for one in values if one not in here.get(name, [])]
+            if lost:
+                more = " ..." if len(lost) > _SHOWN else ""
+                found.append(f"{name} {', '.join(lost[:_SHOWN])}{more}")
+        return found
+
+    def _differences(self, other: Mapping[str, Any]) -> str:
+        """Return in words how settings differ from those of this work."""
+        own, rest, parts = self._settings, list[str](), list[str]()
+        names = [name for name in dict.fromkeys([*own, *other]) if own.get(name) != other.get(name)]
+        for name in [one for one in names if one in self._leading] or names:
+            one, others = own.get(name), other.get(name)
+            if {type(one), type(others)} & {list, dict} or not (name in own and name in other):
+                rest.append(name)
+            else:
+                parts.append(f"{name} is {shown(others)} instead of {shown(one)}")
+        return ", ".join([*parts, *([f"not the same {', '.join(rest)}"] if rest else [])])
 
     def check(self, may_lack: str | None = None) -> None:
         """Check that no file of finished results is altered or missing, except `may_lack`."""
@@ -122,7 +156,7 @@ class ResultFolder:
             if not path.is_file() or checksum_of(path) != checksum:
                 raise AntsError(
                     f"{str(path)!r}, a part of the results, is missing or has changed since they "
-                    "were finished; restore it, or give --force to run everything again."
+                    "were finished; restore it, or run their command again with --force."
                 )
 
     @contextmanager
@@ -141,16 +175,19 @@ class ResultFolder:
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
         try:
             # Without a manifest, the settings of the blocks are unknown.
-            if replace or not (self._unfinished / MANIFEST).exists():
+            if replace or not manifest_in(self._unfinished):
                 self._clear()
             for folder in (self._blocks, self._ready):
                 files.check_writable_folder(folder, self.path)
             self.seconds_before = seconds_of(self._unfinished)
+            if not (replace or self.seconds_before):
+                self.seconds_before = (self.part() or {}).get("seconds", 0.0)
             with tempfile.TemporaryDirectory(dir=self._ready) as name:
                 ready = Path(name)
                 contents = {"settings": self._settings, "seconds": self.seconds_before}
                 contents |= {**self._runs, **(more or {})}
-                _write_manifest(contents, ready).replace(self._unfinished / MANIFEST)
+                for name in (SPARE, MANIFEST):  # one after the other, so that one is always whole
+                    _write_manifest(contents, ready).replace(self._unfinished / name)
                 try:
                     yield self._blocks, ready
                 except (AntsError, OSError) as error:
@@ -203,14 +240,15 @@ class ResultFolder:
 
     def tidy(self) -> None:
         """Remove the files that a process left if it was killed after it had finished the work."""
-        if not (self._unfinished / MANIFEST).exists():
+        if not manifest_in(self._unfinished):
             self._clear()
 
     def _clear(self) -> None:
         """Remove the files of this class in `unfinished`, and the folder if it is then empty."""
         if not self._unfinished.is_dir():
             return
-        (self._unfinished / MANIFEST).unlink(missing_ok=True)
+        for name in (SPARE, MANIFEST):
+            (self._unfinished / name).unlink(missing_ok=True)
         for folder in (self._blocks, self._ready, self._unfinished / ROWS):
             shutil.rmtree(folder, ignore_errors=True)
         (self._unfinished / FAILED).unlink(missing_ok=True)
@@ -218,7 +256,27 @@ class ResultFolder:
             self._unfinished.rmdir()
 
     def _listed(self) -> dict[str, str]:
-        return read_manifest(self.path)["files"] if (self.path / MANIFEST).exists() else {}
+        return (manifest_in(self.path) or {"files": {}})["files"]
+
+
+def _varied(settings: Mapping[str, Any], leading: Sequence[str]) -> dict[str, list[Any]]:
+    """Return the values of the settings that vary in a study, each once, and its seeds."""
+    if rows := settings.get("vary"):
+        several = {name: [row.get(name) for row in rows] for row in rows for name in row}
+    else:
+        names = [one for one in leading if one in settings] or [n for n in settings if "." in n]
+        several = {n: settings[n] for n in names if isinstance(settings[n], list)}
+    found = {"seed": settings["seeds"]}
+    for name, values in several.items():
+        found[name] = [one for n, one in enumerate(values) if one not in values[:n]]
+    return found
+
+
+def _is_within(one: Any, other: Any) -> bool:
+    """Return whether a number is at most another one, or a list is a part of another one."""
+    if isinstance(other, list):
+        return isinstance(one, list) and all(value in other for value in one)
+    return one is not None and one <= other
 
 
 def seconds_of(unfinished: Path) -> float:
@@ -226,12 +284,19 @@ def seconds_of(unfinished: Path) -> float:
 
     A process starts by writing a manifest with the time before, and ends with its last block.
     """
-    manifest = unfinished / MANIFEST
-    if not manifest.exists():
+    manifest = manifest_in(unfinished)
+    if not manifest:
         return 0.0
-    started = manifest.stat().st_mtime
+    started = start_of(unfinished)
     times = [block.stat().st_mtime for block in (unfinished / BLOCKS).rglob("*.npz")]
-    return read_manifest(unfinished)["seconds"] + max([started, *times]) - started
+    return manifest["seconds"] + max([started, *times]) - started
+
+
+def start_of(unfinished: Path) -> float:
+    """Return when the last process began with unfinished work, in seconds since the epoch."""
+    with suppress(FileNotFoundError):
+        return (unfinished / MANIFEST).stat().st_mtime
+    return (unfinished / SPARE).stat().st_mtime
 
 
 def seeds_by_point(runs: Mapping[str, Any]) -> dict[str, frozenset[str]]:
@@ -240,17 +305,34 @@ def seeds_by_point(runs: Mapping[str, Any]) -> dict[str, frozenset[str]]:
     return {point: seeds[n] for point, n in zip(runs["points"], runs["seeds_of"], strict=True)}
 
 
+def manifest_in(folder: Path) -> dict[str, Any] | None:
+    """Return the contents of the manifest in a folder, or of its copy; None without any.
+
+    Raises:
+        AntsError: All that there is of the two is damaged.
+    """
+    there = [folder / name for name in (MANIFEST, SPARE) if (folder / name).exists()]
+    for path in there:
+        with suppress(AntsError):
+            return _contents_of(path)
+    return _contents_of(there[0]) if there else None
+
+
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Return the contents of the manifest in a folder; AntsError if it is damaged."""
+    """Return the contents of the manifest in a folder; AntsError if it is missing or damaged."""
+    return manifest_in(folder) or _contents_of(folder / MANIFEST)
+
+
+def _contents_of(path: Path) -> dict[str, Any]:
     try:
-        manifest = json.loads(files.read_text(folder / MANIFEST))
+        manifest = json.loads(files.read_text(path))
         if manifest.pop("checksum") != files.checksum_of_json(manifest):
             raise ValueError("the checksum differs")
         return manifest
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise AntsError(
-            f"{str(folder / MANIFEST)!r} is damaged or of another version, so the command cannot "
-            "use this folder; choose another --out."
+            f"{files.named(path)} is damaged or of another version of the package; restore it, or "
+            "remove it and run the command of this folder again."
         ) from error
 
 

@@ -25,6 +25,7 @@ from taichi_ants.learners.registry import BUILT_IN as LEARNERS
 from taichi_ants.protocol import EVENTS
 from taichi_ants.report.page import text_of
 from taichi_ants.settings import Setting, all_of, declared, flat, named_groups
+from taichi_ants.studies.design import axes_of
 from taichi_ants.studies.points import ColonyPoint, RunPoint
 from taichi_ants.studies.sweep_file import MEASURES
 from taichi_ants.task import Task, observations
@@ -70,8 +71,11 @@ class Model:
     def __init__(
         self, settings: Mapping[str, Any], asked: Mapping[str, Any], sweep: Mapping[str, Any]
     ) -> None:
-        self.settings, self.options, self.command = settings, asked["options"], asked["command"]
-        self.sweep = sweep
+        self.sweep, self.search = sweep, sweep.get("search", {})
+        self.searched = dict(axes_of(self.search.get("vary", {})))
+        own = {name: _tried(settings.get(name), one) for name, one in self.searched.items()}
+        self.settings = {**settings, **own}
+        self.options, self.command = asked["options"], asked["command"]
         self.of_colony = "ants" in settings
         self.seeds = settings["seeds"]
         self.places = [one for place in settings["worlds"] for one in _list_of(place)]
@@ -142,6 +146,8 @@ class Model:
 
     def varied(self) -> list[str]:
         """Return the names of the settings that differ between points."""
+        if self.searched:
+            return _quoted(self.searched)
         if rows := self.settings.get("vary"):
             names = dict.fromkeys(name for row in rows for name in row)
             return [f"`{n}`" for n in names if len({str(row.get(n)) for row in rows}) > 1]
@@ -192,11 +198,13 @@ class Model:
     def _given_of_worlds(self) -> dict[str, list[Any]]:
         given = flat({"world": self.sweep.get("world", {})}) if self.sweep else self.options
         found: dict[str, list[Any]] = {}
-        for table in (given, *(self.settings.get("vary") or ())):
+        tried = {name: self.values(name) for name in self.searched}
+        for table in (given, *(self.settings.get("vary") or ()), tried):
             for name, value in table.items():
                 if name == "world" or name.startswith("world."):
                     own = found.setdefault("preset" if name == "world" else name[6:], [])
-                    own += [value] if value not in own else []
+                    several = value if table is tried else [value]
+                    own += [one for one in several if one not in own]
         return found
 
     def world_settings(self) -> dict[str, list[Any]]:
@@ -302,6 +310,15 @@ class Model:
         return found
 
 
+def _tried(usual: Any, axis: Any) -> list[Any]:
+    """Return the values of a setting in a search: the default, and choices or a range in words."""
+    if isinstance(axis, Mapping):
+        low, high = axis["from"], axis["to"]
+        is_within = isinstance(usual, (int, float)) and low <= usual <= high
+        return [f"{low} to {high}", *([] if is_within or usual is None else [usual])]
+    return [*([] if usual is None or usual in axis else [usual]), *axis]
+
+
 def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the ODD description of finished results, as Markdown."""
     asked = manifest["asked"]
@@ -324,6 +341,7 @@ def described(model: Model, command: str) -> str:
     return how.from_string(text_of("odd.md")).render(
         command=command,
         model=model,
+        settings=model.settings,
         colony=model.of_colony,
         most=_MOST,
         texts=RULES,

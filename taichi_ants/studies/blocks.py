@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -67,6 +68,15 @@ class Blocks:
                 self._drop(path)
                 continue
             yield list(points), list(next(iter(points.values())).seeds), outcome
+
+    def damaged(self) -> list[Path]:
+        """Return the files in the folder that are not whole blocks; reads all of them."""
+        return [one for one in sorted(self.folder.glob("block-*.npz")) if not self._is_whole(one)]
+
+    def _is_whole(self, path: Path) -> bool:
+        with suppress(ValueError):  # includes AntsError
+            return path == self._path(_header(path)) and bool(read(path))
+        return False
 
     def add(self, points: Sequence[str], seeds: Sequence[str], outcome: Outcome) -> None:
         """Write a block, arrays (points, seeds, ...); AntsError if it cannot be written."""

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
-from taichi_ants.files.results import MANIFEST, UNFINISHED, read_manifest
+from taichi_ants.files.results import UNFINISHED, manifest_in
 
 GRID, LATIN_HYPERCUBE, SOBOL, RANDOM = DESIGNS = ("grid", "latin_hypercube", "sobol", "random")
 KEYS = ("design", "samples", "design_seed", "sensitivity")
@@ -220,9 +220,8 @@ class Design:
             AntsError: The folder has such results, finished or not, or a damaged manifest.
         """
         for place in (out, out / UNFINISHED):
-            if self.kind != LATIN_HYPERCUBE or not (place / MANIFEST).exists():
-                continue
-            other = read_manifest(place)["settings"].get("design") or {}
+            manifest = manifest_in(place) if self.kind == LATIN_HYPERCUBE else None
+            other = (manifest or {"settings": {}})["settings"].get("design") or {}
             if other.get("design") == self.kind and other["samples"] != self.samples:
                 raise AntsError(
                     f"{str(out)!r} contains a Latin hypercube of {other['samples']} samples, which "

@@ -20,6 +20,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
@@ -38,6 +39,7 @@ from taichi_ants.studies.compilation import compile_once
 from taichi_ants.studies.interruption import stop_if_noted
 
 TRIES = 3  # of a block, before it counts as failed
+RESUME = "finished parts are saved, so run the same command again to resume"  # ends messages
 _LOOK_EVERY = 0.5  # seconds between looks for Ctrl-C
 
 Plugin = tuple[str, str]  # the name and the text of a plugin file, which travel to the workers
@@ -51,6 +53,12 @@ class Executor(Protocol):
 
     def submit(self, call: Callable[..., Any], /, *arguments: Any) -> Future[Any]:
         """Return the future of a call, which runs elsewhere or later."""
+
+
+class LostWorkersError(AntsError):
+    """There are no more workers for a study, whose finished blocks are saved."""
+
+    exit_status = 1
 
 
 @dataclass(frozen=True)
@@ -154,7 +162,7 @@ def completed(
         plugins: Plugins that the workers need.
 
     Raises:
-        AntsError: The executor takes no more work.
+        LostWorkersError: The executor takes no more work.
     """
     of_study = versions()
     source, again, alone = iter(pieces), deque[Piece](), deque[Piece]()
@@ -181,9 +189,9 @@ def completed(
                 try:
                     future = executor.submit(do, of_study, tuple(plugins), pickled)
                 except (BrokenExecutor, RuntimeError) as refusal:
-                    raise AntsError(
+                    raise LostWorkersError(
                         f"the executor takes no more work ({type(refusal).__name__}: {refusal}); "
-                        "finished parts are saved, so run the study again to resume."
+                        f"{RESUME}."
                     ) from refusal
                 coming[future] = piece
             if not coming:
@@ -199,7 +207,7 @@ def completed(
                     continue
                 failures[piece] += 1
                 if failures[piece] == TRIES:
-                    yield piece, error
+                    yield piece, _died(error) if isinstance(error, BrokenExecutor) else error
                 elif failures[piece] == TRIES - 1 and isinstance(error, BrokenExecutor):
                     alone.append(piece)
                 else:
@@ -218,6 +226,15 @@ def _error_of(future: Future[Any]) -> Exception | None:
     if error is None or isinstance(error, Exception):
         return error
     return RuntimeError(f"{type(error).__name__}: {error}")  # a SystemExit, for example
+
+
+def _died(error: BrokenExecutor) -> LostWorkersError:
+    """Return the error of a block whose workers have died in all tries."""
+    how = "" if isinstance(error, BrokenProcessPool) else f" ({error})"  # its text has no cause
+    return LostWorkersError(
+        f"{TRIES} workers died at this block, perhaps because memory was short{how}, so use "
+        "fewer workers"
+    )
 
 
 class LocalWorkers:

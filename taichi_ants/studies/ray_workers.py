@@ -6,6 +6,7 @@ import os
 import pickle
 import signal
 import socket
+import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Future
@@ -17,7 +18,7 @@ from typing import Any
 from taichi_ants.errors import AntsError, count
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies import executors
-from taichi_ants.studies.executors import check_versions
+from taichi_ants.studies.executors import RESUME, LostWorkersError, check_versions
 
 _WAIT = 3.0  # seconds for an answer of the cluster
 _WAIT_FOR_WORKERS = 120.0  # seconds for the first worker of each machine
@@ -54,6 +55,7 @@ class RayWorkers:
         self._needs = {"CPU": threads, "GPU": int(arch == "cuda")}
         self._counted, self._workers = -_COUNT_EVERY, 0
         self._ended = ""  # why there are no workers any more
+        self._head = ""  # HOST:PORT
 
     def __enter__(self) -> RayWorkers:
         for name, value in _ENVIRONMENT.items():
@@ -70,6 +72,9 @@ class RayWorkers:
                 'Ray is not installed; run pip install "taichi_ants[ray]", or leave out --ray.'
             ) from error
         self._ray = ray
+        # With `log_to_driver=False`, Ray still prints the deaths of machines to standard output.
+        if (private := sys.modules.get("ray._private.worker")) is not None:
+            vars(private)["print_to_stdstream"] = lambda *given, **more: None
         where: dict[str, Any] = {"address": self.address or "local"}
         if not self.address:
             where |= {"num_cpus": available_threads(), "include_dashboard": False}
@@ -92,6 +97,7 @@ class RayWorkers:
         except BaseException:
             ray.shutdown()
             raise
+        self._head = ray.get_runtime_context().gcs_address
         needs = {"num_cpus": self._needs["CPU"], "num_gpus": self._needs["GPU"]}
         # The study repeats what fails. A worker computes any number of blocks.
         self._task = ray.remote(**needs, max_retries=0, max_calls=0)(_call)
@@ -112,8 +118,14 @@ class RayWorkers:
 
     @property
     def num_workers(self) -> int:
-        """The number of workers for which the machines that are alive have room."""
+        """The number of workers for which the machines that are alive have room.
+
+        Raises:
+            LostWorkersError: The head of the cluster has died. Ray itself would end this process a
+                minute later, without a message.
+        """
         if time.monotonic() - self._counted >= _COUNT_EVERY:
+            self._check_head()
             self._counted = time.monotonic()
             self._workers = sum(self._room(node["Resources"]) for node in self._alive())
         return self._workers
@@ -121,6 +133,20 @@ class RayWorkers:
     def state(self) -> str:
         """Return the numbers of workers and of finished calls, for progress bars."""
         return f"{count(self._workers, 'worker')}, {count(self.finished, 'block')}"
+
+    def _check_head(self) -> None:
+        """Raise LostWorkersError if the head of the cluster, once it is known, does not listen."""
+        if not self._head:
+            return
+        with suppress(AntsError):
+            return _check_listens(self._head)
+        time.sleep(_WAIT)
+        try:
+            _check_listens(self._head)
+        except AntsError as error:
+            raise LostWorkersError(
+                f"the head of the Ray cluster at {self._head!r} does not listen any more; {RESUME}."
+            ) from error
 
     def _alive(self) -> list[dict[str, Any]]:
         return [node for node in self._ray.nodes() if node["Alive"]]

@@ -7,18 +7,29 @@ import re
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from taichi_ants import __version__, files
 from taichi_ants.errors import AntsError, count, shown
 from taichi_ants.files import bundles, inputs
-from taichi_ants.files.results import MANIFEST, PAGE, UNFINISHED, ResultFolder, read_manifest
+from taichi_ants.files.results import (
+    MANIFEST,
+    PAGE,
+    UNFINISHED,
+    ResultFolder,
+    manifest_in,
+    read_manifest,
+)
 from taichi_ants.studies.provenance import packages, source
+from taichi_ants.studies.search import STORAGE
 
 RESULTS = "results/"  # begins the names of the files of a results folder in an archive
 COMMANDS = ("sweep", "compare", "colony")
 _SOURCE = re.compile(rb"(<dt>(Command|Finished|Commit|Versions|Machine|Time)</dt><dd>).*?</dd>")
+_OF_TRIAL = re.compile(rb'"(worker_id|datetime_start|datetime_complete)": ?"[^"]*",? ?')
 _SHOWN = 5  # versions that differ, at most, in a message
 
 
@@ -29,14 +40,14 @@ def checked_manifest(folder: Path) -> dict[str, Any]:
         AntsError: The folder has no finished results of this version, a file is missing or has
             changed, or its command cannot be repeated.
     """
-    if not (folder / MANIFEST).exists():
-        if (folder / UNFINISHED / MANIFEST).exists():
+    manifest = manifest_in(folder)
+    if not manifest:
+        if manifest_in(folder / UNFINISHED):
             raise AntsError(
                 f"{str(folder)!r} has unfinished work; run its command again to finish it, then "
                 "archive it."
             )
         raise AntsError(f"{str(folder)!r} has no results; name the folder of a finished study.")
-    manifest = read_manifest(folder)
     version = manifest["settings"].get("version")
     if version != __version__ or "asked" not in manifest:
         written = f"version {version}" if version != __version__ else "an older state"
@@ -44,10 +55,10 @@ def checked_manifest(folder: Path) -> dict[str, Any]:
             f"{str(folder)!r} has results of {written} of this package, and this is {__version__}; "
             "archive it with that version, or run the command again with --force."
         )
-    if manifest["asked"]["command"] not in COMMANDS or "runs" not in manifest:
+    if manifest["asked"]["command"] not in COMMANDS:
         raise AntsError(
-            f"{str(folder)!r} has results of another kind; name a folder of a sweep with [vary], "
-            "a comparison or a colony study."
+            f"{str(folder)!r} has results of another kind; name a folder of a sweep, a comparison "
+            "or a colony study."
         )
     ResultFolder(folder, manifest["settings"]).check()
     return manifest
@@ -155,8 +166,11 @@ def unpacked(bundle: bundles.Bundle, manifest: Mapping[str, Any]) -> Iterator[di
 
 def other_versions(manifest: Mapping[str, Any]) -> str:
     """Return which versions of this process differ from those of a run, in words; "" if none do."""
-    here: dict[str, Any] = {"Python": platform.python_version(), **packages()}
     there: dict[str, Any] = {"Python": manifest["python"], **manifest["packages"]}
+    here: dict[str, Any] = {"Python": platform.python_version(), **packages()}
+    for name in there.keys() - here.keys():  # those that this process has not imported yet
+        with suppress(metadata.PackageNotFoundError):
+            here[name] = metadata.version(name)
     names = {n: n.replace("taichi_ants", "taichi-ants") for n in there}
     found = [
         f"{names[n]} {here.get(n, 'is missing')} instead of {one}"
@@ -189,7 +203,8 @@ def compare(
 ) -> Iterator[Compared]:
     """Yield each file of the results in a bundle and in a folder, with its first difference.
 
-    Pages and manifests name the command, the time and the machine of a run. These facts may differ.
+    Pages, manifests and the trials of searches name the command, the time or the machine of a run.
+    These facts may differ.
     """
     made = read_manifest(folder)
     for name in sorted({*manifest["files"], *made["files"]}):
@@ -199,9 +214,9 @@ def compare(
             yield Compared(name, "is not in the archive")
         elif made["files"][name] == manifest["files"][name]:
             yield Compared(name)
-        elif name == PAGE and _without_run(bundle.read(RESULTS + name)) == _without_run(
-            (folder / name).read_bytes()
-        ):
+        elif name in _WITHOUT_RUN and _WITHOUT_RUN[name](
+            bundle.read(RESULTS + name)
+        ) == _WITHOUT_RUN[name]((folder / name).read_bytes()):
             yield Compared(name, note="except the time and the machine of the run")
         else:
             with bundle.open(RESULTS + name) as one, files.opened(folder / name) as other:
@@ -212,9 +227,10 @@ def compare(
     yield Compared(MANIFEST, words, "its settings")
 
 
-def _without_run(page: bytes) -> bytes:
-    """Return a page without the facts about the run."""
-    return _SOURCE.sub(rb"\1</dd>", page)
+_WITHOUT_RUN = {  # functions of the content of a file that leave out the facts about the run
+    PAGE: partial(_SOURCE.sub, rb"\1</dd>"),
+    STORAGE: partial(_OF_TRIAL.sub, b""),
+}
 
 
 def plugins_in_words(bundle: bundles.Bundle, names: list[str]) -> str:

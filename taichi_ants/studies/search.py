@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     import optuna
 
 TRIALS, HELD_OUT, BEST, STORAGE = "trials.csv", "held_out.csv", "best.toml", "optuna.journal"
+# Folders of blocks: of each trial, whose number follows, and of the held-out seeds.
+TRIAL_BLOCKS, HELD_OUT_BLOCKS = "trial-", "held-out"
 COMPLETE, PRUNED, FAILED = "complete", "pruned", "failed"
 _KEYS = ("maximise", "minimise", "trials", "seed", "prune", "prune_after", "held_out", "vary")
 _OF_SWEEPS = ("vary", "against", "margin", "measure_every", *design.KEYS)
@@ -120,13 +122,17 @@ class Search:
 
         default: Any = self.base.point({}, {})
         own = {
-            **{"measures": self.base.measures, "measure": self.measure, "trials": self.trials},
-            **{"maximises": self.maximises, "seed": self.seed, "prune_after": self.prune_after},
-            **{"held_out": self.held_out, "optuna": optuna.__version__},
+            **{"maximise" if self.maximises else "minimise": self.measure, "trials": self.trials},
+            **{"seed": self.seed, "prune_after": self.prune_after, "held_out": self.held_out},
+            "optuna": optuna.__version__,
             "vary": {name: vars(axis) for name, axis in self.axes.items()},
         }
         study: Study[Any] = Study((default,), self.base.seeds)
-        return {**study.settings(), **flat({"search": own})}
+        return {
+            **study.settings(),
+            "measures": self.base.measures,
+            **flat({"search": own}),
+        }
 
     def measured(self, blocks: Path, progress: Progress, **where: Any) -> Found:
         """Return the results; compute what the folder of blocks lacks.
@@ -154,7 +160,7 @@ class Search:
         built: dict[str, Any] = {}
         points = own.point({}, built), own.point(tried[best].settings, built)
         last = part(total - 2 * len(self.held_out), 2 * len(self.held_out))
-        values = self._measures(Study(points, self.held_out), blocks / "held-out", last, where)
+        values = self._measures(Study(points, self.held_out), blocks / HELD_OUT_BLOCKS, last, where)
         return Found(tried, best, values, study)
 
     def take(self, folder: Path, runs: Mapping[str, Any], blocks: Blocks) -> None:
@@ -180,7 +186,9 @@ class Search:
     @staticmethod
     def _place(blocks: Path, number: int, at: slice) -> Path:
         """Return the folder of the blocks of a group of seeds of a trial."""
-        return files.check_writable_folder(blocks / f"trial-{number:05d}" / f"{at.start:05d}")
+        return files.check_writable_folder(
+            blocks / f"{TRIAL_BLOCKS}{number:05d}" / f"{at.start:05d}"
+        )
 
     def _part(self, point: Any, at: slice) -> Study[Any]:
         """Return the study of a point and a group of seeds."""

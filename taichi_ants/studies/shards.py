@@ -17,7 +17,7 @@ from taichi_ants.files.results import (
     MANIFEST,
     UNFINISHED,
     ResultFolder,
-    read_manifest,
+    manifest_in,
     seconds_of,
     seeds_by_point,
 )
@@ -26,28 +26,38 @@ from taichi_ants.studies.blocks import Blocks
 _OF_TIME = "seconds"  # the array that differs from run to run
 
 
-def join(folders: Sequence[Path], out: Path) -> dict[str, Any]:
+def join(folders: Sequence[Path], out: Path, replace: bool = False) -> dict[str, Any]:
     """Copy the blocks of shards into the unfinished work of one folder.
+
+    With `replace`, other results and other unfinished work in `out` are replaced.
 
     Returns:
         The manifest of the first shard.
 
     Raises:
-        AntsError: A folder is not a shard, settings differ, runs are missing, shards contain
-            different results of the same run, or `out` cannot be written.
+        AntsError: A folder is not a shard, settings differ, a block is damaged, runs are missing,
+            shards contain different results of the same run, or `out` cannot be written.
     """
     manifests = [_manifest_of(folder) for folder in folders]
     first = manifests[0]
     for folder, manifest in zip(folders, manifests, strict=True):
         _check_same(folders[0], first, folder, manifest)
-    shards = [Blocks(folder / UNFINISHED / BLOCKS) for folder in folders]
+    shards = [Blocks(folder / UNFINISHED / BLOCKS, drops=False) for folder in folders]
+    for folder, shard in zip(folders, shards, strict=True):
+        if damaged := shard.damaged():
+            raise AntsError(
+                f"{files.named(damaged[0])} is damaged; run the command of the shard in "
+                f"{files.named(folder)} again, which computes such blocks again."
+            )
     _check_complete(first, manifests, shards)
     _check_overlaps(first, folders, shards)
     place = ResultFolder(out, first["settings"], runs=first["runs"])
-    if place.is_finished():
-        raise AntsError(f"{str(out)!r} already has these results; choose another --out.")
+    if not replace and place.is_finished():
+        raise AntsError(
+            f"{str(out)!r} already has these results; choose another --out, or give --force."
+        )
     seconds = sum(seconds_of(folder / UNFINISHED) for folder in folders)
-    with place.work(more={"seconds": seconds}) as (blocks, _), files.writing(out):
+    with place.work(replace, {"seconds": seconds}) as (blocks, _), files.writing(out):
         for folder in folders:
             for path in sorted((folder / UNFINISHED / BLOCKS).glob("*.npz")):
                 with files.unfinished(blocks / path.name) as copy:
@@ -57,10 +67,10 @@ def join(folders: Sequence[Path], out: Path) -> dict[str, Any]:
 
 
 def _manifest_of(folder: Path) -> dict[str, Any]:
-    if not (folder / UNFINISHED / MANIFEST).exists():
+    manifest = manifest_in(folder / UNFINISHED)
+    if not manifest:
         what = "finished results" if (folder / MANIFEST).exists() else "no unfinished work"
         raise AntsError(f"{str(folder)!r} has {what}, not a shard; name folders made with --shard.")
-    manifest = read_manifest(folder / UNFINISHED)
     if not manifest.get("runs") or not manifest.get("command"):
         raise AntsError(
             f"{str(folder)!r} has unfinished work of a command without --shard; name folders made "

@@ -5,13 +5,22 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError, count
-from taichi_ants.files.results import BLOCKS, FAILED, MANIFEST, UNFINISHED, read_manifest
+from taichi_ants.files.results import (
+    BLOCKS,
+    FAILED,
+    UNFINISHED,
+    manifest_in,
+    seconds_of,
+    start_of,
+)
 from taichi_ants.studies.blocks import Blocks
+from taichi_ants.studies.search import HELD_OUT_BLOCKS, TRIAL_BLOCKS
 
 
 def state(folder: Path) -> Iterator[str]:
@@ -21,20 +30,37 @@ def state(folder: Path) -> Iterator[str]:
         AntsError: The folder contains neither results nor unfinished work, or a manifest is
             damaged.
     """
-    is_new = True
-    if (folder / MANIFEST).exists():
-        manifest = read_manifest(folder)
-        runs = manifest.get("runs")
-        several = f" with {count(len(list(_runs_of(runs))), 'run')}" if runs else ""
-        yield f"finished: results{several}, since {manifest['finished']}"
-        is_new = False
-    if (folder / UNFINISHED / MANIFEST).exists():
-        yield from _of_work(folder / UNFINISHED)
-        is_new = False
-    if is_new:
+    finished, unfinished = manifest_in(folder), manifest_in(folder / UNFINISHED)
+    if not (finished or unfinished):
         raise AntsError(
-            f"{str(folder)!r} has neither results nor unfinished work; name the folder of a study."
+            f"{files.named(folder)} has neither results nor unfinished work; name the folder of a "
+            "study."
         )
+    if finished:
+        runs = finished.get("runs")
+        several = f" with {count(len(list(_runs_of(runs))), 'run')}" if runs else ""
+        yield f"finished: results{several}, since {finished['finished']}"
+    if unfinished:
+        yield from _of_work(folder / UNFINISHED, unfinished)
+
+
+def _of_work(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
+    """Yield lines about unfinished work."""
+    times: dict[Path, float] = {}  # by block
+    for path in (folder / BLOCKS).rglob("*.npz"):
+        with suppress(FileNotFoundError):  # the work has just finished
+            times[path] = path.stat().st_mtime
+    several = count(len(times), "block")
+    if manifest.get("runs"):
+        yield from _of_study(folder, manifest, times)
+    elif trials := manifest["settings"].get("search.trials"):
+        yield from _of_search(folder, trials, several)
+    else:
+        yield f"unfinished: {several} done"
+    if (folder / FAILED).exists():
+        yield from (f"failed: {one}" for one in json.loads(files.read_text(folder / FAILED)))
+    if times:
+        yield f"last block: {_duration(max(0.0, time.time() - max(times.values())))} ago"
 
 
 def _runs_of(runs: Mapping[str, Any]) -> Iterator[tuple[str, str, float]]:
@@ -45,42 +71,38 @@ def _runs_of(runs: Mapping[str, Any]) -> Iterator[tuple[str, str, float]]:
             yield point, seed, weight
 
 
-def _of_work(folder: Path) -> Iterator[str]:
-    manifest, saved = read_manifest(folder), folder / BLOCKS
-    paths = list(saved.glob("block-*.npz"))
-    if not (several := manifest.get("runs")):
-        yield f"unfinished: {count(len(list(saved.glob('*.npz'))), 'block')} done"
-        return
-    runs, blocks = list(_runs_of(several)), Blocks(saved, drops=False)
+def _of_study(
+    folder: Path, manifest: Mapping[str, Any], times: Mapping[Path, float]
+) -> Iterator[str]:
+    runs, blocks = list(_runs_of(manifest["runs"])), Blocks(folder / BLOCKS, drops=False)
     done = [run for run in runs if blocks.has(*run[:2])]
     work, total = (sum(weight for *_, weight in some) for some in (done, runs))
-    shard = manifest["options"].get("shard")
+    several = count(len(times), "block")
+    shard = manifest.get("options", {}).get("shard")
     part = f"shard {shard[0]} of {shard[1]}, " if shard else ""
+    if shard and len(done) == len(runs):
+        yield f"finished: {part}{count(len(runs), 'run')}, in {several}"
+        return
     yield (
         f"unfinished: {part}{len(done)} of {count(len(runs), 'run')} done "
-        f"({100 * work / max(total, 1e-9):.0f} % of the work), in {count(len(paths), 'block')}"
+        f"({100 * work / max(total, 1e-9):.0f} % of the work), in {several}"
     )
-    failed = json.loads(files.read_text(folder / FAILED)) if (folder / FAILED).exists() else []
-    yield from (f"failed: {one}" for one in failed)
-    yield from _of_time(folder, blocks, runs, total - work)
+    # The speed of the process that worked last, or of all of them before it has finished a block.
+    started = start_of(folder)
+    when = [times.get(blocks.path_of(*run[:2]) or folder, 0.0) for run in done]
+    new = sum(run[2] for run, at in zip(done, when, strict=True) if at > started)
+    seconds = max(when) - started if new else seconds_of(folder)
+    if seconds > 0 and total > work:
+        yield f"left: about {_duration((total - work) * seconds / (new or work))}"
 
 
-def _of_time(
-    folder: Path, blocks: Blocks, runs: list[tuple[str, str, float]], left: float
-) -> Iterator[str]:
-    """Yield how long is left, at the speed of the process that worked last."""
-    started = (folder / MANIFEST).stat().st_mtime
-    times = {path: path.stat().st_mtime for path in (folder / BLOCKS).glob("block-*.npz")}
-    last = max(times.values(), default=started)
-    if left and last > started:
-        new = 0.0
-        for point, seed, weight in runs:
-            path = blocks.path_of(point, seed)
-            new += weight * (path is not None and times[path] > started)
-        if new:
-            yield f"left: about {_duration(left / new * (last - started))}"
-    if times:
-        yield f"last block: {_duration(max(0.0, time.time() - last))} ago"
+def _of_search(folder: Path, trials: int, several: str) -> Iterator[str]:
+    begun = sorted((folder / BLOCKS).glob(f"{TRIAL_BLOCKS}*"))
+    compares = (folder / BLOCKS / HELD_OUT_BLOCKS).exists()
+    done = trials if compares else int(begun[-1].name.removeprefix(TRIAL_BLOCKS)) if begun else 0
+    yield f"unfinished: {done} of {count(trials, 'trial')} done, in {several}"
+    if 0 < done < trials and (seconds := seconds_of(folder)):
+        yield f"left: about {_duration(seconds / done * (trials - done))}"
 
 
 def _duration(seconds: float) -> str:

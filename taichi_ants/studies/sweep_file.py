@@ -220,15 +220,19 @@ def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
             raise AntsError(f"{name} is an empty list; give at least one value.")
         for one in fixed:  # a group and one of its settings exclude each other, too
             if f"{one}.".startswith(f"{name}.") or f"{name}.".startswith(f"{one}."):
+                other = "" if one == name else f" {one}"
                 raise AntsError(
-                    f"{name} is in [vary] and {one} in the fixed settings; remove one of them."
+                    f"{name} is in [vary] and{other} in the fixed settings; remove one of them."
                 )
         if name in _OF_FILE:
             raise AntsError(f"{name} cannot vary; move it from [vary] to the top of the file.")
         declaration = _declaration(name, fixed)
         if isinstance(values, dict):
-            whole = declaration.kind is int if declaration else name in _whole_numbers(kind)
+            whole = name in ("world.seed", *_whole_numbers(kind))
+            whole = declaration.kind is int if declaration else whole
             axes[name] = axis = Range.of(name, values, whole)
+            if name in _whole_numbers(kind):
+                checked_whole(f"{name}.from", axis.low, 0 if name == "episodes" else 1)
             values = [axis.low, axis.high]
         else:
             if name == "world.ranges" and not all(isinstance(one, list) for one in values):

@@ -13,7 +13,7 @@ from command_lines import ROOT, assert_one_sentence, call, contents
 
 from taichi_ants import AntsError
 from taichi_ants.files import bundles
-from taichi_ants.files.results import ResultFolder, read_manifest
+from taichi_ants.files.results import ResultFolder, checksum_of, read_manifest
 from taichi_ants.studies import reproduction
 
 PLUGIN = '''
@@ -313,6 +313,69 @@ def test_an_archive_that_reads_or_holds_other_files_than_its_study_is_refused(
     assert "does not fit its files" in refused(
         "reproduce", ["other.zip", "--trust-plugins"], capsys
     )
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("preset = ", 'preset = "/etc/hostname" #'), ('policy = "old', 'policy = "../secret.npz" #')],
+)
+def test_a_study_in_an_archive_reads_no_other_files(old, new, copy, capsys):
+    """Also with valid checksums."""
+    Path("../secret.npz").write_bytes((copy / "inputs/rule.npz").read_bytes())
+    path, manifest = copy / "inputs/my.toml", read_manifest(copy)
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+    manifest["files"]["inputs/my.toml"] = checksum_of(path)
+    _write(copy, manifest)
+    assert call("archive", ["copy"], capsys)[0] == 0
+    (wanted,) = [one for one in ("/etc/hostname", "../secret.npz") if one in new]
+    status, _, err = call("reproduce", ["copy.zip", "--trust-plugins"], capsys)
+    assert status == 2
+    assert f"the study reads '{wanted}', which its archive does not contain" in err
+    assert not Path("results").exists()
+
+
+SEARCH = """
+kind = "colony"
+seeds = 2
+ants = 2
+episodes = 0
+ticks = 30
+rollouts = 1
+policy = "trail_follower"
+[search]
+maximise = "deliveries"
+trials = 3
+held_out = 2
+vary.task.pheromone.half_life = { from = 10, to = 1000, scale = "log" }
+vary.task.pheromone.view = ["half", "strongest"]
+[task]
+pheromone.evaporation = "exponential"
+pheromone.half_life = 20
+"""
+
+
+def test_a_search_is_archived_and_reproduced(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(SEARCH)
+    assert call("sweep", ["my.toml", "--out", "done", "--no-figures"], capsys)[0] == 0
+    assert call("archive", ["done"], capsys)[0] == 0
+    Path("my.toml").unlink()
+    status, out, err = call("reproduce", ["done.zip"], capsys)
+    assert (status, err) == (0, "")
+    assert "equal      optuna.journal (except the time and the machine of the run)" in out
+    with bundles.reading(Path("done.zip")) as bundle:
+        odd = bundle.read("ODD.md").decode()
+    assert "chose 3 combinations, one after the other, to maximise the mean of `deliveries`" in odd
+    assert "where the half-life h is 10 to 1000." in odd
+    assert '"strongest"' in odd
+    folder = ResultFolder(Path("done"), read_manifest(Path("done"))["settings"])
+    trials = Path("done/optuna.journal").read_text()
+    folder.add("optuna.journal", trials.replace('"value":', '"value":1', 1))
+    assert call("archive", ["done", "--force"], capsys)[0] == 0
+    status, out, _ = call("reproduce", ["done.zip", "--out", "again"], capsys)
+    assert status == 1
+    assert "DIFFERENT  optuna.journal (first difference at byte " in out
 
 
 def test_an_index_that_declares_less_than_is_there_is_refused(here):

@@ -184,7 +184,7 @@ def test_a_finished_study_grows(finished, remembered, tmp_path, monkeypatch):
     fewer_sizes = [*SMALL[:last_size], *SMALL[last_size + 1 :]]
     status, err = faults.run("colony", [*fewer_sizes, "--out", "out"])
     assert status == 2
-    assert "(sizes differ)" in err
+    assert "that this study lacks (sizes 3)" in err
 
 
 @pytest.mark.slow
@@ -232,9 +232,9 @@ def test_other_arenas_are_the_only_difference_and_their_order_is_none(
     for world_kinds in (["paper", "small"], ["small", "paper", "small"]):
         assert call("colony", [*small, *world_kinds], capsys)[0] == 130
     _, _, err = call("colony", [*small, "paper"], capsys)
-    assert "(world_kinds differ)" in err
+    assert "unfinished work that this study lacks (world_kinds 'small')" in err
     _, _, err = call("colony", [*small, "paper", "small", "--training.discount", 0.8], capsys)
-    assert "(training.discount differ)" in err
+    assert "(training.discount is 0.9 instead of 0.8)" in err
 
 
 @pytest.mark.long

@@ -289,8 +289,8 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     assert (first["baseline"] == "exact bounds") == (training == "on")
     status, _, err = compare(*TINY, "--episodes", 30, "--out", out)
     assert status == 2
-    assert "task.evaporation_in_evaluation differ)" in err
-    assert ("task.evaporation_in_training," in err) == (training == "on")
+    assert "task.evaporation_in_evaluation is " in err
+    assert ("task.evaporation_in_training is" in err) == (training == "on")
 
 
 def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
@@ -439,11 +439,11 @@ def test_altered_results_are_not_shown_as_if_whole(name, copy, compare):
 @pytest.mark.parametrize(
     ("change", "named"),
     [
-        (["--seeds", 2], "seeds"),
-        (["--episodes", 61], "episodes"),
-        (["--max-steps", 46], "max_steps"),
-        (["--discounts", 0.9], "training.discount"),
-        (["--world", "open", "--world.seed", 3], "worlds"),
+        (["--seeds", 2], "that this study lacks (seed "),
+        (["--episodes", 61], "(episodes is 60 instead of 61)"),
+        (["--max-steps", 46], "(max_steps is 45 instead of 46)"),
+        (["--discounts", 0.9], "that this study lacks (training.discount "),
+        (["--world", "open", "--world.seed", 3], "(not the same worlds)"),
     ],
 )
 def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
@@ -451,7 +451,7 @@ def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
     status, _, err = compare(*SMALL, *change, "--out", copy)
     assert status == 2
     assert_one_sentence(err)
-    assert re.search(rf"\(.*\b{named}\b.* differ\)", err)
+    assert named in err
     assert "--force" in err
     assert contents(copy) == before
 

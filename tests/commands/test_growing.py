@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import re
 import shutil
 import signal
 import time
@@ -130,12 +132,12 @@ def test_unfinished_work_grows_too(sweep, monkeypatch):
 @pytest.mark.parametrize(
     ("change", "names"),
     [
-        (("episodes = 6", "episodes = 7"), "episodes"),
-        (("discount = 0.9\n", "discount = 0.8\n"), "training.discount"),
-        (("[7, 2, 5, 1]", "[7, 2, 5]"), "seeds"),
-        (("[0.01, 0.1, 0.2]", "[0.01, 0.1]"), "training.learning_rate, vary"),
-        (("return_all", "return_last50"), "measures"),
-        (("[training]", 'task.delivery = "truncates"\n[training]'), "task.delivery"),
+        (("episodes = 6", "episodes = 7"), "of other settings (episodes is 6 instead of 7)"),
+        (("discount = 0.9\n", "discount = 0.8\n"), "training.discount is 0.9 instead of 0.8"),
+        (("[7, 2, 5, 1]", "[7, 2, 5]"), "that this study lacks (seed 1); add them"),
+        (("[0.01, 0.1, 0.2]", "[0.01, 0.1, 0.3]"), "lacks (training.learning_rate 0.2)"),
+        (("return_all", "return_last50"), "not the same measures"),
+        (("[training]", 'task.delivery = "truncates"\n[training]'), "task.delivery is "),
     ],
 )
 def test_what_contradicts_is_refused_by_name(change, names, sweep):
@@ -143,13 +145,12 @@ def test_what_contradicts_is_refused_by_name(change, names, sweep):
     before = contents(Path("a"))
     status, _, err = sweep(
         RUNS.replace(*change).replace("episodes = 6", "episodes = 50")
-        if names == "measures"
+        if "measures" in names
         else RUNS.replace(*change),
         "a",
     )
     assert status == 2
     assert_one_sentence(err)
-    assert "results of other settings (" in err
     assert names in err
     assert contents(Path("a")) == before
 
@@ -212,6 +213,42 @@ def test_shards_that_do_not_fit_are_refused(sweep, capsys):
     assert "'s1' and 'wrong' have different results for training.learning_rate 0.01, " in err
 
 
+@pytest.mark.parametrize("part", ["header", "array"])
+def test_a_damaged_block_of_a_shard_is_computed_again_by_its_command(part, sweep, capsys):
+    assert sweep(RUNS, "plain")[0] == 0
+    for n in (1, 2):
+        assert sweep(RUNS, f"s{n}", "--shard", f"{n}/2")[0] == 0
+    path = blocks_of("s2")[0]
+    content = bytearray(path.read_bytes())
+    first, *_, header = (one.start() for one in re.finditer(rb"\x93NUMPY", content))
+    content[(header if part == "header" else first) + 130] ^= 1  # after NumPy's 128 bytes
+    path.write_bytes(content)
+    before = contents(Path("s2"))
+    status, _, err = call("merge", ["s1", "s2", "--out", "merged"], capsys)
+    assert status == 2
+    assert_one_sentence(err)
+    assert f"'{path}' is damaged; run the command of the shard in 's2' again" in err
+    assert contents(Path("s2")) == before
+    assert not Path("merged").exists()
+    status, _, err = sweep(RUNS, "s2", "--shard", "2/2")
+    assert status == 0
+    assert "is damaged or has other settings, so it is computed again" in err
+    assert call("merge", ["s1", "s2", "--out", "merged"], capsys)[::2] == (0, "")
+    assert_same_results("plain", "merged")
+
+
+def test_a_merge_replaces_other_results_only_if_asked(sweep, capsys):
+    assert sweep(FEWER["runs"], "merged")[0] == 0
+    assert sweep(RUNS.replace("seeds = [7,", "seeds = [8,"), "other")[0] == 0
+    assert sweep(RUNS, "s1", "--shard", "1/1")[0] == 0
+    for out in ("merged", "other"):
+        status, _, err = call("merge", ["s1", "--out", out], capsys)
+        assert status == 2
+        assert "--force" in err
+        assert call("merge", ["s1", "--out", out, "--force"], capsys)[::2] == (0, "")
+        assert_same_results("merged", out)
+
+
 @pytest.mark.parametrize("shard", ["4/3", "0/3", "2", "a/b", "1/0", "-1/3"])
 def test_shards_that_do_not_exist_are_refused(shard, sweep):
     status, _, err = sweep(RUNS, "a", f"--shard={shard}")
@@ -255,6 +292,60 @@ def test_status_and_rows_of_work_in_progress(sweep, capsys, monkeypatch):
     _, out, _ = call("status", ["a"], capsys)
     assert "finished: results with 24 runs, since" in out
     assert call("status", ["nothing"], capsys)[0] == 2
+
+
+def blocks_of(folder):
+    return sorted(Path(folder, "unfinished/blocks").iterdir(), key=lambda one: one.stat().st_mtime)
+
+
+def test_the_time_left_does_not_count_kept_results_as_new(sweep, capsys, monkeypatch):
+    assert sweep(FEWER["runs"], "a")[0] == 0
+    real, done = RunPoint.do, []
+
+    def stops(*arguments):
+        if done:
+            raise KeyboardInterrupt
+        done.append(arguments[:2])
+        return real(*arguments)
+
+    monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
+    assert sweep(RUNS, "a")[0] == 130
+    ((points, seeds),) = done
+    new = len(points) * len(seeds)
+    began = Path("a/unfinished/manifest.json").stat().st_mtime
+    os.utime(blocks_of("a")[-1], (began, began + 360))
+    _, out, _ = call("status", ["a"], capsys)
+    assert f"unfinished: {8 + new} of 24 runs done" in out
+    assert f"left: about {360 * (16 - new) / new / 60:.0f} minutes" in out
+
+
+def test_the_time_left_before_the_first_block_of_a_new_process(sweep, capsys, monkeypatch):
+    real, stop_after = RunPoint.do, 3
+
+    def stops(*arguments):
+        nonlocal stop_after
+        stop_after -= 1
+        if stop_after < 0:
+            raise KeyboardInterrupt
+        return real(*arguments)
+
+    monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
+    assert sweep(RUNS, "a")[0] == 130
+    done = sum(int(one) for one in re.findall(r"(\d+) of 24", call("status", ["a"], capsys)[1]))
+    began = Path("a/unfinished/manifest.json").stat().st_mtime - 1000
+    os.utime("a/unfinished/manifest.json", (began, began))
+    for path in blocks_of("a"):
+        os.utime(path, (began, began + 360))
+    assert sweep(RUNS, "a")[0] == 130
+    _, out, _ = call("status", ["a"], capsys)
+    assert f"left: about {360 * (24 - done) / done / 60:.0f} minutes" in out
+
+
+def test_a_finished_shard_is_not_unfinished(sweep, capsys):
+    assert sweep(RUNS, "a", "--shard", "2/3")[0] == 0
+    _, out, _ = call("status", ["a"], capsys)
+    assert "  finished: shard 2 of 3, 8 runs, in " in out
+    assert "unfinished" not in out
 
 
 def workers_of(pid):

@@ -169,7 +169,7 @@ def test_a_finished_sweep_is_shown(sweep):
     assert contents(Path("results/sweep-my")) == before
     status, out, err = sweep(RUNS.replace("shaping = [1, 0]", "shaping = [1, 2]"))
     assert status == 2
-    assert "(task.rewards.shaping, vary differ)" in err
+    assert "that this study lacks (task.rewards.shaping 0); add them" in err
 
 
 WRONG = {

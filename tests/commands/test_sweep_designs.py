@@ -117,7 +117,7 @@ def test_a_search_has_its_files_and_can_be_shown(sweep):
     status, out, err = sweep(SEARCH.replace("trials = 12", "trials = 11"))
     assert (status, out) == (2, "")
     assert_one_sentence(err)
-    assert "(search.trials differ)" in err
+    assert "(search.trials is 12 instead of 11)" in err
     assert contents(folder) == before
     # The file of the best settings gives what the search has measured with the held-out seeds.
     assert sweep((folder / "best.toml").read_text("utf-8"), "--no-figures", "--out", "best")[0] == 0

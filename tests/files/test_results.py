@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from taichi_ants.errors import AntsError
-from taichi_ants.files.results import ResultFolder, _write_manifest
+from taichi_ants.files.results import ResultFolder, _write_manifest, seconds_of
 from taichi_ants.studies.result_folder import work_or_show
 
 SETTINGS = {"seeds": (0, 1), "rate": np.float32(0.5), "world": {"ranges": [3, 3, 3]}}
@@ -99,24 +99,24 @@ def test_work_without_a_block_leaves_nothing(tmp_path):
 
 def test_results_of_other_settings_are_kept_apart(tmp_path):
     finish(tmp_path)
-    with pytest.raises(AntsError, match=r"results of other settings \(rate differ\)"):
+    with pytest.raises(AntsError, match=r"results of .* \(rate is 0.5 instead of 0.25\)"):
         ResultFolder(tmp_path, OTHER).is_finished()
-    with pytest.raises(AntsError, match=r"\(more, rate, world differ\)"):
+    with pytest.raises(AntsError, match=r"\(not the same more, rate, world\)"):
         ResultFolder(tmp_path, {"seeds": [0, 1], "more": 1}).is_finished()
 
 
 def test_of_settings_that_follow_from_others_only_these_are_named(tmp_path):
     finish(tmp_path)
     other = {**OTHER, "seeds": (1, 2)}
-    with pytest.raises(AntsError, match=r"\(seeds differ\)"):
+    with pytest.raises(AntsError, match=r"\(not the same seeds\)"):
         ResultFolder(tmp_path, other, ("seeds", "more")).is_finished()
-    with pytest.raises(AntsError, match=r"\(rate differ\)"):
+    with pytest.raises(AntsError, match=r"\(rate is 0.5 instead of 0.25\)"):
         ResultFolder(tmp_path, OTHER, ("seeds", "more")).is_finished()
 
 
 def test_unfinished_work_of_other_settings_is_kept_apart(tmp_path):
     stop_after_a_block(tmp_path)
-    with pytest.raises(AntsError, match=r"unfinished work of other settings \(rate differ\)"):
+    with pytest.raises(AntsError, match=r"unfinished work of .* \(rate is 0.5 instead of"):
         ResultFolder(tmp_path, OTHER).is_finished()
     assert (tmp_path / "unfinished" / "blocks" / "0.npz").exists()
 
@@ -143,7 +143,8 @@ def test_replacing_does_not_use_old_blocks(settings, tmp_path):
 def test_blocks_without_a_manifest_are_not_trusted(tmp_path):
     """Where a process was killed while it cleaned up, nobody knows whose blocks are left."""
     stop_after_a_block(tmp_path)
-    (tmp_path / "unfinished" / "manifest.json").unlink()
+    for name in ("manifest.json", "manifest-copy.json"):
+        (tmp_path / "unfinished" / name).unlink()
     with ResultFolder(tmp_path, OTHER).work() as (blocks, _):
         assert names(blocks) == []
 
@@ -192,7 +193,10 @@ def test_a_damaged_manifest_is_named(place, damage, tmp_path):
         stop_after_a_block(tmp_path)
     (tmp_path / place / "manifest.json").write_text(damage)
     folder = ResultFolder(tmp_path, SETTINGS)
-    with pytest.raises(AntsError, match=r"manifest\.json' is damaged or .* another --out"):
+    if place == "unfinished":
+        assert not folder.is_finished()  # by the copy
+        (tmp_path / place / "manifest-copy.json").write_text(damage)
+    with pytest.raises(AntsError, match=r"manifest\.json' is damaged or .* or remove it and"):
         folder.is_finished()
     if place == "unfinished":
         assert finish(tmp_path, replace=True).is_finished()
@@ -200,6 +204,21 @@ def test_a_damaged_manifest_is_named(place, damage, tmp_path):
     with pytest.raises(AntsError, match=r"manifest\.json' is damaged"):
         folder.work(replace=True).__enter__()
     assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "manifest-copy.json"])
+@pytest.mark.parametrize("damage", [None, "{"])
+def test_one_copy_of_the_manifest_is_enough_for_the_blocks(name, damage, tmp_path):
+    stop_after_a_block(tmp_path)
+    path = tmp_path / "unfinished" / name
+    path.unlink() if damage is None else path.write_text(damage)
+    with pytest.raises(AntsError, match="of other settings"):
+        ResultFolder(tmp_path, OTHER).is_finished()
+    folder = ResultFolder(tmp_path, SETTINGS)
+    assert not folder.is_finished()
+    assert seconds_of(tmp_path / "unfinished") >= 0
+    with folder.work() as (blocks, _):
+        assert (blocks / "0.npz").read_text() == "done"
 
 
 def test_foreign_files_are_not_written_among(tmp_path):
@@ -287,7 +306,7 @@ ALTERED = {
 def test_what_was_altered_is_noticed(change, tmp_path):
     folder = finish(tmp_path, names=("policy.npz", "figures/one.png"))
     ALTERED[change](tmp_path / "policy.npz")
-    said = r"policy\.npz', a part of the results, is missing or has changed .* give --force"
+    said = r"policy\.npz', a part of the results, is missing or has changed .* with --force"
     with pytest.raises(AntsError, match=said):
         folder.check()
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
+from taichi_ants.files.results import MANIFEST, _write_manifest
 from taichi_ants.studies import design
 from taichi_ants.studies.design import Choices, Design, Range
 from taichi_ants.studies.sweep import read_sweep, sweep_of
@@ -138,6 +139,15 @@ def test_declared_whole_numbers_need_no_key():
     assert all(type(row[name]) is int for row in rows for name in ("ants", "task.pheromone.level"))
 
 
+def test_seeds_of_worlds_are_whole_numbers():
+    text = COLONY.replace("task.noise.slip = { from = 0", "world.seed = { from = 0").replace(
+        "to = 0.5 }", "to = 90 }"
+    )
+    text = text.replace("[task]", '[world]\npreset = "open"\n[task]')
+    rows = sweep_of(files.tomllib.loads(text)).settings
+    assert {type(row["world.seed"]) for row in rows} == {int}
+
+
 def test_no_setting_has_the_name_of_a_key_of_ranges():
     from taichi_ants import worlds
     from taichi_ants.settings import all_of
@@ -168,6 +178,11 @@ WRONG = {
     "whole": (SLIP, "{ from = 0, to = 0.5, whole = true }", ["slip.to is 0.5", "whole number"]),
     "not a flag": (SLIP, "{ from = 0, to = 1, whole = 1 }", ["slip.whole is 1"]),
     "choice": (SLIP, '[0, "often"]', ["noise.slip` is 'often'"]),
+    "below 1": (
+        f"task.noise.slip = {SLIP}",
+        "capacity = { from = 0, to = 3 }",
+        ["capacity.from is 0; it must lie between 1 and"],
+    ),
     "nothing varies": (
         f"half_life = {HALF}\ntask.noise.slip = {SLIP}",
         "half_life = 5",
@@ -179,7 +194,7 @@ WRONG = {
     "not a power": ("samples = 8", "samples = 9", ["samples is 9", "a power of 2"]),
     "against": ("[task]", "against.task.noise.slip = 0\n[task]", ["against is for a grid"]),
     "twice": ("[vary]", '[vary]\n"task.noise.slip" = 1', ["task.noise.slip is in [vary] twice"]),
-    "fixed, too": ("[task]", "[task]\nnoise.slip = 0", ["slip is in [vary] and task.noise.slip"]),
+    "fixed, too": ("[task]", "[task]\nnoise.slip = 0", ["slip is in [vary] and in the fixed"]),
 }
 
 
@@ -202,14 +217,13 @@ def test_a_missing_extra_is_named_with_the_command(monkeypatch):
         Design.of({"design": "sobol", "samples": 8, "sensitivity": True})
 
 
-def test_a_hypercube_of_another_size_is_refused(tmp_path, monkeypatch):
+def test_a_hypercube_of_another_size_is_refused(tmp_path):
     manifest = {"settings": {"design": Design("latin_hypercube", 8).facts()["design"]}}
-    monkeypatch.setattr(design, "read_manifest", lambda folder: manifest)
     for place in (tmp_path, tmp_path / "unfinished"):
         place.mkdir(exist_ok=True)
-        Path(place, design.MANIFEST).touch()
+        _write_manifest(manifest, place)
         Design("latin_hypercube", 8).check_folder(tmp_path)
         Design("sobol", 16).check_folder(tmp_path)
         with pytest.raises(AntsError, match="8 samples, which cannot be extended to 16"):
             Design("latin_hypercube", 16).check_folder(tmp_path)
-        Path(place, design.MANIFEST).unlink()
+        Path(place, MANIFEST).unlink()

@@ -7,6 +7,7 @@ import pickle
 import signal
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
@@ -186,6 +187,19 @@ def test_a_block_that_always_fails_is_named_and_the_others_are_done(tmp_path, mo
     )
     assert executor.calls == 3 + TRIES
     assert len(list(tmp_path.iterdir())) == 3
+
+
+@pytest.mark.parametrize("fails", ["one", "all"])
+def test_a_block_at_which_all_workers_die_is_named(fails, tmp_path, monkeypatch):
+    monkeypatch.setattr(RunPoint, "runs_of_a_block", 2)
+    died = BrokenProcessPool("A process in the process pool was terminated abruptly")
+    executor = Fails(lambda work, n: died if fails == "all" or 8 in work.seeds else None)
+    with pytest.raises(AntsError) as caught:
+        RUNS.run(tmp_path, executor=executor)
+    assert caught.value.exit_status == 1
+    assert f"{TRIES} workers died at this block, perhaps because memory was" in str(caught.value)
+    assert ("2 blocks failed: " in str(caught.value)) == (fails == "one")
+    assert "abruptly" not in str(caught.value)
 
 
 def test_points_whose_training_failed_are_left_out_and_no_others(tmp_path, monkeypatch):

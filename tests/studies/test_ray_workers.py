@@ -258,3 +258,22 @@ def test_two_of_eight_machines_die(plain, kernels, cluster, tmp_path):
     _, err = process.communicate(timeout=500)
     assert (process.returncode, err) == (0, "")
     assert_same_results(plain, tmp_path / "a", also=["packages"])
+
+
+@pytest.mark.long
+def test_a_dead_head_ends_the_command_with_a_sentence(plain, kernels, cluster, tmp_path):
+    """The last test of the cluster, which does not survive it."""
+    (tmp_path / "my.toml").write_text(SWEEP)
+    arguments = ["my.toml", "--out", "a", "--no-figures"]
+    process = start("sweep", [*arguments, "--ray", cluster.address], kernels, tmp_path)
+    wait_for_blocks(process, tmp_path)
+    os.kill(next(one for one, line in tree(cluster.pid).items() if "gcs_server" in line), 9)
+    began = time.monotonic()
+    out, err = process.communicate(timeout=500)
+    assert time.monotonic() - began < 30 * promptly()  # Ray itself needs a minute
+    assert (process.returncode, out) == (1, "")
+    assert_one_sentence(err.lstrip("\n"))
+    assert "the head of the Ray cluster at '" in err
+    assert "does not listen any more; finished parts are saved, so run the same command" in err
+    assert run("sweep", arguments, kernels, tmp_path).returncode == 0
+    assert_same_results(plain, tmp_path / "a", also=["packages"])

@@ -263,12 +263,49 @@ def test_a_finished_search_continues_with_more_trials(tmp_path, capsys, monkeypa
         status, _, err = call("sweep", ["my.toml", "--out", out, "--no-figures"], capsys)
         assert status == 2 * (trials == 4)
         counts.setdefault(out, []).append(len(done))
-    assert "search.trials differ" in err  # fewer trials are refused
+    assert "search.trials is 9 instead of 4" in err  # fewer trials are refused
     first, then, shown, refused = counts["grown"]
     assert (shown, refused) == (0, 0)
     assert first + then == counts["whole"][0] + 2  # the comparison with held-out seeds runs again
     for name in ("trials.csv", "held_out.csv", "best.toml", "report.txt"):
         assert (tmp_path / "grown" / name).read_text() == (tmp_path / "whole" / name).read_text()
+
+
+def test_a_finished_search_continues_with_more_held_out_seeds(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    few = TEXT.replace("trials = 40", "trials = 4")
+    do, done = search.ColonyPoint.do, []
+    monkeypatch.setattr(search.ColonyPoint, "do", staticmethod(lambda *a: done.append(1) or do(*a)))
+    for out, held_out in (("grown", "4"), ("grown", "[9, 8, 7, 6, 10]"), ("whole", "5")):
+        done.clear()
+        (tmp_path / "my.toml").write_text(few.replace("held_out = 12", f"held_out = {held_out}"))
+        status, _, err = call("sweep", ["my.toml", "--out", out, "--no-figures"], capsys)
+        assert (status, err) == (0, "")
+        assert out == "whole" or held_out == "4" or len(done) == 2  # no trial runs again
+    for name in ("trials.csv", "report.txt"):
+        assert (tmp_path / "grown" / name).read_text() == (tmp_path / "whole" / name).read_text()
+    (tmp_path / "my.toml").write_text(few.replace("held_out = 12", "held_out = [11, 12]"))
+    status, _, err = call("sweep", ["my.toml", "--out", "grown", "--no-figures"], capsys)
+    assert status == 2
+    assert "(not the same search.held_out)" in err
+
+
+def test_the_state_of_a_search_that_was_stopped(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    do, done = search.ColonyPoint.do, []
+
+    def stops(*arguments):
+        if len(done) == 7:
+            raise KeyboardInterrupt
+        done.append(1)
+        return do(*arguments)
+
+    monkeypatch.setattr(search.ColonyPoint, "do", staticmethod(stops))
+    (tmp_path / "my.toml").write_text(TEXT.replace("prune_after = 2", "prune = false"))
+    assert call("sweep", ["my.toml", "--out", "out", "--no-figures"], capsys)[0] == 130
+    _, out, _ = call("status", ["out"], capsys)
+    assert "unfinished: 7 of 40 trials done, in 7 blocks" in out
+    assert "left: about " in out
 
 
 WRONG = {
