@@ -35,6 +35,7 @@ from taichi_ants.settings import (
     named_groups,
     nested,
     not_a_setting,
+    settings_of_entry,
 )
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
@@ -357,13 +358,8 @@ class TaskNumbers(Intervention, path="task"):
             of = rest.partition(".")[0]
             here = known
             if rest and group in _NAMED:
-                entry = _NAMED[group].entry.entry_named(of)  # type: ignore[attr-defined]
-                before = f"{entry.path}."
-                inner = ((one.path.removeprefix(before), one) for one in all_of(entry))
-                here = {
-                    f"{group}.{of}.{key}": one._replace(path=f"task.{group}.{of}.{key}")
-                    for key, one in inner
-                }
+                own = settings_of_entry(_NAMED[group], of)
+                here = {path.removeprefix("task."): one for path, one in own.items()}
             if name not in here:
                 raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")
             values.append((name, here[name].checked(value)))

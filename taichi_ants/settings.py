@@ -434,6 +434,15 @@ def named_groups(cls: Any) -> Iterator[Setting]:
     return (one for one in all_of(cls) if one.kind is Named)
 
 
+def settings_of_entry(group: Setting, name: str) -> dict[str, Setting]:
+    """Return the declarations of the entry of this name in a named group, by their full names."""
+    entry: Any = group.entry.entry_named(name)  # type: ignore[attr-defined]
+    several = {
+        f"{group.path}.{name}{one.path.removeprefix(entry.path)}": one for one in all_of(entry)
+    }
+    return {path: one._replace(path=path) for path, one in several.items()}
+
+
 _DECLARED: dict[Any, tuple[Setting, ...]] = {}
 
 

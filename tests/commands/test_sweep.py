@@ -590,6 +590,34 @@ def test_events_that_can_succeed_are_not_refused(old, new, tmp_path):
     assert len(read_sweep(tmp_path / "my.toml").study.points) > 1
 
 
+def test_ranges_of_events_are_checked_and_whole(tmp_path):
+    ranges = "at.1.tick = { from = 5, to = 50 }\nat.1.task.pheromone.level = { from = 3, to = 9 }"
+    text = PROTOCOL.replace("tick = 20\n", "").replace("at.1.remove_ants = [0.0, 0.5]", ranges)
+    text = 'design = "latin_hypercube"\nsamples = 4\n' + text
+    (tmp_path / "my.toml").write_text(text)
+    events = [one.protocol[0] for one in read_sweep(tmp_path / "my.toml").study.points]
+    assert len({event.tick for event in events}) == 4
+    assert all(type(level) is int for event in events for _, level in event.task.values)
+    for end, said in (("from = -5", "`at.1.tick` is -5; it must be"), ("from = 5.5", "whole")):
+        (tmp_path / "my.toml").write_text(text.replace("from = 5", end, 1))
+        with pytest.raises(AntsError, match=said):
+            read_sweep(tmp_path / "my.toml")
+
+
+def test_ranges_of_entries_of_groups_are_checked_and_whole(tmp_path):
+    text = PROTOCOL.replace("at.1.remove_ants = [0.0, 0.5]", "task.fields.home.level = {R}")
+    text = text.replace("[training]", '[task.fields.home]\nlaid = "always"\n\n[training]')
+    text = 'design = "random"\nsamples = 4\n' + text
+    (tmp_path / "my.toml").write_text(text.replace("R", "from = 5, to = 50"))
+    points = read_sweep(tmp_path / "my.toml").study.points
+    levels = {one.task.fields["home"].level for one in points}
+    assert len(levels) > 1
+    assert all(type(level) is int for level in levels)
+    (tmp_path / "my.toml").write_text(text.replace("R", "from = 0, to = 50"))
+    with pytest.raises(AntsError, match=r"`task\.fields\.home\.level` is 0; it must be between 1"):
+        read_sweep(tmp_path / "my.toml")
+
+
 def test_births_leave_room_for_more_ants_than_start(tmp_path):
     text = PROTOCOL.replace("remove_ants = [0.0, 0.5]", "add_ants.number = [0, 65]")
     text = text.replace("capacity = 12\n", "").replace("life.regrowth = 0", "life.births = true")
