@@ -243,7 +243,12 @@ class Model:
             for kind, facts in (item for event in events or () for item in event.items()):
                 numbers[kind] += 1
                 found.setdefault((kind, numbers[kind]), []).append(flat(facts))
-        return [f"*{kind}*: {_varied(kind, facts)}" for (kind, _), facts in found.items()]
+        lines = []
+        for (kind, number), variants in found.items():
+            own = f"{kind}.{number}."
+            tried = {k.removeprefix(own): v for k, v in self.searched.items() if k.startswith(own)}
+            lines.append(f"*{kind}*: {_varied(kind, variants, tried)}")
+        return lines
 
     def traffic(self) -> dict[str, str]:
         """Return the texts of the rules of traffic that a point has, by name."""
@@ -360,17 +365,18 @@ def _joined(text: str) -> str:
     return "\n\n".join(re.sub(r"\n(?!- |\| |\d+\. )", " ", one) for one in blocks if one) + "\n"
 
 
-def _varied(kind: str, variants: Sequence[Mapping[str, Any]]) -> str:
-    """Return the settings of an event with their values in all of its variants."""
+def _varied(kind: str, variants: Sequence[Mapping[str, Any]], searched: Mapping[str, Any]) -> str:
+    """Return the settings of an event with their values in all variants, or those in a search."""
     found = []
-    for name in dict.fromkeys(name for facts in variants for name in facts):
+    for name in dict.fromkeys([*(name for facts in variants for name in facts), *searched]):
         group, _, own = name.rpartition(".")
         of = declared(INTERVENTIONS[group] if group in INTERVENTIONS else EVENTS[kind])
         usual = next((one.default for one in of if one.name == own), None)  # if it is left out
-        values = [facts.get(name, usual) for facts in variants]
-        found.append(
-            f"{name} {_several([one for n, one in enumerate(values) if one not in values[:n]])}"
-        )
+        values: list[Any] = _tried(usual, searched[name]) if name in searched else []
+        for facts in variants if name not in searched else ():
+            value = facts.get(name, usual)
+            values += [value] if value not in values else []
+        found.append(f"{name} {_several(values)}")
     return "; ".join(found)
 
 

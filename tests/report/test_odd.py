@@ -247,6 +247,15 @@ def test_an_event_that_varies_is_described_once():
     assert "- *at*: trail.level 1; tick 3; trail.field trail or home" in text_of(*points)
 
 
+def test_what_a_search_chooses_for_an_event_is_described():
+    point = ColonyPoint(worlds.paper(), Task(), SARSA, protocol=Every(ticks=50, trail=0))
+    vary = {"every.1.stop": {"from": 60, "to": 90}, "every.1.trail.field": ["trail", "home"]}
+    more = {"search.trials": 3, "search.prune_after": None, "search.held_out": [5]}
+    text = text_of(point, sweep={"search": {"maximise": "deliveries", "vary": vary}}, **more)
+    event = "every*: trail.level 0; ticks 50; start 50; stop 60 to 90; trail.field trail or home"
+    assert event in text
+
+
 def test_the_unit_of_a_level_is_that_of_its_evaporation():
     fades = {"evaporation": "exponential", "half_life": 7}
     task = Task().but(fields={"home": fades, "mark": {"evaporation": "none"}})
