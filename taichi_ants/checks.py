@@ -24,6 +24,7 @@ from taichi_ants.errors import (
 )
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import checked_values, frozen_policy
+from taichi_ants.settings import flat
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL
@@ -123,6 +124,25 @@ def check_follows(learns: bool, task: Task) -> None:
     if not task.choice.needs_table:
         raise AntsError(
             f"the ants choose by the rule {task.choice.rule!r}, which has no policy; leave it out."
+        )
+
+
+def check_same_kernels(task: Task, changed: Task, learns: bool) -> None:
+    """Raise AntsError if a changed task needs other kernels; `learns` says whether ants learn."""
+    castes = {name: one.fixed for name, one in task.castes.items()}
+    if castes != {name: one.fixed for name, one in changed.castes.items()}:
+        raise AntsError(
+            "the task cannot change the share, ants, nest or policy of a caste in an episode, or "
+            "whether it has thresholds; change its other numbers."
+        )
+    if task.compiled(learns) != changed.compiled(learns):
+        old, new = flat(task.as_dict()), flat(changed.as_dict())
+        several = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+        changes = (f"{one} from {old.get(one)!r} to {new.get(one)!r}" for one in several)
+        raise AntsError(
+            f"the task cannot change {' and '.join(changes)} in an episode, because that requires "
+            "other kernels; change settings that kernels read as numbers, for example "
+            "pheromone.level."
         )
 
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from taichi_ants.checks import check_follows, check_learns
+from taichi_ants.checks import check_follows, check_learns, check_same_kernels
 from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
 from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
@@ -35,6 +35,7 @@ from taichi_ants.settings import (
     named_groups,
     nested,
     not_a_setting,
+    settings_of_entry,
 )
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
@@ -245,8 +246,13 @@ class Place(OfCells, path="place"):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
+        if self.kind is not None and not task.foods:
+            raise AntsError(
+                f"`place.kind` is {self.kind!r}, but the task has no kinds of food; leave it out, "
+                "or add kinds to `task.foods`."
+            )
         if self.kind is not None:
-            check_one_of("place.kind", self.kind, tuple(task.foods))
+            check_one_of("`place.kind`", self.kind, tuple(task.foods))
 
     def apply(self, to: Interventions) -> None:
         cells = to.index(self.cells)
@@ -308,7 +314,7 @@ class Trail(OfCells, path="trail"):
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
-        check_one_of("trail.field", self.field, (TRAIL, *task.fields))
+        check_one_of("`trail.field`", self.field, (TRAIL, *task.fields))
 
     def apply(self, to: Interventions) -> None:
         self.check_in(to.colony.worlds[0], to.colony.task, to.colony.learns)
@@ -352,11 +358,8 @@ class TaskNumbers(Intervention, path="task"):
             of = rest.partition(".")[0]
             here = known
             if rest and group in _NAMED:
-                entry = _NAMED[group].entry.entry_named(of)  # type: ignore[attr-defined]
-                before = f"{entry.path}."
-                here = {
-                    f"{group}.{of}.{one.path.removeprefix(before)}": one for one in all_of(entry)
-                }
+                own = settings_of_entry(_NAMED[group], of)
+                here = {path.removeprefix("task."): one for path, one in own.items()}
             if name not in here:
                 raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")
             values.append((name, here[name].checked(value)))
@@ -382,7 +385,7 @@ class TaskNumbers(Intervention, path="task"):
         return task.but(**nested(dict(self.values)))
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
-        self.changed(task)
+        check_same_kernels(task, self.changed(task), learns)
 
     def apply(self, to: Interventions) -> None:
         to.set_task(self.changed(to.colony.task))

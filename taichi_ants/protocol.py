@@ -11,7 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
 
 from taichi_ants import measures
 from taichi_ants.errors import AntsError, count, entries_of, shown
@@ -29,10 +31,14 @@ from taichi_ants.interventions import (
     RemoveAnts,
     TaskNumbers,
     Trail,
+    indices,
 )
 from taichi_ants.settings import Is
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
+
+if TYPE_CHECKING:
+    from taichi_ants.worlds.world import World
 
 Tick = Annotated[int, Is(unit="ticks of the episode", least=0, most=MAX_STEPS)]
 Interval = Annotated[int, Is(unit="ticks", least=1, most=MAX_STEPS)]
@@ -188,20 +194,61 @@ def checked_protocol(protocol: Any) -> tuple[Event, ...]:
     return tuple(events)
 
 
-def check_room(event: Event, of: Sequence[Event], task: Task, ants: int, capacity: int) -> None:
+def check_room(
+    event: Event, of: Sequence[Event], task: Task, ants: int, capacity: int, length: int | None
+) -> None:
     """Raise AntsError if an event adds more ants than can ever have room in a colony.
 
-    `ants` start in each world. If ants can die, or an event in `of` can remove some, there may be
-    room later.
+    `ants` start in each world, and `length` is that of episodes, None if they can end earlier. The
+    events of `of` that are certain to happen before add to these ants. If ants can die, or an event
+    in `of` can remove some, there may be room later.
     """
     lifespans = (task.life.lifespan, *(caste.lifespan for caste in task.castes.values()))
     if any(lifespans) or any(one.remove_ants or one.ants for one in of):
         return
-    number = event.add_ants and event.add_ants.number
-    if number and ants + number > capacity:
+    number = added = _number_added(event)
+    if length is not None and not isinstance(event, When):
+        last = event.times(length)[-1]
+        added = sum(
+            _number_added(one) * len(range(times.start, min(times.stop, last + 1), times.step))
+            for one in of
+            if _number_added(one) and not isinstance(one, When)
+            for times in [one.times(length)]
+        )
+    if number and ants + added > capacity:
+        total = f", which makes {added} ants with those of earlier events" if added > number else ""
         raise AntsError(
-            f"`add_ants.number` is {number}, but the {count(ants, 'ant')} at the start leave room "
-            f"for {capacity - ants}, because the capacity is {capacity}; set a larger capacity."
+            f"`add_ants.number` is {number}{total}, but the {count(ants, 'ant')} at the start "
+            f"leave room for {capacity - ants}, because the capacity is {capacity}; set a larger "
+            "capacity."
+        )
+
+
+def _number_added(event: Event) -> int:
+    return (event.add_ants and event.add_ants.number) or 0
+
+
+def check_queen(event: Event, of: Sequence[Event], world: World, length: int) -> None:
+    """Raise AntsError if an event moves a queen to a cell that is certain not to be empty.
+
+    It has rock or a queen in the world, and no event in `of` can remove it. `length` is that of
+    episodes.
+    """
+    place = event.place
+    if place is None or place.what != "queen":
+        return
+    if any(one.clear or one.move or one.place not in (None, place) for one in of):
+        return
+    cell = indices(world.grid, place.cells)
+    if np.isin(cell, world.grid.index(np.vstack([world.obstacles, world.queens]))):
+        raise AntsError(
+            f"`place.cells` has the cell {place.cells[0]}, where the world has rock or a queen, so "
+            "the queen cannot move there; choose an empty cell."
+        )
+    if not isinstance(event, When) and len(event.times(length)) > 1:
+        raise AntsError(
+            f"`{event.path}` moves the queen more than once to the same cell, which is not empty "
+            "the second time; use `at`."
         )
 
 

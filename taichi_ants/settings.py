@@ -79,6 +79,17 @@ class Is:
     choices: Callable[[], tuple[str, ...]] | None = None
     or_region: bool = False
 
+    def __post_init__(self) -> None:
+        if self.most is None:
+            return
+        for name, is_above in (("least", False), ("above", True)):
+            bound = getattr(self, name)
+            if bound is not None and (bound > self.most or (is_above and bound == self.most)):
+                raise AntsError(
+                    f"`Is({name}={bound}, most={self.most})` allows no number; give a larger "
+                    f"`most` than `{name}`."
+                )
+
     def but(self, other: Is) -> Is:
         """Return the combination of both; where `other` declares something, it takes precedence."""
         given = {one.name: getattr(other, one.name) for one in fields(other)}
@@ -195,9 +206,7 @@ class Setting(NamedTuple):
                 kind = entry.entry_named(name)  # type: ignore[attr-defined]
                 entries[name] = one if isinstance(one, kind) else _entry(kind, one, start, name)
             except AntsError as error:
-                text = str(error).replace(f"{self.path}.NAME", f"{self.path}.{name}")
-                text = text.replace(f"`{entry.__name__}.", f"`{self.path}.{name}.")
-                raise AntsError(text) from None
+                raise AntsError(_placed(str(error), entry, f"{self.path}.{name}")) from None
         return Named(entries)
 
     def _in_range(self, value: float) -> bool:
@@ -250,7 +259,8 @@ class Setting(NamedTuple):
 class _Checked(type):
     """The class of classes of settings, which refuses unknown names of settings.
 
-    An entry of a `Named` does not know its name. Until it gets one, messages call it by its class.
+    An entry of a `Named` does not know its name, nor do groups of its settings. Until it gets one,
+    messages call them by their classes.
     """
 
     def __call__(cls, *values: Any, **named: Any) -> Any:
@@ -262,9 +272,10 @@ class _Checked(type):
                     raise AntsError(f"`{_below(path, name)}` {not_a_setting(name, known)}")
             return super().__call__(*values, **named)
         except AntsError as error:
-            if not path.endswith(".NAME"):
+            if _alone(cls) == path:
                 raise
-            raise AntsError(str(error).replace(f"`{path}.", f"`{cls.__name__}.")) from None
+            text = str(error).replace(f"`{path}.", f"`{cls.__name__}.")
+            raise AntsError(_placed(text, cls, cls.__name__)) from None
 
 
 @cache
@@ -343,7 +354,8 @@ class Settings(metaclass=_Checked):
         made: dict[str, Any] = {}
         for name, value in changes.items():
             if name not in known:
-                raise AntsError(f"`{_below(self.path, name)}` {not_a_setting(name, known)}")
+                path = _below(_alone(type(self)), name)
+                raise AntsError(f"`{path}` {not_a_setting(name, known)}")
             one = known[name]
             if one.kind is Named and isinstance(value, Mapping):
                 value = one._named(value, getattr(self, name))
@@ -363,7 +375,7 @@ class Settings(metaclass=_Checked):
     def from_dict(cls: type[Self], facts: Any) -> Self:
         """Return the settings in a mapping, checked; groups are mappings or names."""
         if not isinstance(facts, Mapping):
-            raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
+            raise AntsError(f"`{_alone(cls)}` is {shown(facts)}; it must be a table of settings.")
         return cls()._changed(facts)
 
 
@@ -372,6 +384,20 @@ def _entry(cls: Any, value: Any, start: Mapping[str, Any], name: str) -> Any:
     if not isinstance(value, Mapping):
         return cls.from_dict(value)  # raises AntsError
     return (start[name] if name in start else cls())._changed(value)
+
+
+def _alone(cls: Any) -> str:
+    """Return what messages call settings: the path, or the class of an entry without a name."""
+    return cls.__name__ if ".NAME" in cls.path else cls.path
+
+
+def _placed(text: str, cls: Any, path: str) -> str:
+    """Return a message that calls an entry and its groups by their classes, with their paths."""
+    for end in ".`":
+        text = text.replace(f"`{cls.__name__}{end}", f"`{path}{end}")
+    for one in declared(cls):
+        text = _placed(text, one.kind, f"{path}.{one.name}") if one.is_group else text
+    return text
 
 
 Entry = TypeVar("Entry")
@@ -406,6 +432,15 @@ class Named(dict[str, Entry], Generic[Entry]):
 def named_groups(cls: Any) -> Iterator[Setting]:
     """Yield the settings of a class, and of its groups, that are mappings of named settings."""
     return (one for one in all_of(cls) if one.kind is Named)
+
+
+def settings_of_entry(group: Setting, name: str) -> dict[str, Setting]:
+    """Return the declarations of the entry of this name in a named group, by their full names."""
+    entry: Any = group.entry.entry_named(name)  # type: ignore[attr-defined]
+    several = {
+        f"{group.path}.{name}{one.path.removeprefix(entry.path)}": one for one in all_of(entry)
+    }
+    return {path: one._replace(path=path) for path, one in several.items()}
 
 
 _DECLARED: dict[Any, tuple[Setting, ...]] = {}

@@ -28,7 +28,7 @@ from taichi_ants.settings import (
     nested,
 )
 from taichi_ants.studies.command_line import Parser, add_settings, given_settings
-from taichi_ants.task import Field, Pheromone, Task, Traffic
+from taichi_ants.task import Caste, Field, Pheromone, Task, Threshold, Traffic
 from taichi_ants.worlds import double_bridge, open_world
 
 KINDS = (Task, TrainingConfig, open_world, double_bridge)
@@ -264,3 +264,22 @@ def test_unknown_and_wrong_settings_are_named_before_an_entry_has_a_name():
     says = "`task.castes.scout.threshold.valu` is not a setting; choose value."
     castes = {"scout": {"threshold": {"distribution": "fixed", "valu": 3}}}
     assert refused(lambda: Task(castes=castes)) == says
+    assert refused(lambda: Threshold("fixed", -1)).startswith("`Threshold.value` is -1; it must")
+    assert refused(lambda: Threshold().but(valu=1)) == (
+        "`Threshold.valu` is not a setting; choose value."
+    )
+    assert refused(lambda: Caste(threshold=-1)).startswith("`Caste.threshold.value` is -1; it must")
+    assert refused(lambda: Task(castes={"scout": {"threshold": -1}})).startswith(
+        "`task.castes.scout.threshold.value` is -1; it must"
+    )
+    assert refused(lambda: Task(castes={"scout": 3})) == (
+        "`task.castes.scout` is 3; it must be a table of settings."
+    )
+
+
+@pytest.mark.parametrize(("bound", "most"), [("least", 0), ("above", 1), ("above", 0.5)])
+def test_a_declaration_must_allow_a_number(bound, most):
+    assert refused(lambda: Is(**{bound: 1, "most": most})) == (
+        f"`Is({bound}=1, most={most})` allows no number; give a larger `most` than `{bound}`."
+    )
+    assert Is(least=1, most=1).most == 1

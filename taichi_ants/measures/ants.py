@@ -13,6 +13,7 @@ from taichi_ants.grid.hexgrid import normal_form
 
 if TYPE_CHECKING:
     from taichi_ants.engines.records import Snapshot
+    from taichi_ants.worlds.world import World
 
 
 def living(snapshot: Snapshot) -> int:
@@ -48,14 +49,20 @@ def regions(snapshot: Snapshot) -> dict[str, float]:
     The shares refer to the living ants on any cell, and are nan without ants. AntsError if the
     world has no regions.
     """
-    world = snapshot.world
+    return {
+        name: share_of(np.isin(snapshot.ant_cells, snapshot.grid.index(cells)))
+        for name, cells in regions_of(snapshot.world).items()
+    }
+
+
+def regions_of(world: World | None) -> Mapping[str, np.ndarray]:
+    """Return the cells of the regions of a world by name; AntsError if it has none."""
     if world is None or not world.regions:
         raise AntsError(
             "the measure 'regions' needs a world with regions; add them with World.with_regions, "
             "or with a table [world.regions] in a sweep file."
         )
-    places = {name: world.region(name) for name in world.regions}
-    return {name: share_of(np.isin(snapshot.ant_cells, one)) for name, one in places.items()}
+    return world.regions
 
 
 def share_in(regions: Mapping[str, Any]) -> Callable[[Snapshot], dict[str, float]]:

@@ -8,11 +8,16 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from taichi_ants.errors import AntsError, check_new_name, expect, shown
 from taichi_ants.measures import activity, ants, deliveries, paths, trails
 from taichi_ants.measures.measure import Measure
+from taichi_ants.task.field import TRAIL
+
+if TYPE_CHECKING:
+    from taichi_ants.task import Task
+    from taichi_ants.worlds.world import World
 
 
 def _built_in(function: Callable[..., Any], unit: str, summary: str, of: str | None = None) -> None:
@@ -42,6 +47,11 @@ _built_in(ants.foraging, "", "share of the ants that forage, which are not idle"
 _built_in(ants.distance, "steps", "mean distance of the ants to the nearest queen")
 _built_in(ants.regions, "", "share of the ants in each region of the world")
 _built_in(ants.occupancy, "ants", "number of ants on each cell (an array)")
+ARRAYS = (ants.occupancy.__name__,)  # measures whose value is an array
+_PARTS: dict[str, Callable[[World, Task], tuple[str, ...]]] = {
+    "entropy": lambda world, task: (TRAIL, *task.fields),
+    "regions": lambda world, task: tuple(ants.regions_of(world)),
+}
 _YOURS: dict[str, Measure] = {}
 
 
@@ -104,6 +114,25 @@ def get(name: str | Measure) -> Measure:
             "it with measures.register."
         )
     return measure.select(part) if part else measure
+
+
+def check_part(name: str, world: World, task: Task, single: bool = False) -> None:
+    """Raise AntsError if a built-in measure does not have the part that its name selects.
+
+    With `single`, also if it is not one number, because it has several parts or is an array.
+    """
+    whole, _, part = name.partition(".")
+    if whole not in BUILT_IN:
+        return
+    parts = _PARTS[whole](world, task) if whole in _PARTS else ()
+    allowed = ", ".join(f"{whole}.{one}" for one in parts)
+    if part and part not in parts:
+        choose = f"choose one of {allowed}" if parts else "it has none, so leave out the point"
+        raise AntsError(f"{name!r} is not a part of {whole}; {choose}.")
+    if single and not part and len(parts) > 1:
+        raise AntsError(f"{name!r} has {len(parts)} parts; name one of {allowed}.")
+    if single and whole in ARRAYS:
+        raise AntsError(f"{name!r} is an array; choose a measure that is a number.")
 
 
 def names() -> tuple[str, ...]:

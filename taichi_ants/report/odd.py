@@ -8,6 +8,7 @@ which it reads from the manifest and the inputs of finished results. No code of 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -18,8 +19,10 @@ from taichi_ants.analysis.colony.study import OF_STUDY
 from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
 from taichi_ants.analysis.tables import sentence
 from taichi_ants.errors import count
+from taichi_ants.interventions import INTERVENTIONS
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.registry import BUILT_IN as LEARNERS
+from taichi_ants.protocol import EVENTS
 from taichi_ants.report.page import text_of
 from taichi_ants.settings import Setting, all_of, declared, flat, named_groups
 from taichi_ants.studies.design import axes_of
@@ -105,9 +108,18 @@ class Model:
         group = name[: name.rfind(".") + 1]
         for value in values:
             unknown = f"The rule `{value}` is defined by the plugin of this study, see its source."
-            text = RULES[table].get(value, unknown)
-            words = _OWN.sub(lambda one: self.text(f"{group}{one[1]}"), text)
+            words = self._filled(RULES[table].get(value, unknown), group)
             yield f'With `{name}` "{value}": {words}' if len(values) > 1 else words
+
+    def _filled(self, text: str, group: str) -> str:
+        """Return a text of a rule with the values of the settings of its group."""
+        return _OWN.sub(lambda one: self.text(f"{group}{one[1]}"), text)
+
+    def unit(self, group: str) -> str:
+        """Return the unit of the levels of a pheromone: what evaporation does to them."""
+        texts = (RULES["units"].get(one) for one in self.values(f"{group}.evaporation"))
+        words = " or ".join(self._filled(one, f"{group}.") for one in texts if one)
+        return f"level; {words}" if words else "level"
 
     def entries(self, group: str) -> list[str]:
         """Return the names of the entries in a named group of the task, such as its fields."""
@@ -224,14 +236,19 @@ class Model:
         return ", ".join(map(str, self.seeds))
 
     def events(self) -> list[str]:
-        """Return a text for each event with interventions."""
-        several = [one for events in self.values("protocol") if events for one in _list_of(events)]
-        lines = [
-            f"*{kind}*: {', '.join(f'{name} {value}' for name, value in flat(facts).items())}"
-            for event in several
-            for kind, facts in event.items()
-        ]
-        return list(dict.fromkeys(lines))
+        """Return a text for each event with interventions; its settings can vary over points."""
+        found: dict[tuple[str, int], list[dict[str, Any]]] = {}
+        for events in self.values("protocol"):
+            numbers: Counter[str] = Counter()
+            for kind, facts in (item for event in events or () for item in event.items()):
+                numbers[kind] += 1
+                found.setdefault((kind, numbers[kind]), []).append(flat(facts))
+        lines = []
+        for (kind, number), variants in found.items():
+            own = f"{kind}.{number}."
+            tried = {k.removeprefix(own): v for k, v in self.searched.items() if k.startswith(own)}
+            lines.append(f"*{kind}*: {_varied(kind, variants, tried)}")
+        return lines
 
     def traffic(self) -> dict[str, str]:
         """Return the texts of the rules of traffic that a point has, by name."""
@@ -261,6 +278,8 @@ class Model:
             # Entries of named groups share declarations, which have NAME in place of the entry.
             one = known.get(re.sub(r"^(task\.(?:fields|foods|castes))\.\w+\.", r"\1.NAME.", name))
             values = self.values(name)
+            if name == "protocol" and any(values):
+                values = [count(len(self.events()), "event")]
             usual = one.default if one else of_points.get(name, MISSING)
             is_setting = one or name in of_points or name.split(".")[0] in ("task", "training")
             if not is_setting or all(value == usual for value in values):
@@ -346,6 +365,21 @@ def _joined(text: str) -> str:
     return "\n\n".join(re.sub(r"\n(?!- |\| |\d+\. )", " ", one) for one in blocks if one) + "\n"
 
 
+def _varied(kind: str, variants: Sequence[Mapping[str, Any]], searched: Mapping[str, Any]) -> str:
+    """Return the settings of an event with their values in all variants, or those in a search."""
+    found = []
+    for name in dict.fromkeys([*(name for facts in variants for name in facts), *searched]):
+        group, _, own = name.rpartition(".")
+        of = declared(INTERVENTIONS[group] if group in INTERVENTIONS else EVENTS[kind])
+        usual = next((one.default for one in of if one.name == own), None)  # if it is left out
+        values: list[Any] = _tried(usual, searched[name]) if name in searched else []
+        for facts in variants if name not in searched else ():
+            value = facts.get(name, usual)
+            values += [value] if value not in values else []
+        found.append(f"{name} {_several(values)}")
+    return "; ".join(found)
+
+
 def _list_of(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
@@ -371,8 +405,8 @@ def _several(values: Sequence[Any], unit: str = "") -> str:
 
 
 def _value(value: Any) -> str:
-    if value is None:
-        return "off"
+    if value is None or value == ():
+        return "off" if value is None else "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):

@@ -179,6 +179,10 @@ class _Translation:
             return self._call(node)
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow):
             raise self._refuse(node, "is not allowed; write power(x, y), of taichi_ants.rules")
+        if isinstance(node, ast.BoolOp) or isinstance(getattr(node, "op", None), ast.Not):
+            raise self._refuse(
+                node, "is not a number; use it as a condition, as in `1 if a and b else 0`"
+            )
         raise self._refuse(node)
 
     def _literal(self, node: ast.expr, value: Any) -> str:

@@ -9,16 +9,17 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from taichi_ants import __version__, checks, files, learners
+from taichi_ants import __version__, checks, files, learners, measures
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder, stops
-from taichi_ants.protocol import Event, When, check_room, checked_protocol
+from taichi_ants.protocol import Event, When, check_queen, check_room, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.task import Task
@@ -247,20 +248,36 @@ class ColonyPoint:
 
     def _check_protocol(self) -> None:
         """Raise an AntsError, which names the event, if it can never happen as it should."""
-        world = self.world[0] if isinstance(self.world, tuple) else self.world
-        capacity = self.capacity or self.ants
         for learns in (True, False) if self.episodes else (False,):
-            for event in self.events(learns):
+            events = self.events(learns)
+            for check, event in product((self._check_times, self._check_event), events):
                 number = [one for one in self.protocol if one.path == event.path].index(event) + 1
                 try:
-                    event.times(self.ticks)
-                    check_room(event, self.events(learns), self.task, self.ants, capacity)
-                    for one in event.interventions:
-                        one.check_in(world, self.task, learns)
+                    check(event, learns)
                 except AntsError as error:
                     raise AntsError(
                         f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
                     ) from error
+
+    def _check_times(self, event: Event, learns: bool) -> None:
+        event.times(self.ticks)
+
+    def _check_event(self, event: Event, learns: bool) -> None:
+        places = self.pool if learns and self.pool else self.places_of_evaluation
+        of, start = self.events(learns), (self.ants, self.capacity, self.start, False)
+        capacity = checks.checked_capacity(self.task, *start)
+        check_room(event, of, self.task, self.ants, capacity, self.ticks)
+        for one in event.interventions:
+            one.check_in(places[0], self.task, learns)
+        if isinstance(event, When):
+            measures.check_part(event.measure, places[0], self.task, single=True)
+        for world in () if places is self.pool else places:  # a pool's worlds are drawn
+            check_queen(event, of, world, self.ticks)
+
+    @property
+    def places_of_evaluation(self) -> tuple[World, ...]:
+        """The worlds of the evaluation: one, or one for each seed."""
+        return self.world if isinstance(self.world, tuple) else (self.world,)
 
     alike = property(lambda self: self)  # each point has its own blocks
 
@@ -269,7 +286,7 @@ class ColonyPoint:
         """The number of seeds of a block, whose colonies run together, as memory allows."""
         if any(isinstance(one, When) and one.in_all_worlds for one in self.protocol):
             return 1  # a condition of one world must not change what all share
-        world = self.world[0] if isinstance(self.world, tuple) else self.world
+        world = self.places_of_evaluation[0]
         slots, states = self.capacity or self.ants, self.task.n_states
         memory = learners.get(self.training.learner).memory_for(self.training, states)
         table = (1 + memory.tables) * states * ROW + memory.floats + memory.integers
@@ -281,7 +298,7 @@ class ColonyPoint:
     @property
     def weight(self) -> float:
         """The approximate work of a seed: that of a tick of an ant is 1."""
-        world = self.world[0] if isinstance(self.world, tuple) else self.world
+        world = self.places_of_evaluation[0]
         cells = sum(
             world.grid.size * (_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL)
             for one in (self.task.pheromone, *self.task.fields.values())

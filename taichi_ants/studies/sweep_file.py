@@ -10,17 +10,24 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from taichi_ants import checks, files, learners, measures, protocol, rules, worlds
+from taichi_ants import checks, files, interventions, learners, measures, protocol, rules, worlds
 from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.settings import Setting, all_of, declared, flat, named_groups, nested
+from taichi_ants.settings import (
+    Setting,
+    all_of,
+    declared,
+    flat,
+    named_groups,
+    nested,
+    settings_of_entry,
+)
 from taichi_ants.studies import design
 from taichi_ants.studies.design import Axis, Choices, Range
 from taichi_ants.studies.points import ColonyPoint, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
-from taichi_ants.task.field import TRAIL
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = (  # keys that are not settings of points
@@ -77,7 +84,7 @@ def measure_of(kind: str, name: str) -> Measure:
 
 def _registered(kind: str) -> set[str]:
     """Return the names of registered measures that sweeps of this kind can have."""
-    return set(measures.names()) - {"occupancy"} if kind == "colony" else set()
+    return set(measures.names()) - set(measures.ARRAYS) if kind == "colony" else set()
 
 
 def _names_of(kind: str) -> str:
@@ -164,10 +171,8 @@ class Base(NamedTuple):
                 raise AntsError(
                     f"{name} needs {least} episodes; use more or choose another measure."
                 )
-            whole, _, part = name.partition(".")
-            if whole == "entropy" and part and part not in (TRAIL, *point.task.fields):
-                allowed = ", ".join(f"{whole}.{one}" for one in (TRAIL, *point.task.fields))
-                raise AntsError(f"{name!r} is not a part of {whole}; choose one of {allowed}.")
+            if isinstance(point, ColonyPoint):
+                measures.check_part(name, point.places_of_evaluation[0], point.task)
         return point
 
 
@@ -262,11 +267,27 @@ def _check_amounts(name: str, values: Sequence[Any]) -> None:
 
 
 def _declaration(name: str, fixed: Settings) -> Setting | None:
-    """Return the declaration of a setting; None if it is not in the task, training or world."""
+    """Return the declaration of a setting; None if the task, training, world and events lack it.
+
+    Also None for the short form of an intervention.
+    """
+    event, path = re.fullmatch(rf"({'|'.join(protocol.EVENTS)})\.\d+\.(.*)", name), name
+    if event and not event[2].startswith("task."):
+        group, _, own = event[2].rpartition(".")
+        of: Any = interventions.INTERVENTIONS.get(group, protocol.EVENTS[event[1]])
+        found = (one for one in declared(of) if one.name == own and not one.is_group)
+        return next((one._replace(path=name) for one in found), None)
+    if event:
+        path = event[2]
     preset = fixed.get("world.preset", "paper")
     of_world = worlds.settings_of(preset) if preset in worlds.names() else ()
-    known = (*all_of(Task), *declared(TrainingConfig), *of_world)
-    return next((one for one in known if one.path == name), None)
+    known = [*all_of(Task), *declared(TrainingConfig), *of_world]
+    for one in named_groups(Task):
+        entry = path.removeprefix(f"{one.path}.").partition(".")[0]
+        # `check_entries` refuses the names of other rules.
+        if path.startswith(f"{one.path}.") and (one.path != "task.rules" or entry in rules.names()):
+            known += settings_of_entry(one, entry).values()
+    return next((one._replace(path=name) for one in known if one.path == path), None)
 
 
 def _whole_numbers(kind: str) -> set[str]:

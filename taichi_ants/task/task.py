@@ -252,6 +252,12 @@ class Task(Settings, path="task"):
         grows = any(food.regrowth is not None for food in self.foods.values())
         return self.life.regrowth is not None or self.life.wander is not None or grows
 
+    @property
+    def ants_change(self) -> bool:
+        """Whether ants are born or die."""
+        spans = [self.life.lifespan, *(caste.lifespan for caste in self.castes.values())]
+        return self.life.births or any(span is not None for span in spans)
+
     def _check_castes(self) -> None:
         if len(self.castes) > MAX_CASTES:
             raise AntsError(
@@ -415,6 +421,47 @@ class Task(Settings, path="task"):
         """Return the fields while ants learn or do not, with or without evaporation."""
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
         return {name: one if falls else one.lasting for name, one in self.fields.items()}
+
+    def compiled(self, learning: bool) -> dict[str, Any]:
+        """Return what kernels are compiled for, while ants learn or do not; see `Features`."""
+        pheromones = self.pheromone_while(learning), *self.fields_while(learning).values()
+        cues = self.all_cues
+        outbound, homing = cues[0]
+        found = {
+            "observation": self.sees,
+            "dense": tuple(one.dense for one in pheromones),
+            # Only the views of cues are compiled.
+            "views": tuple(
+                one.view if any(number in pair for pair in cues) else "half"
+                for number, one in enumerate(pheromones)
+            ),
+            "outbound": outbound,
+            "homing": homing,
+            "carriers_follow": self.number_of(self.choice.carriers_follow or COMPASS),
+            "reads": tuple(self.number_of(name) for name in self.sees.reads),
+            "traffic": self.traffic,
+            "ants_change": self.ants_change,
+            "food_changes": self.food_changes,
+            "choice": self.choice.rule,
+            "slips": self.noise.slip > 0,
+            "misreads": self.noise.misread > 0,
+            "n_kinds": max(1, len(self.foods)),
+            "has_foods": bool(self.foods),
+            "has_loads": self.has_loads,
+            "n_castes": len(self.castes),
+            "cues": cues if len(cues) > 1 else (),
+            "has_labour": self.labour.divides,
+            "epsilon_varies": any(one.epsilon_spread for one in self.castes.values()),
+        }
+        if self.rules:
+            found |= {
+                "rules": self.own_rules,
+                "reward": self.reward,
+                "deposits": tuple(one.deposit for one in pheromones),
+                "evaporations": tuple(one.evaporation for one in pheromones),
+                "fields": (TRAIL, *self.fields),
+            }
+        return found
 
     def number_of(self, cue: str) -> int:
         """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""

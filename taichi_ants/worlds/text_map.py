@@ -187,7 +187,14 @@ def _read_region(where: str, line: str, regions: dict[str, _Mark]) -> None:
         raise AntsError(f"{where} has the mark {mark!r}, which {why}; choose one of {free}.")
     if cell is not None and cell not in _CELLS:
         raise AntsError(f"{where} draws cells as {cell!r}; use only {_ALLOWED}.")
-    regions[mark] = _Mark(cell or EMPTY, tuple(one.strip() for one in names.split(",")))
+    several = tuple(one.strip() for one in names.split(","))
+    for name in several:
+        if not name.isidentifier():
+            raise AntsError(
+                f"{where} has a region {name!r}; a name has letters, digits and _, and does not "
+                "begin with a digit."
+            )
+    regions[mark] = _Mark(cell or EMPTY, several)
 
 
 def _read_level(where: str, name: str, value: str) -> int:

@@ -19,6 +19,7 @@ from command_lines import (
 )
 
 from taichi_ants import (
+    AntsError,
     Colony,
     Life,
     Pheromone,
@@ -536,11 +537,95 @@ WRONG_EVENTS = {
         ["in [[at]] number 1, in the training, the ants of this colony do not follow a policy"],
     ),
     "region": ("trail = 0", 'clear = "gate"', ["in [[at]] number 1", "no region 'gate'"]),
+    "kernels": (
+        *("trail = 0", "task.noise.slip = 0.1"),
+        ["in [[at]] number 1, in the training, the task cannot change noise.slip from 0.0 to 0.1"],
+    ),
+    "part": (
+        *('"living"', '"entropy.home"'),
+        ["in [[when]] number 1, in the training, 'entropy.home' is not a part of entropy; choose"],
+    ),
+    "no part": (
+        '"living"',
+        '"living.home"',
+        ["'living.home' is not a part of living; it has none"],
+    ),
+    "no region": ('"living"', '"regions.gate"', ["in [[when]] number 1", "world.regions"]),
+    "array": ('"living"', '"occupancy"', ["in [[when]] number 1", "'occupancy' is an array"]),
+    "room": (
+        *("remove_ants = [0.0, 0.5]", "add_ants.number = [0, 6]"),
+        [
+            "in [[every]] number 1, in the training",
+            "makes 9 ants with those of earlier events, but",
+        ],
+    ),
+    "queen": (
+        *("trail = 0", 'place = { what = "queen", cells = [[0, 0, 0]] }'),
+        ["in [[at]] number 1, in the training, `place.cells` has the cell (0, 0, 0), where"],
+    ),
+    "queen again": (
+        *("add_ants = 1", 'place = { what = "queen", cells = [[0, 0, 1]] }'),
+        ["in [[every]] number 1", "moves the queen more than once to the same cell"],
+    ),
     "during": ('"both"', '"day"', ["during is 'day'; it must be one of evaluation, training"]),
     "one table": ("[[every]]", "[every]", ["write [[every]] in double brackets"]),
     "number": ("at.1.remove", "at.2.remove", ["in [[at]] number 2, `at.tick` is missing"]),
     "kind": ('kind = "colony"', 'kind = "runs"', ["is for kind 'colony'"]),
 }
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ('"living"', '"entropy.trail"'),
+        ("trail = 0", "task.pheromone.level = 9"),
+        ("remove_ants = [0.0, 0.5]", "add_ants.number = [0, 5]"),  # 12 ants in all
+        ("add_ants = 1", "add_ants = 6"),  # another event removes ants
+        ("trail = 0", 'clear = [[0, 0, 1]]\nplace = { what = "queen", cells = [[0, 0, 0]] }'),
+    ],
+)
+def test_events_that_can_succeed_are_not_refused(old, new, tmp_path):
+    assert old in PROTOCOL
+    (tmp_path / "my.toml").write_text(PROTOCOL.replace(old, new))
+    assert len(read_sweep(tmp_path / "my.toml").study.points) > 1
+
+
+def test_ranges_of_events_are_checked_and_whole(tmp_path):
+    ranges = "at.1.tick = { from = 5, to = 50 }\nat.1.task.pheromone.level = { from = 3, to = 9 }"
+    text = PROTOCOL.replace("tick = 20\n", "").replace("at.1.remove_ants = [0.0, 0.5]", ranges)
+    text = 'design = "latin_hypercube"\nsamples = 4\n' + text
+    (tmp_path / "my.toml").write_text(text)
+    events = [one.protocol[0] for one in read_sweep(tmp_path / "my.toml").study.points]
+    assert len({event.tick for event in events}) == 4
+    assert all(type(level) is int for event in events for _, level in event.task.values)
+    for end, said in (("from = -5", "`at.1.tick` is -5; it must be"), ("from = 5.5", "whole")):
+        (tmp_path / "my.toml").write_text(text.replace("from = 5", end, 1))
+        with pytest.raises(AntsError, match=said):
+            read_sweep(tmp_path / "my.toml")
+
+
+def test_ranges_of_entries_of_groups_are_checked_and_whole(tmp_path):
+    text = PROTOCOL.replace("at.1.remove_ants = [0.0, 0.5]", "task.fields.home.level = {R}")
+    text = text.replace("[training]", '[task.fields.home]\nlaid = "always"\n\n[training]')
+    text = 'design = "random"\nsamples = 4\n' + text
+    (tmp_path / "my.toml").write_text(text.replace("R", "from = 5, to = 50"))
+    points = read_sweep(tmp_path / "my.toml").study.points
+    levels = {one.task.fields["home"].level for one in points}
+    assert len(levels) > 1
+    assert all(type(level) is int for level in levels)
+    (tmp_path / "my.toml").write_text(text.replace("R", "from = 0, to = 50"))
+    with pytest.raises(AntsError, match=r"`task\.fields\.home\.level` is 0; it must be between 1"):
+        read_sweep(tmp_path / "my.toml")
+
+
+def test_births_leave_room_for_more_ants_than_start(tmp_path):
+    text = PROTOCOL.replace("remove_ants = [0.0, 0.5]", "add_ants.number = [0, 65]")
+    text = text.replace("capacity = 12\n", "").replace("life.regrowth = 0", "life.births = true")
+    (tmp_path / "my.toml").write_text(text)
+    assert len(read_sweep(tmp_path / "my.toml").study.points) == 6
+    (tmp_path / "my.toml").write_text(text.replace("65]", "66]"))
+    with pytest.raises(AntsError, match=r"makes 69 ants .* leave room for 68, because the capac"):
+        read_sweep(tmp_path / "my.toml")
 
 
 @pytest.mark.parametrize("name", WRONG_EVENTS)

@@ -151,11 +151,11 @@ def with_a_return_in_each_branch(view):
     [
         (beyond_the_table, "encode fails (it returns 128, which must lie between 0 and 127"),
         (below_the_table, "encode fails (it returns -1, which must lie between 0 and 127"),
-        (of_what_there_is_not, "has no attribute 'smell'"),
-        (of_a_cell_too_far, "index out of range"),
+        (of_what_there_is_not, "a view has no `smell`; choose one of carries, percept, codes, "),
+        (of_a_cell_too_far, "there is no entry 4"),
         (of_the_end, "there is no entry -1"),
         (of_a_division_by_zero, "divide by zero"),
-        (of_a_vector, "encode fails"),
+        (of_a_vector, "the state is ("),
         (of_what_overflows, "overflow"),
         (with_an_early_return, "encode fails (its only return must be its last line)"),
         (with_a_return_in_each_branch, "encode fails (its only return must be its last line)"),
@@ -221,6 +221,13 @@ def test_a_field_is_read_by_its_name(diffusion):
 def test_fields_to_read_have_names_of_their_own(reads):
     with pytest.raises(AntsError, match=r"^reads of 'homely' contains .*\.$"):
         observations.register(Observation("homely", 16, of_home, reads=reads))
+
+
+def test_a_field_cannot_have_the_name_of_another_part_of_a_view():
+    with pytest.raises(AntsError, match=r"'level', but `own_level` of a view has another meaning;"):
+        observations.register(Observation("homely", 16, of_home, reads=("level",)))
+    with pytest.raises(AntsError, match=r"'strangers'; it must contain names of fields, each once"):
+        observations.register(Observation("homely", 16, of_home, reads=("strangers",)))
 
 
 def test_a_field_that_the_task_lacks_cannot_be_read():

@@ -359,7 +359,7 @@ WRONG = [
     ({"clear": [[10**9, 0, 0]]}, "the cell (1000000000, 0, 0) is outside the world"),
     ({"clear": "gate"}, "there is no region 'gate'"),
     ({"place": {"what": "queen", "cells": [60, 61]}}, "a single cell for the queen"),
-    ({"task": {"observation": "paper"}}, "cannot change its observation"),
+    ({"task": {"observation": "paper"}}, "the task cannot change observation from"),
     ({"place": {"what": "lava", "cells": [60]}}, "what` is 'lava'"),
     ({"place": {"what": 5, "cells": [60]}}, "what` is 5"),
     ({"place": {"what": "rock", "cells": []}}, "cells` is empty"),

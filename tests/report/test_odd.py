@@ -10,7 +10,7 @@ import pytest
 from command_lines import ROOT
 
 from taichi_ants import AntsError, TrainingConfig, files, learners, worlds
-from taichi_ants.protocol import At
+from taichi_ants.protocol import At, Every
 from taichi_ants.report.odd import RULES, Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
 from taichi_ants.studies.points import ColonyPoint, RunPoint
@@ -207,7 +207,8 @@ def test_events_and_fixed_policies_are_described():
         protocol=(At(tick=30, remove_ants=0.5),),
     )
     text = text_of(point, sweep={"world": {"preset": "my map.txt"}})
-    assert "- *at*: remove_ants.share 0.5, tick 30" in text
+    assert "- *at*: remove_ants.share 0.5; tick 30" in text
+    assert "| `protocol` | 1 event | none |" in text
     assert f"Ants follow the policy random, with SHA-256 `{policy.sha256}`" in text
     assert "**Learning.** None: ants follow a fixed rule or policy." in text
     assert "- `my map.txt`: a text map or a world of the plugin" in text
@@ -215,6 +216,59 @@ def test_events_and_fixed_policies_are_described():
     alone = text_of(RunPoint(worlds.paper(), Task(), SARSA, 0, 100, policy=policy))
     assert "one ant on a hexagonal grid forages by a fixed rule" in alone
     assert "7.6 Learning" not in alone
+
+
+def test_an_event_that_varies_is_described_once():
+    points = [
+        ColonyPoint(
+            *(worlds.paper(), Task(), SARSA),
+            ants=4,
+            protocol=(
+                At(tick=tick, remove_ants=0.5),
+                At(tick=20, trail={"level": level, **field}),
+                Every(ticks=50, stop=stop, task={"pheromone.level": 9}),
+            ),
+        )
+        for tick in (100, 200)
+        for level, field in ((0, {}), (5, {}), (9, {"field": "trail"}))
+        for stop in (None, 100)
+    ]
+    events = re.findall(r"^- (\*(?:at|every|when)\*.*)$", text_of(*points), re.M)
+    assert events == [
+        "*at*: remove_ants.share 0.5; tick 100 or 200",
+        "*at*: trail.level 0, 5 or 9; tick 20",
+        "*every*: task.pheromone.level 9; ticks 50; start 50; stop off or 100",
+    ]
+    home = Task(fields={"home": {}})
+    points = [
+        ColonyPoint(worlds.paper(), home, SARSA, protocol=At(3, trail={"level": 1, "field": name}))
+        for name in ("trail", "home")
+    ]
+    assert "- *at*: trail.level 1; tick 3; trail.field trail or home" in text_of(*points)
+
+
+def test_what_a_search_chooses_for_an_event_is_described():
+    point = ColonyPoint(worlds.paper(), Task(), SARSA, protocol=Every(ticks=50, trail=0))
+    vary = {"every.1.stop": {"from": 60, "to": 90}, "every.1.trail.field": ["trail", "home"]}
+    more = {"search.trials": 3, "search.prune_after": None, "search.held_out": [5]}
+    text = text_of(point, sweep={"search": {"maximise": "deliveries", "vary": vary}}, **more)
+    event = "every*: trail.level 0; ticks 50; start 50; stop 60 to 90; trail.field trail or home"
+    assert event in text
+
+
+def test_the_unit_of_a_level_is_that_of_its_evaporation():
+    fades = {"evaporation": "exponential", "half_life": 7}
+    task = Task().but(fields={"home": fades, "mark": {"evaporation": "none"}})
+    text = of_task(task)
+    assert "pheromone that ants lay | level; linear evaporation removes 1 per tick |" in text
+    assert (
+        "| `home` | level of a further pheromone | level; exponential evaporation halves it in 7 t"
+        in text
+    )
+    assert "| `mark` | level of a further pheromone | level |" in text
+    both = [Task(), Task().but(pheromone=fades)]
+    text = text_of(*(ColonyPoint(worlds.paper(), one, SARSA) for one in both))
+    assert "linear evaporation removes 1 per tick or exponential evaporation halves it in 7" in text
 
 
 def test_sentences_are_short_and_tables_have_even_rows():

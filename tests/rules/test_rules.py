@@ -138,6 +138,14 @@ def bits(level):
     return level & 3
 
 
+def both(level, least=2.0):
+    return level and least
+
+
+def negated(level):
+    return 1 - (not level)
+
+
 def whole_vector(levels):
     return levels
 
@@ -195,6 +203,8 @@ WRONG = [
     ("deposit", roots, "x must be above 0"),
     ("evaporation", undefined, "`nowhere`, is not defined"),
     ("evaporation", bits, "`level & 3`, is not allowed"),
+    ("evaporation", both, "`level and least`, is not a number; use it as a condition, as in"),
+    ("evaporation", negated, "`not level`, is not a number; use it as a condition, as in"),
     ("choice", whole_vector, "is a vector; use its entries"),
     ("choice", outside, "must have an index from 0 to 2"),
     ("choice", far_entry, "IndexError: there is no entry 3"),
@@ -281,7 +291,7 @@ def test_parameters_change_without_other_kernels_and_in_an_episode(clean):
     world = worlds.open_world(1, ranges=(8, 8, 8))
     colony = Colony(world, task, None, 0, 8, sharing="frozen")
     other = task.but(rules={"weaker": {"amount": 7}})
-    assert colony.check_same_kernels(other) is None
+    assert task.compiled(learning=False) == other.compiled(learning=False)
     colony.begin_episode()
     TaskNumbers((("rules.weaker.amount", 7.0),)).apply(Interventions(colony))
     assert colony.task == other

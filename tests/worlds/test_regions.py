@@ -56,7 +56,7 @@ def test_a_text_map_draws_regions():
         ("region a = %\nQ", "has no cell '%' of the region a; draw one, or leave"),
         ("Q\nregion a = %", "names a region; move it above the drawing"),
         ("region a = % Q\n%\n\n%", "a second time; draw the queen of each nest once"),
-        ("region 1a = %\n%\n\nQ", "regions has the name '1a'; it must be a word of letters"),
+        ("region 1a = %\n%\n\nQ", "line 1 of the map has a region '1a'; a name has letters"),
     ],
 )
 def test_a_wrong_line_of_a_region_is_named(text, says):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -13,13 +12,12 @@ from taichi_ants import checks
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ColonyState, checked_worlds
-from taichi_ants.engines.colony.stepping import Stepper, features_of
+from taichi_ants.engines.colony.stepping import Stepper
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown
 from taichi_ants.measures.measure import Measure
 from taichi_ants.measures.series import Recorder
 from taichi_ants.protocol import Event
-from taichi_ants.task import Task
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -128,25 +126,6 @@ class Colony(ColonyState):
             row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
         self._stepper.launch(self, "intervention_phases")
         row[:] = running
-
-    def check_same_kernels(self, task: Task) -> None:
-        """Raise an AntsError if a task needs other kernels than the present one."""
-        castes = {name: one.fixed for name, one in self.task.castes.items()}
-        if castes != {name: one.fixed for name, one in task.castes.items()}:
-            raise AntsError(
-                "the task cannot change the share, ants, nest or policy of a caste in an episode, "
-                "or whether it has thresholds; change its other numbers."
-            )
-        other = copy.copy(self)
-        other.take_task(task)
-        present, needed = features_of(self), features_of(other)
-        for name in present._fields:
-            if getattr(present, name) != getattr(needed, name):
-                raise AntsError(
-                    f"the task cannot change its {name.replace('_', ' ')} in an episode, because "
-                    "kernels are compiled for it; change settings that kernels read as numbers, "
-                    "for example pheromone.level."
-                )
 
     def tick(self, n: int = 1) -> None:
         """Advance by n ticks, except worlds whose episode has ended."""

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.checks import check_follows, check_learns
+from taichi_ants.checks import check_follows, check_learns, check_same_kernels
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import (
     ANT_STANDS,
@@ -248,7 +248,7 @@ class Interventions:
         """Set a task that differs only in settings that kernels read as numbers."""
         self._check_all("the task")
         colony = self.colony
-        colony.check_same_kernels(task)
+        check_same_kernels(colony.task, task, colony.learns)
         whole = [n for n, pheromone in enumerate(colony.pheromones) if not pheromone.dense]
         levels = {
             (one, number): np.maximum(one.stored(number) - one.clock(number), 0)

@@ -186,12 +186,9 @@ class ColonyState:
 
     def take_task(self, task: Task) -> None:
         """Set the attributes that depend on the task."""
-        life = task.life
         self.task, self.pheromone = task, task.pheromone_while(self.learns)
         self.fields = task.fields_while(self.learns)
-        spans = [life.lifespan, *(caste.lifespan for caste in task.castes.values())]
-        self.ants_change = life.births or any(span is not None for span in spans)
-        self.food_changes = task.food_changes
+        self.ants_change, self.food_changes = task.ants_change, task.food_changes
 
     @property
     def pheromones(self) -> tuple[Pheromone, ...]:

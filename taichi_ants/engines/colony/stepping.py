@@ -13,7 +13,6 @@ import numpy as np
 from taichi_ants import runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
-from taichi_ants.task.field import COMPASS, TRAIL
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.kernels import Features
@@ -133,55 +132,12 @@ def features_of(state: ColonyState) -> Features:
     """Return the features of a colony for which kernels are compiled."""
     from taichi_ants.engines.colony import kernels
 
-    task, pheromones = state.task, state.pheromones
-    cues = task.all_cues
-    outbound, homing = cues[0]
     return kernels.Features(
         learner=state.learner,
         own_tables=state.one_a_slot,
         is_given_actions=state.is_given_actions,
-        observation=task.sees,
-        dense=tuple(one.dense for one in pheromones),
-        # Only the views of cues are compiled.
-        views=tuple(
-            one.view if any(number in pair for pair in cues) else "half"
-            for number, one in enumerate(pheromones)
-        ),
-        outbound=outbound,
-        homing=homing,
-        carriers_follow=task.number_of(task.choice.carriers_follow or COMPASS),
-        reads=tuple(task.number_of(name) for name in task.sees.reads),
-        traffic=task.traffic,
-        ants_change=state.ants_change,
-        food_changes=state.food_changes,
-        choice=task.choice.rule,
-        slips=task.noise.slip > 0,
-        misreads=task.noise.misread > 0,
         n_nests=state.n_nests,
-        n_kinds=state.n_kinds,
-        has_foods=bool(task.foods),
-        has_loads=task.has_loads,
-        n_castes=len(task.castes),
-        cues=cues if len(cues) > 1 else (),
-        has_labour=task.labour.divides,
-        epsilon_varies=any(one.epsilon_spread for one in task.castes.values()),
-        **_own_rules(state),
-    )
-
-
-def _own_rules(state: ColonyState) -> dict[str, Any]:
-    """Return the features of your own rules, empty if the task has none."""
-    task = state.task
-    return (
-        {}
-        if not task.rules
-        else {
-            "rules": task.own_rules,
-            "reward": task.reward,
-            "deposits": tuple(one.deposit for one in state.pheromones),
-            "evaporations": tuple(one.evaporation for one in state.pheromones),
-            "fields": (TRAIL, *state.fields),
-        }
+        **state.task.compiled(state.learns),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from taichi_ants import measures
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
-from taichi_ants.interventions import Policy, TaskNumbers
+from taichi_ants.interventions import Policy
 from taichi_ants.protocol import Event, When, check_room, checked_protocol
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class Timetable:
     """
 
     def __init__(self, colony: Colony, protocol: Any, length: int) -> None:
-        self._colony, self._events = colony, checked_protocol(protocol)
+        self._colony, self._events, self._length = colony, checked_protocol(protocol), length
         self._at: dict[int, list[tuple[int, Event]]] = {}  # by tick: indices and events
         for number, event in enumerate(self._events):
             for tick in event.times(length):
@@ -45,15 +45,14 @@ class Timetable:
         """Raise an AntsError if an intervention cannot happen in this colony."""
         colony = self._colony
         for event in self._events:
-            check_room(event, self._events, colony.task, colony.ants, colony.capacity)
+            length = None if colony.ends_at_delivery else self._length
+            check_room(event, self._events, colony.task, colony.ants, colony.capacity, length)
             for one in event.interventions:
                 if isinstance(event, When) and one.in_all_worlds and len(colony.worlds) > 1:
                     raise AntsError(
                         f"`when.{one.path}` would change all {len(colony.worlds)} worlds of the "
                         "colony, which share it; make a colony with a single seed."
                     )
-                if isinstance(one, TaskNumbers):
-                    colony.check_same_kernels(one.changed(colony.task))
                 learns = colony.learns or colony.is_given_actions
                 one.check_in(colony.worlds[0], colony.task, learns)
 

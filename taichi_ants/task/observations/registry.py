@@ -12,21 +12,29 @@ import inspect
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from operator import index
 from textwrap import dedent
 from types import SimpleNamespace
 from typing import Any
 
-from taichi_ants.errors import AntsError, check_new_name, checked_whole, expect, shown, unusable
+from taichi_ants.errors import (
+    AntsError,
+    check_new_name,
+    checked_whole,
+    expect,
+    shown,
+    unusable,
+    whole,
+)
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
 
 # Tables of this many rows have 5 * 2**20 values; kernels index several tables with 32 bits.
 MAX_STATES = 1 << 20
 AHEAD = (-1, 0, 1)
 _VIEW = (
-    *("carries", "percept", "codes", "levels", "ants", "nearer", "strongest", "own_level"),
-    *("entries", "keys", "items"),  # methods of a view in kernels
+    *("carries", "percept", "codes", "levels", "ants", "strangers", "nearer", "strongest"),
+    "own_level",
 )
+_TAKEN = (*_VIEW, "entries", "keys", "items")  # methods of a view in kernels
 _VIEWS = 3000  # the number of views, and of names of states, that a check tries
 
 
@@ -140,12 +148,17 @@ def register(observation: Observation) -> Observation:
 def _check_reads(observation: Observation) -> None:
     reads = observation.reads
     expect(f"reads of {observation.name!r}", reads, tuple)
-    taken = {*_VIEW, *(f"own_{name}" for name in reads if isinstance(name, str))}
+    taken = {*_TAKEN, *(f"own_{name}" for name in reads if isinstance(name, str))}
     for name in reads:
         if not isinstance(name, str) or not name.isidentifier() or name in taken:
             raise AntsError(
                 f"reads of {observation.name!r} contains {shown(name)}; it must contain names of "
                 "fields, each once, other than the names in a view."
+            )
+        if f"own_{name}" in _TAKEN:
+            raise AntsError(
+                f"reads of {observation.name!r} contains {name!r}, but `own_{name}` of a view has "
+                "another meaning; rename the field."
             )
         taken.add(name)
 
@@ -181,8 +194,8 @@ def _try_functions(observation: Observation) -> None:
             raise ValueError("its only return must be its last line")
         with np.errstate(all="raise"):
             for view in _drawn_views(observation):
-                state = observation.encode(view)
-                if not 0 <= index(state) <= last:
+                state = whole("the state", observation.encode(view))
+                if not 0 <= state <= last:
                     raise ValueError(f"it returns {state}, which must lie between 0 and {last}")
         function = "name_of"
         for state in np.linspace(0, last, min(last + 1, _VIEWS), dtype=int).tolist():
@@ -191,7 +204,17 @@ def _try_functions(observation: Observation) -> None:
         raise unusable(observation, f"{function} fails ({error})") from error
 
 
-def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
+class _View(SimpleNamespace):
+    """A drawn view; its message about a name that it does not have lists those that it has."""
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(
+            f"a view has no `{name}`; choose one of {', '.join(vars(self))}, or add a field to "
+            "`reads`"
+        )
+
+
+def _drawn_views(observation: Observation) -> Iterator[_View]:
     import numpy as np
 
     rng, shape = np.random.default_rng(0), (_VIEWS, len(observation.cells))
@@ -213,7 +236,7 @@ def _drawn_views(observation: Observation) -> Iterator[SimpleNamespace]:
             lure, codes = 2 * visible >= max(strongest, 2), ground[n] & 3
         codes[lure] = SEES_LURE
         left, forward, right = codes[ahead]
-        yield SimpleNamespace(
+        yield _View(
             carries=carries[n],
             percept=carries[n] << 6 | left << 4 | forward << 2 | right,
             codes=_Vector(codes),
@@ -232,6 +255,6 @@ class _Vector(tuple):
     """A vector without negative indices, as in kernels."""
 
     def __getitem__(self, k: Any) -> Any:
-        if k < 0:
+        if not 0 <= k < len(self):
             raise IndexError(f"there is no entry {k}")
         return super().__getitem__(k)

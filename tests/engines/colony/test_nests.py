@@ -247,7 +247,7 @@ def test_pictures_show_every_queen():
         (lambda: record_colony(two_nests(), 1, 5), "record_colony supports one nest"),
         (lambda: AddAnts(number=1, nest=2).apply(Interventions(begun())), "nest is 2"),
         (lambda: Place("food", [[1, 0, 0]], kind="wax").apply(Interventions(begun())),
-         "place.kind is 'wax'"),
+         "`place.kind` is 'wax'"),
         (lambda: begun().run(1, 5, protocol=[At(2, remove_ants={"share": 0.5, "nest": 2})]),
          "`remove_ants.nest` is 2, but the world has 2 nests"),
         (lambda: Colony(WORLD, Task(), TRAINING), "the world has 2 kinds of food, but the task 1"),

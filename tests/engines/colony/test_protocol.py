@@ -268,6 +268,7 @@ WRONG = [
     (lambda: When("living", trail=0), "`when` needs a bound"),
     (lambda: When("synchrony", above=1, trail=0), "needs the series of 'activity'"),
     (lambda: At(3, task={"fields.a.levl": 3}), "`task.fields.a.levl` is not a setting"),
+    (lambda: At(3, task={"castes.a.epsilon": -1}), "`task.castes.a.epsilon` is -1; it must be"),
     (lambda: from_dict({"explode": 1}), "the name of an intervention is 'explode'"),
     (lambda: from_dict(3), "an intervention is 3; it must be a table"),
 ]
@@ -281,13 +282,20 @@ WRONG_IN_A_RUN = [
     (3, "protocol is 3; it must be a list of At, Every and When"),
     (At(100, trail=0), "`at.tick` is 100, but episodes have 100 ticks; choose at most 99"),
     (At(9, clear=[[99, 0, 0]]), "(99, 0, 0) is outside"),
-    (At(9, task={"observation": "paper"}), "cannot change its observation in an episode"),
+    (
+        At(9, task={"observation": "paper"}),
+        "the task cannot change observation from 'ants' to 'paper' in an",
+    ),
     (At(9, task={"fields.a.level": 3}), "is not a setting of task.fields"),
-    (At(9, task={"noise.slip": 0.1}), "cannot change its slips in an episode"),
+    (At(9, task={"noise.slip": 0.1}), "cannot change noise.slip from 0.0 to 0.1 in an episode"),
     (At(9, add_ants=5), "the 20 ants at the start leave room for 0, because the capacity is 20"),
     ([At(9, add_ants=5), At(50, ants=9)], "after 9 ticks, 5 ants cannot join 20 ants, because"),
     (When("living", above=3, epsilon=0.3), "`when.epsilon` would change all 2 worlds"),
     (At(9, learning_rate=0.3), "the ants do not learn"),
+    (
+        At(9, place={"what": "food", "cells": [[1, 0, 0]], "kind": "seed"}),
+        "`place.kind` is 'seed', but the task has no kinds of food; leave it out, or add",
+    ),
     (At(9, place={"what": "queen", "cells": [[9, 0, 0]]}), "the queen cannot move to cell"),
 ]
 
