@@ -26,7 +26,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def archive(settings: argparse.Namespace) -> None:
     """Write the archive, and print what it contains."""
-    from taichi_ants.files import check_writable_file
+    from taichi_ants.files import check_writable_file, check_writable_folder
     from taichi_ants.report.odd import odd_of
     from taichi_ants.studies.reproduction import checked_manifest, write_archive
 
@@ -35,7 +35,9 @@ def archive(settings: argparse.Namespace) -> None:
     manifest = checked_manifest(folder)
     if out.exists() and not settings.force:
         raise AntsError(f"{str(out)!r} exists; choose another --out, or give --force.")
-    write_archive(check_writable_file(out), folder, manifest, odd_of(folder, manifest))
+    odd = odd_of(folder, manifest)
+    check_writable_folder(out.parent, out)
+    write_archive(check_writable_file(out), folder, manifest, odd)
     size, number = out.stat().st_size / 1e6, len(manifest["files"]) + 1
     print(f"{out}: {number} files of results, ODD.md, requirements.txt ({size:.1f} MB)")
     print(f"To repeat the study and compare: taichi-ants reproduce {out}")
