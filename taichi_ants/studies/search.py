@@ -9,8 +9,9 @@ suggesting the same settings again, and reads their results from finished blocks
 from __future__ import annotations
 
 import math
+import time
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,7 +22,7 @@ from taichi_ants import checks, files
 from taichi_ants.analysis import searches, sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, shown
-from taichi_ants.files.results import REPORT
+from taichi_ants.files.results import REPORT, ROWS
 from taichi_ants.settings import flat, nested, not_a_setting
 from taichi_ants.studies import design, sweep
 from taichi_ants.studies.blocks import Blocks
@@ -38,6 +39,7 @@ TRIALS, HELD_OUT, BEST, STORAGE = "trials.csv", "held_out.csv", "best.toml", "op
 # Folders of blocks: of each trial, whose number follows, and of the held-out seeds.
 TRIAL_BLOCKS, HELD_OUT_BLOCKS = "trial-", "held-out"
 COMPLETE, PRUNED, FAILED = "complete", "pruned", "failed"
+_WRITE_EVERY = 5.0  # seconds, at least, between two tables of the trials so far
 _KEYS = ("maximise", "minimise", "trials", "seed", "prune", "prune_after", "held_out", "vary")
 _OF_SWEEPS = ("vary", "against", "margin", "measure_every", *design.KEYS)
 _VERDICTS = {"supported": "better", "contradicted": "worse", "equivalent": "equal"}
@@ -137,9 +139,10 @@ class Search:
     def measured(self, blocks: Path, progress: Progress, **where: Any) -> Found:
         """Return the results; compute what the folder of blocks lacks.
 
-        Arguments are those of `Study.in_blocks`. Raises AntsError if no trial has a value.
+        Arguments are those of `Study.in_blocks`. The trials so far are written beside the blocks,
+        every few seconds. Raises AntsError if no trial has a value.
         """
-        study, tried = self._study(), list[Trial]()
+        study, tried, written = self._study(), list[Trial](), -_WRITE_EVERY
         total = self.trials * len(self.base.seeds) + 2 * len(self.held_out)
 
         def part(done: float, share: float) -> Progress:
@@ -149,6 +152,9 @@ class Search:
             trial, row = self._asked(study, number)
             tried.append(self._tried(trial, row, blocks, part, where))
             self._tell(study, trial, tried[-1])
+            if time.monotonic() - written >= _WRITE_EVERY or number == self.trials - 1:
+                self._write_trials(tried, study, blocks.parent / ROWS)
+                written = time.monotonic()
         done = [n for n, one in enumerate(tried) if one.state == COMPLETE]
         if not done:
             raise AntsError(
@@ -277,8 +283,10 @@ class Search:
         own = (self.base.measures, None, None, 0.0)
         return Sweep(self.base.kind, study, rows, (), *own).measured(folder, progress, **where)
 
-    def write(self, found: Found, folder: Path, draws: bool) -> None:
-        """Write all results; `found` is what `measured` returned."""
+    def _write_trials(
+        self, trials: Sequence[Trial], study: optuna.Study, folder: Path
+    ) -> list[Settings]:
+        """Write the trials as a table and in Optuna's format; return the rows of the table."""
         rows = [
             {
                 **{"trial": number, "state": one.state},
@@ -286,16 +294,24 @@ class Search:
                 **one.settings,
                 **{name: array.mean() for name, array in one.values.items()},
             }
-            for number, one in enumerate(found.trials)
+            for number, one in enumerate(trials)
         ]
+        files.check_writable_folder(folder)
         files.write_csv(folder / TRIALS, rows, sweeps.columns_of(rows))
+        with files.writing(folder), files.unfinished(folder / STORAGE) as place:
+            self._store(study, place)
+            place.replace(folder / STORAGE)
+        return rows
+
+    def write(self, found: Found, folder: Path, draws: bool) -> None:
+        """Write all results; `found` is what `measured` returned."""
+        rows = self._write_trials(found.trials, found.study, folder)
         default, best = found.held_out[self.measure]
         pairs = zip(self.held_out, default, best, best - default, strict=True)
         columns = "seed", "default", "best", "difference"
         several = [dict(zip(columns, pair, strict=True)) for pair in pairs]
         files.write_csv(folder / HELD_OUT, several, columns)
         files.write_text(folder / BEST, self.best_file(found))
-        self._store(found.study, folder / STORAGE)
         files.write_text(folder / REPORT, self._report(found, rows))
         if draws:
             words = measure_of(self.base.kind, self.measure).words

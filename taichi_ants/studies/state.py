@@ -14,13 +14,14 @@ from taichi_ants.errors import AntsError, count
 from taichi_ants.files.results import (
     BLOCKS,
     FAILED,
+    ROWS,
     UNFINISHED,
     manifest_in,
     seconds_of,
     start_of,
 )
 from taichi_ants.studies.blocks import Blocks
-from taichi_ants.studies.search import HELD_OUT_BLOCKS, TRIAL_BLOCKS
+from taichi_ants.studies.search import COMPLETE, HELD_OUT_BLOCKS, TRIAL_BLOCKS, TRIALS
 
 
 def state(folder: Path) -> Iterator[str]:
@@ -37,9 +38,10 @@ def state(folder: Path) -> Iterator[str]:
             "study."
         )
     if finished:
-        runs = finished.get("runs")
-        several = f" with {count(len(list(_runs_of(runs))), 'run')}" if runs else ""
-        yield f"finished: results{several}, since {finished['finished']}"
+        runs, trials = finished.get("runs"), finished["settings"].get("search.trials")
+        several = count(len(list(_runs_of(runs))), "run") if runs else ""
+        several = count(trials, "trial") if trials else several
+        yield f"finished: results{several and f' with {several}'}, since {finished['finished']}"
     if unfinished:
         yield from _of_work(folder / UNFINISHED, unfinished)
 
@@ -53,8 +55,8 @@ def _of_work(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
     several = count(len(times), "block")
     if manifest.get("runs"):
         yield from _of_study(folder, manifest, times)
-    elif trials := manifest["settings"].get("search.trials"):
-        yield from _of_search(folder, trials, several)
+    elif "search.trials" in manifest["settings"]:
+        yield from _of_search(folder, manifest["settings"], several)
     else:
         yield f"unfinished: {several} done"
     if (folder / FAILED).exists():
@@ -96,13 +98,22 @@ def _of_study(
         yield f"left: about {_duration((total - work) * seconds / (new or work))}"
 
 
-def _of_search(folder: Path, trials: int, several: str) -> Iterator[str]:
+def _of_search(folder: Path, settings: Mapping[str, Any], several: str) -> Iterator[str]:
+    trials = settings["search.trials"]
     begun = sorted((folder / BLOCKS).glob(f"{TRIAL_BLOCKS}*"))
     compares = (folder / BLOCKS / HELD_OUT_BLOCKS).exists()
     done = trials if compares else int(begun[-1].name.removeprefix(TRIAL_BLOCKS)) if begun else 0
     yield f"unfinished: {done} of {count(trials, 'trial')} done, in {several}"
     if 0 < done < trials and (seconds := seconds_of(folder)):
         yield f"left: about {_duration(seconds / done * (trials - done))}"
+    if (folder / ROWS / TRIALS).exists():
+        minimises = "search.minimise" in settings
+        measure = settings["search.minimise" if minimises else "search.maximise"]
+        rows = files.read_csv(folder / ROWS / TRIALS)
+        complete = [one for one in rows if one["state"] == COMPLETE]
+        if complete:
+            best = min(complete, key=lambda one: one[measure] * (1 if minimises else -1))
+            yield f"best: trial {best['trial']:.0f}, {measure} {best[measure]:.4g}"
 
 
 def _duration(seconds: float) -> str:

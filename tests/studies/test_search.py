@@ -288,6 +288,7 @@ def test_a_finished_search_continues_with_more_held_out_seeds(tmp_path, capsys, 
     status, _, err = call("sweep", ["my.toml", "--out", "grown", "--no-figures"], capsys)
     assert status == 2
     assert "(not the same search.held_out)" in err
+    assert "  finished: results with 4 trials, since 2" in call("status", ["grown"], capsys)[1]
 
 
 def test_the_state_of_a_search_that_was_stopped(tmp_path, capsys, monkeypatch):
@@ -301,11 +302,21 @@ def test_the_state_of_a_search_that_was_stopped(tmp_path, capsys, monkeypatch):
         return do(*arguments)
 
     monkeypatch.setattr(search.ColonyPoint, "do", staticmethod(stops))
+    monkeypatch.setattr(search, "_WRITE_EVERY", 0.0)
     (tmp_path / "my.toml").write_text(TEXT.replace("prune_after = 2", "prune = false"))
     assert call("sweep", ["my.toml", "--out", "out", "--no-figures"], capsys)[0] == 130
     _, out, _ = call("status", ["out"], capsys)
     assert "unfinished: 7 of 40 trials done, in 7 blocks" in out
     assert "left: about " in out
+    assert "finished" not in out.replace("unfinished", "")
+    rows = files.read_csv("out/unfinished/rows/trials.csv")
+    best = max(rows, key=lambda one: one["deliveries"])
+    assert f"best: trial {best['trial']:.0f}, deliveries {best['deliveries']:.4g}\n" in out
+    storage = optuna.storages.JournalStorage(
+        optuna.storages.journal.JournalFileBackend("out/unfinished/rows/optuna.journal")
+    )
+    stored = optuna.load_study(study_name="search", storage=storage)
+    assert [one.value for one in stored.trials] == [one["deliveries"] for one in rows]
 
 
 WRONG = {
