@@ -15,13 +15,12 @@ from taichi_ants.checks import (
     checked_seeds,
     checked_share,
     checked_table,
-    refuse_castes,
-    refuse_foods,
 )
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, listing, shown
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.policies import WITHOUT_LEARNING
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, ROW
 from taichi_ants.task.field import COMPASS, TRAIL
@@ -40,6 +39,12 @@ _MOST_NUMBERS = 1 << 27  # elements of independent tables
 def check_cues(task: Task) -> None:
     """Raise AntsError if a task has pheromones or rules that the form of the page lacks."""
     check_own_rules(task, "the live page")
+    for name, entries in (("castes", task.castes), ("foods", task.foods)):
+        if entries:
+            raise AntsError(
+                f"the task has {listing(entries, name[:-1])}, which the form of the live page "
+                "lacks; make a Session in Python, and open its file with --session."
+            )
     if task.fields or (task.outbound_cue, task.homing_cue) != (TRAIL, COMPASS):
         raise AntsError(
             f"the task has {listing(task.fields, 'further field')}, and its cues are "
@@ -74,8 +79,12 @@ class Setup:
         expect("task", self.task, Task)
         check_own_rules(self.task, "the live page")
         check_one_of("pheromone", self.pheromone, (TRAIL, *self.task.fields))
-        refuse_castes(self.task, "the live page")
-        refuse_foods(self.task, "the live page")
+        for name, caste in self.task.castes.items():
+            if caste.policy not in (None, *WITHOUT_LEARNING):  # pages must not name files
+                raise AntsError(
+                    f"`task.castes.{name}.policy` is {shown(caste.policy)}, but the live page "
+                    f"reads no files; choose one of {', '.join(WITHOUT_LEARNING)}, or leave it out."
+                )
         if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "independent"))
             learners.get(self.policy.learner)
@@ -143,12 +152,7 @@ class Setup:
         else:
             training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
             options |= {"sharing": "frozen", "q_values": self.policy}
-        if (world := self.build_world()).n_food_kinds > 1:
-            raise AntsError(
-                f"the world has {world.n_food_kinds} kinds of food, but the live page supports "
-                "only one; draw all food as F, or use a Colony."
-            )
-        return Colony(world, self.task, training, self.seed, **options)
+        return Colony(self.build_world(), self.task, training, self.seed, **options)
 
     def to_json(self) -> dict[str, Any]:
         """Return the setup, JSON-compatible; a table of action values becomes the word "table"."""

@@ -26,6 +26,7 @@ class Tools {
         <svg viewBox="0 0 20 20" aria-hidden="true">${drawing}</svg><span>${label}</span></button>`).join("")
       + `<button type="button" class="icon" id="undo" disabled title="Undo: return to the moment before the last change (Ctrl+Z)">
         <svg viewBox="0 0 20 20" aria-hidden="true"><path d="M7.5 4.5 4 8l3.5 3.5M4.4 8h7.1a4.2 4.2 0 0 1 0 8.4H8"/></svg><span>Undo</span></button>`
+      + '<label id="kind-label" title="Kind of food" hidden><span class="unseen">Kind of food</span><select id="kind"></select></label>'
       + `<label class="brush" title="Brush size ([ and ])"><span class="unseen">Brush size</span>
         <input type="range" id="brush" min="1" max="${MOST_RADIUS + 1}" value="1" step="1"></label>`;
     document.querySelector(".stage").append(bar);
@@ -51,6 +52,11 @@ class Tools {
     byId("world").style.cursor = name === "look" ? "" : "crosshair";
     const { viewer } = this.live;
     if (!viewer) return;
+    const { foods } = viewer.history.header, kind = byId("kind");
+    byId("kind-label").hidden = name !== "food" || foods.length < 2;
+    if (kind.length !== foods.length || foods.some((one, n) => kind[n].value !== one)) {
+      kind.replaceChildren(...foods.map((one) => new Option(one)));
+    }
     viewer.stage.covered = 62;
     if (viewer.stage.fitted) viewer.stage.fit();
     viewer.tool = name === "look" ? null : this;
@@ -142,7 +148,8 @@ class Tools {
     const free = cells.filter((cell) => ground[cell] !== QUEEN && !taken.has(cell));
     if (this.name === "rock" || this.name === "food") {
       this.aside += cells.filter((cell) => taken.has(cell)).length;
-      this.edit("place", { what: this.name }, cells.filter((cell) => ground[cell] !== QUEEN));
+      const kind = this.name === "food" && history.header.foods.length > 1 ? { kind: byId("kind").value } : {};
+      this.edit("place", { what: this.name, ...kind }, cells.filter((cell) => ground[cell] !== QUEEN));
     } else if (this.name === "trail") {
       this.edit("trail", { level: history.header.strongest, ...this.field() }, cells.filter((cell) => ground[cell] !== OBSTACLE));
     } else if (this.name === "ants") this.edit("add_ants", {}, free.filter((cell) => ground[cell] === EMPTY));

@@ -42,13 +42,19 @@ SECTIONS = {
     "numbers": "i4",
     "cells": "cell",
     "poses": "u1",  # the heading, plus 8 with food, plus 16 times the nest
+    # The caste, plus 16 times the kind of the food that the ant carries, plus 128 if it is idle;
+    # empty without castes and with one kind of food.
+    "groups": "u1",
     "states": "state",
     # Actions of the ants of the previous frame; empty unless exactly one tick has passed.
-    "acts": "u1",  # the action, plus 16 times the event
+    "acts": "u1",  # the action, or 15 of an idle ant, plus 16 times the event
+    "rewards": "f4",  # of these actions; empty if events determine them
     "td_errors": "f4",  # NaN where unknown; empty if no ant learns
     # Changes since the previous frame: indices and new values.
     "ground_at": "cell",
     "ground": "u1",
+    "kinds_at": "cell",
+    "kinds": "u1",  # kinds of the food in cells; empty with one kind
     "queens": "cell",  # cells of the queens by nest; empty if they are those of the previous frame
     "trail_at": "cell",
     "trail": "level",  # expiry clocks, or levels, see `Colony.stored_trail`

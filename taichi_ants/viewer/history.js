@@ -16,7 +16,7 @@
    A frame is an ArrayBuffer, or a view of one. */
 
 const EMPTY = 0, OBSTACLE = 5, FOOD = 7, QUEEN = 13; // contents of a cell, as in task/constants.py
-const N_ACTIONS = 5;
+const N_ACTIONS = 5, IDLE = 15; // IDLE is the action of an idle ant in frames
 const MOST_BYTES = 2 ** 27; // bytes of stored frames; a live simulation has more after some hours
 const CLOCK = ["episode", "tick", "deliveries", "returns", "epsilon", "learningRate", "ants", "delivered", "ticks", "trailClock"];
 const POINT = ["episode", "ticks", "delivered", "returns", "epsilon", "ended"]; // as in frames.py
@@ -107,7 +107,10 @@ class History {
     this.ends = []; // points at the ends of episodes
     this.values = new Map(); // entry of a table -> [moments, values] of its changes
     // `stored` is the trail in the form of the kernels, `trail` its levels.
-    this.world = { moment: -1, ground: new Uint8Array(this.grid.size), stored: this.emptyTrail(), trail: this.emptyTrail() };
+    this.world = {
+      moment: -1, ground: new Uint8Array(this.grid.size), kinds: new Uint8Array(this.grid.size),
+      stored: this.emptyTrail(), trail: this.emptyTrail(),
+    };
     this.kept = []; // copies of the world at some moments, for fast seeking
     this.lastKept = -Infinity;
     // At most 64 MiB of copies, so large worlds have fewer.
@@ -123,11 +126,18 @@ class History {
     return this.dense ? new Float32Array(this.grid.size) : new Int32Array(this.grid.size);
   }
 
+  /* Zeros for the groups of ants, in memory that frames share. */
+  none(length) {
+    if (!(this.zeros?.length >= length)) this.zeros = new Uint8Array(2 * length);
+    return this.zeros.subarray(0, length);
+  }
+
   /* Append a frame; keeps views of its bytes. A whole frame does not depend on earlier ones. */
   add(bytes, whole = false) {
     const { header } = this, frame = this.read(bytes), moment = this.length, before = this.frames[moment - 1];
     if (!frame.numbers.length && frame.ants) frame.numbers = before.numbers;
     if (!frame.queens.length) frame.queens = before.queens;
+    if (frame.groups.length < frame.cells.length) frame.groups = this.none(frame.cells.length);
     frame.number = moment;
     frame.whole = whole;
     frame.passed = before && before.episode === frame.episode ? frame.tick - before.tick : 0;
@@ -166,7 +176,7 @@ class History {
     for (; this.first < first; this.first++) {
       const { number, size, ...rest } = this.frames[this.first];
       const clock = Object.fromEntries(CLOCK.map((name) => [name, rest[name]]));
-      const nothing = { numbers: [], cells: [], poses: [], states: [], acts: [], td_errors: [], passed: 0 };
+      const nothing = { numbers: [], cells: [], poses: [], groups: [], states: [], acts: [], td_errors: [], passed: 0 };
       this.frames[this.first] = { number, ...clock, ...nothing };
       this.bytes -= size;
     }
@@ -214,12 +224,13 @@ class History {
 
   /* A complete frame of a moment, see `pack` in frames.py. */
   wholeFrame(moment) {
-    const frame = this.frames[moment], { ground, stored } = this.worldAt(moment);
+    const frame = this.frames[moment], { ground, kinds, stored } = this.worldAt(moment);
     const since = moment > this.first ? this.frames[moment - 1].ticks : -1;
     const points = [...(moment > this.first ? [] : this.within), ...this.ends].filter(({ ticks }) => ticks > since && ticks <= frame.ticks);
     const entries = [...this.values.keys()].filter((entry) => this.values.get(entry)[0][0] <= moment);
     const sections = {
-      ...frame, acts: [], td_errors: [], ground_at: ground.keys(), ground, trail_at: stored.keys(), trail: stored,
+      ...frame, acts: [], rewards: [], td_errors: [], ground_at: ground.keys(), ground, kinds_at: kinds.keys(), kinds,
+      trail_at: stored.keys(), trail: stored,
       table_at: entries, table: entries.map((entry) => this.entry(moment, entry)),
       progress: points.flatMap((point) => POINT.map((name) => point[name])),
     };
@@ -259,10 +270,12 @@ class History {
       if (from && (moment < world.moment || from.moment > world.moment)) {
         world.moment = from.moment;
         world.ground.set(from.ground);
+        world.kinds.set(from.kinds);
         world.stored.set(from.stored);
       } else if (moment < world.moment) {
         world.moment = -1;
         world.ground.fill(0);
+        world.kinds.fill(0);
         world.stored.fill(0);
       }
     }
@@ -276,14 +289,17 @@ class History {
     const world = this.world, frame = this.frames[world.moment + 1];
     if (frame.whole) {
       world.ground.fill(0);
+      world.kinds.fill(0);
       world.stored.fill(0);
     }
     frame.ground_at.forEach((cell, i) => (world.ground[cell] = frame.ground[i]));
+    frame.kinds_at.forEach((cell, i) => (world.kinds[cell] = frame.kinds[i]));
     frame.trail_at.forEach((cell, i) => (world.stored[cell] = frame.trail[i]));
     world.moment++;
     const last = this.kept[this.kept.length - 1];
     if (world.moment >= (last ? last.moment + this.keepEvery : 0)) {
-      this.kept.push({ moment: world.moment, ground: world.ground.slice(), stored: world.stored.slice() });
+      const { ground, kinds, stored } = world;
+      this.kept.push({ moment: world.moment, ground: ground.slice(), kinds: kinds.slice(), stored: stored.slice() });
       if (this.kept.length > this.mostKept) {
         this.kept = this.kept.filter((_, i) => i % 2 === 0);
         this.keepEvery *= 2;
@@ -307,8 +323,8 @@ class History {
 
   /* An ant at a moment, with its next action; null if it does not live then.
 
-     {number, nest, cell, heading, loaded, state, values, act}; act is null if unknown, else
-     {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}. why is
+     {number, nest, caste, kind, idle, cell, heading, loaded, state, values, act}; `kind` is that of its
+     food, and act is null if unknown or if the ant is idle, else {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}. why is
      "best", "tie" (of `ties` actions) or "explored", by the values at the time of the choice, one
      tick earlier if it was made `ahead`. tdError is a mean over `sharers`; before and after are
      action values. */
@@ -317,13 +333,19 @@ class History {
     if (i < 0) return null;
     const frame = this.frames[moment];
     const ant = {
-      number, nest: frame.poses[i] >> 4, cell: frame.cells[i], heading: frame.poses[i] & 7,
+      number, nest: frame.poses[i] >> 4, caste: frame.groups[i] & 15, kind: (frame.groups[i] >> 4) & 7,
+      idle: frame.groups[i] > 127, cell: frame.cells[i], heading: frame.poses[i] & 7,
       loaded: (frame.poses[i] & 8) > 0, state: frame.states[i], act: null,
     };
     ant.values = this.row(moment, ant);
     const next = this.frames[moment + 1];
-    if (next && next.acts.length) ant.act = this.act(moment, i, ant);
+    if (next && next.acts.length && (next.acts[i] & 15) !== IDLE) ant.act = this.act(moment, i, ant);
     return ant;
+  }
+
+  /* The number of the table of an ant, as in `Colony.tables_of_ants`. */
+  owner({ number, nest, caste }) {
+    return this.header.own_tables ? number : nest * Math.max(1, this.header.castes.length) + caste;
   }
 
   act(moment, i, ant) {
@@ -340,18 +362,18 @@ class History {
     if (header.learns && !header.own_tables) {
       sharers = 0;
       for (let k = 0; k < next.acts.length; k++) {
-        if (frame.states[k] === ant.state && frame.poses[k] >> 4 === ant.nest && (next.acts[k] & 15) === action) sharers++;
+        const group = { nest: frame.poses[k] >> 4, caste: frame.groups[k] & 15 };
+        if (frame.states[k] === ant.state && this.owner(group) === this.owner(ant) && (next.acts[k] & 15) === action) sharers++;
       }
     }
     const tdError = next.td_errors.length ? next.td_errors[i] : NaN;
-    const reward = header.rewards[next.acts[i] >> 4];
+    const reward = header.rewards ? header.rewards[next.acts[i] >> 4] : next.rewards[i];
     return { action, event, reward, why, ties, ahead, tdError, sharers, before, after, values };
   }
 
   /* The five action values of an ant's state as they stood at a moment. */
-  row(moment, { number, nest, state }) {
-    const owner = this.header.own_tables ? number : nest;
-    const first = (owner * this.header.n_states + state) * N_ACTIONS;
+  row(moment, ant) {
+    const first = (this.owner(ant) * this.header.n_states + ant.state) * N_ACTIONS;
     return Array.from({ length: N_ACTIONS }, (_, action) => this.entry(moment, first + action));
   }
 
@@ -404,7 +426,7 @@ class History {
         if (frame.cells[i] !== cell + offset) continue;
         const ant = { nest: frame.poses[i] >> 4, cell: frame.cells[i], heading: frame.poses[i] & 7 };
         const action = next.acts[i] & 15, event = this.header.events[next.acts[i] >> 4];
-        if (this.target(ant, action) === cell) found.push({ number: frame.numbers[i], action, event });
+        if (action !== IDLE && this.target(ant, action) === cell) found.push({ number: frame.numbers[i], action, event });
       }
     }
     return found;

@@ -15,8 +15,8 @@ import numpy as np
 from taichi_ants import files
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
-from taichi_ants.errors import AntsError, expect
-from taichi_ants.rendering.snapshots import colony_snapshots, frames, picture
+from taichi_ants.errors import expect
+from taichi_ants.rendering.snapshots import picture
 from taichi_ants.rendering.writers import check_single, png, write
 from taichi_ants.viewer.frames import Recording
 from taichi_ants.viewer.recorder import record_colony, record_trace
@@ -114,8 +114,6 @@ def frame(recording: Recording) -> str:
 def notebook(shown: Any) -> str | None:
     """Return HTML that shows a world, recording, trace or colony; None if it is too large.
 
-    A colony whose task pages do not support, for example with castes, becomes a picture.
-
     IPython calls this function, see `taichi_ants.__init__`.
     """
     if isinstance(shown, Recording):
@@ -128,13 +126,10 @@ def notebook(shown: Any) -> str | None:
     expect("the object", shown, Colony)
     if shown.grid.size > _MOST_CELLS or shown.ants > _MOST_ANTS or shown.episode < 0:
         return None
-    try:
-        return frame(record_colony(shown))
-    except AntsError:  # pages do not support the task, but pictures do
-        return _image(shown, next(frames(colony_snapshots(shown), task=shown.task)))
+    return frame(record_colony(shown))
 
 
-def _image(shown: World | Colony, pixels: np.ndarray) -> str:
-    """Return an HTML image of a world or colony, with its text for screen readers."""
+def _image(shown: World, pixels: np.ndarray) -> str:
+    """Return an HTML image of a world, with its text for screen readers."""
     content = base64.b64encode(png(pixels, optimize=True)).decode()
     return f'<img alt="{html.escape(repr(shown))}" src="data:image/png;base64,{content}">'

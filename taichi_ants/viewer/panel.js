@@ -84,11 +84,23 @@ class Panel {
     const buttons = button("ant-before", "Previous ant (P)", "before") + button("ant-after", "Next ant (N)", "after")
       + button("ant-aim", "Keep this ant centred (F)", "aim", `aria-pressed="${aims}"`)
       + button("ant-close", "Stop following (Esc)", "close");
-    const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? "with food" : "no food"}</span>` : "";
-    const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>`;
+    const badge = ant ? ` <span class="badge ${ant.loaded ? "loaded" : ""}">${ant.loaded ? `with ${this.foodOf(ant.kind)}` : "no food"}</span>` : "";
+    const head = `<div class="head"><h2>Ant ${followed}${badge}</h2>${buttons}</div>${ant ? this.groupsOf(ant) : ""}`;
     if (ant) ant.tick = this.history.frames[moment].tick;
     if (ant && !ant.act && this.history.live) ant.past = this.lastAct(moment, followed);
     card.innerHTML = head + (ant ? this.viewOf(ant) + this.barsOf(ant) + this.storyOf(ant) : "<p>This ant is not alive at this tick.</p>");
+  }
+
+  /* The name of a kind of food. */
+  foodOf(kind) {
+    return safe(this.history.header.foods[kind] ?? "food");
+  }
+
+  /* The nest and the caste of an ant, and whether it is idle, where these differ between ants. */
+  groupsOf({ nest, caste, idle }) {
+    const { castes, nests } = this.history.header;
+    const words = [...(nests > 1 ? [`nest ${nest}`] : []), ...(castes.length ? [castes[caste]] : []), ...(idle ? ["idle"] : [])];
+    return words.length ? `<span class="label groups">${safe(words.join(" · "))}</span>` : "";
   }
 
   /* The ant at its last known action, at most a few moments ago. */
@@ -123,7 +135,7 @@ class Panel {
     const box = around ? "-2.9 -2.9 5.8 5.8" : "-2.6 -2.65 5.2 3.65";
     return `<div class="sees"><svg viewBox="${box}" role="img" aria-label="It sees, from left to right: ${safe(rest)}">`
       + `${shapes.join("")}<path d="${HEXAGON}" transform="scale(.93)" fill="none" stroke="var(--rule)" stroke-width=".07"/>`
-      + `${antShape(ant.loaded)}</svg><div><span class="label">state ${ant.state}</span><b>${safe(task)} ${safe(rest)}</b>`
+      + `${antShape(ant.loaded, "var(--ant)", this.stage.colours[ofKind(ant.kind)])}</svg><div><span class="label">state ${ant.state}</span><b>${safe(task)} ${safe(rest)}</b>`
       + `<small>${safe(meaning)}</small></div></div>`;
   }
 
@@ -155,6 +167,7 @@ class Panel {
 
   storyOf(ant, before = "") {
     const { header, live } = this.history, act = ant.act;
+    if (ant.idle && !act) return '<div class="story"><span class="label">It is idle, so it does not act.</span></div>';
     if (ant.past) return this.storyOf(ant.past, '<span class="label">In the last tick:</span>');
     if (!act) {
       const late = this.history.length === 1 ? "This page opened after the last tick. Actions appear from the next tick."
@@ -186,13 +199,14 @@ class Panel {
     const card = byId("cell"), { history } = this;
     card.hidden = cell < 0;
     if (cell < 0) return;
-    const { ground, trail } = history.worldAt(moment), ants = history.antsOn(moment, cell);
+    const { ground, kinds, trail } = history.worldAt(moment), ants = history.antsOn(moment, cell);
+    const holds = ground[cell] === FOOD ? this.foodOf(kinds[cell]) : HOLDS[ground[cell]] ?? "?";
     const level = trail[cell];
     const link = (number) => `<button type="button" class="link" data-follow="${number}">ant ${number}</button>`;
     const wanting = history.wanting(moment, cell).map(({ number, action, event }) =>
       `${link(number)} (${history.header.actions[action]}${["BLOCKED", "FAILED"].includes(event) ? ", failed" : ""})`);
     const lines = [
-      ["contains", ants.length ? ants.map(link).join(", ") : HOLDS[ground[cell]] ?? "?"],
+      ["contains", ants.length ? ants.map(link).join(", ") : holds],
       [safe(history.header.pheromone), `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.strongest}`],
       ["next actions", wanting.join(", ") || "none"],
     ];
@@ -224,8 +238,12 @@ class Panel {
       const [queen, ant] = ["queen", "ant"].map((name) => this.stage.colours[ofNest(name, n)]);
       return `${cell("var(--queen-floor)", drawing(queen, CROWN))}<svg viewBox="-1 -1 2 2" aria-hidden="true">${antShape(false, ant)}</svg>nest ${n}`;
     });
+    const { foods } = this.history.header;
+    const kinds = (foods.length ? foods : ["food"]).map((name, kind) =>
+      `${cell("var(--food-floor)", drawing(this.stage.colours[ofKind(kind)], CRUMBS))}${safe(name)}`);
+    const idle = this.history.header.idles ? [`${bodies[0].replace("<svg", '<svg opacity=".4"')}idle ant`] : [];
     byId("legend").innerHTML = [
-      `${bodies[0]}ant`, `${bodies[1]}ant with food`, `${cell("var(--food-floor)", drawing("var(--food)", CRUMBS))}food`,
+      `${bodies[0]}ant`, `${bodies[1]}ant with food`, ...idle, ...kinds,
       `${cell("var(--queen-floor)", drawing("var(--queen)", CROWN))}queen`, `${cell("var(--rock)")}rock`,
       `<span class="ramp"></span>${safe(this.history.header.pheromone)}`, ...nests,
     ].map((item) => `<li>${item}</li>`).join("");
@@ -234,8 +252,8 @@ class Panel {
 }
 
 /* An ant with heading up, as part of an SVG. */
-function antShape(loaded, colour = "var(--ant)") {
+function antShape(loaded, colour = "var(--ant)", food = "var(--food)") {
   const half = `<path d="${LIMBS}" fill="none" stroke="${colour}" stroke-width=".07" stroke-linecap="round"/>`;
-  const crumb = loaded ? '<circle cy="-.7" r=".25" fill="var(--food)"/>' : "";
+  const crumb = loaded ? `<circle cy="-.7" r=".25" fill="${food}"/>` : "";
   return `${half}<g transform="scale(-1 1)">${half}</g><path d="${BODY}" fill="${colour}"/>${crumb}`;
 }

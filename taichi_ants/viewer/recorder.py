@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.checks import check_progress, check_rewards, refuse_castes, refuse_foods
+from taichi_ants.checks import check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, check_one_of, count, expect
@@ -25,6 +25,7 @@ from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.viewer.frames import Recording, pack, types_of
 
 _MOST_NAMES = 4096  # states up to which a header names all states, seen or not
+_IDLE = 15  # the action of an idle ant in frames
 _MOST = 1000  # points of curves of each kind
 
 Point = tuple[float, ...]  # see `frames.POINT`
@@ -87,7 +88,7 @@ class Recorder:
         pheromone: The name of the pheromone that the page shows: the trail, or a field.
 
     Raises:
-        AntsError: The page cannot show the task, or there is no such pheromone.
+        AntsError: There is no such pheromone.
     """
 
     def __init__(
@@ -100,9 +101,6 @@ class Recorder:
     ) -> None:
         expect("colony", colony, Colony)
         expect("title", title, str)
-        refuse_foods(colony.task, "the viewer")
-        refuse_castes(colony.task, "the viewer")
-        check_rewards(colony.task, "the viewer")
         check_one_of("pheromone", pheromone, (TRAIL, *colony.fields))
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         self.pheromone = pheromone
@@ -116,7 +114,7 @@ class Recorder:
         self._draws_ahead = self._learns and learner.draws_next_action
         # The data of a page that has read all frames so far.
         self._numbers = np.zeros(0, np.int32)
-        self._ground = np.zeros(self.grid.size, np.uint8)
+        self._ground, self._kinds = (np.zeros(self.grid.size, np.uint8) for _ in range(2))
         # The levels of the pheromone, as they are stored.
         self._trail = np.zeros(self.grid.size, start.fields[pheromone].dtype)
         self._queens = np.zeros(0, np.int32)
@@ -139,7 +137,7 @@ class Recorder:
         changes = task.life.births or task.life.lifespan
         ants = "Ants" if changes else count(colony.ants, "ant")
         return {
-            "format": 2,
+            "format": 3,
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
@@ -152,13 +150,21 @@ class Recorder:
             "letters": task.sees.letters,
             "actions": ACTION_NAMES,
             "events": [event.name for event in Event],
-            "rewards": task.rewards.by_event().tolist(),
+            "rewards": task.rewards.by_event().tolist() if self._rewards_by_event else None,
+            "castes": list(task.castes),
+            "foods": list(task.foods),
+            "idles": task.labour.divides,
             "learns": self._learns,
             "own_tables": colony.one_a_slot,
             "draws_ahead": self._draws_ahead,
             "follow": self._follow,
             "about": self._about(),
         }
+
+    @property
+    def _rewards_by_event(self) -> bool:
+        task = self.colony.task
+        return task.reward == "by_event" and not task.foods
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
         """Return the `name_parts` of the states seen so far, except those in `known`.
@@ -181,12 +187,17 @@ class Recorder:
         }
         if colony.n_nests > 1:
             lines["nests"] = str(colony.n_nests)
+        for name, entries in (("castes", colony.task.castes), ("kinds of food", colony.task.foods)):
+            if entries:
+                lines[name] = ", ".join(entries)
         if colony.fields:
             hidden = [name for name in (TRAIL, *colony.fields) if name != self.pheromone]
             lines["pheromone"] = f"{self.pheromone}; hidden: {', '.join(hidden)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
-            shared = "one per nest" if colony.n_nests > 1 else "shared"
+            groups = {"nest": colony.n_nests, "caste": len(colony.task.castes)}
+            several = " and ".join(name for name, n in groups.items() if n > 1)
+            shared = f"one per {several}" if several else "shared"
             lines["table"] = "one per ant" if colony.one_a_slot else shared
             lines["learning rate"] = f"{config.learning_rate:g}"
             lines["discount"] = f"{config.discount:g}"
@@ -203,6 +214,7 @@ class Recorder:
         late = copy.copy(self)
         late._numbers, late._queens = self._numbers[:0], self._queens[:0]
         late._ground, late._trail = np.zeros_like(self._ground), np.zeros_like(self._trail)
+        late._kinds = np.zeros_like(self._kinds)
         late._known, late._owners = self._known.copy(), self._owners.copy()
         late._table = np.full_like(self._table, np.nan)
         return late._frame({"progress": self.progress.points()})
@@ -225,7 +237,10 @@ class Recorder:
         places = order[np.searchsorted(after, numbers, sorter=order)]
         actions = colony.actions[self.world, places]
         executed = colony.executed[self.world, places]
+        executed = np.where(executed < 0, _IDLE, executed)
         acts = {"acts": executed + 16 * colony.events[self.world, places]}
+        if not self._rewards_by_event:
+            acts["rewards"] = colony.rewards[self.world, places]
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})
@@ -252,14 +267,19 @@ class Recorder:
 
         NaN for learners with more than one update per step, and if the learning rate is 0.
         """
-        if not self._has_td_errors:
-            return np.full(len(slots), np.nan)
-        pairs = self._rows(slots, states) * N_ACTIONS + actions
+        errors = np.full(len(slots), np.nan)
+        acted = actions >= 0  # idle ants have not
+        if not (self._has_td_errors and acted.any()):
+            return errors
+        slots, states = slots[acted], states[acted]
+        pairs = self._rows(slots, states) * N_ACTIONS + actions[acted]
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
         _, place, ants = np.unique(pairs, return_inverse=True, return_counts=True)
-        weights = self.colony.update_weights
-        weights = weights[np.minimum(ants[place], len(weights) - 1)]
-        return np.divide(moved, weights, out=np.full(len(moved), np.nan), where=weights > 0)
+        castes = self.colony.castes[self.world, slots]
+        weights = self.colony.update_weights_of(castes, ants[place])
+        found = np.full(len(moved), np.nan)
+        errors[acted] = np.divide(moved, weights, out=found, where=weights > 0)
+        return errors
 
     def _frame(self, sections: dict[str, Any]) -> bytes:
         """Return a frame of the changes since the last one, added to `sections`."""
@@ -271,6 +291,11 @@ class Recorder:
         sections["cells"] = colony.cells[self.world, slots]
         headings, carrying = colony.headings[self.world], colony.carrying[self.world]
         sections["poses"] = (headings + 8 * carrying + 16 * colony.nests[self.world])[slots]
+        if self.colony.task.castes or self.colony.n_kinds > 1:
+            order = np.argsort(snapshot.ant_numbers, kind="stable")  # as `slots`
+            foods = np.maximum(snapshot.ant_foods[order], 0)
+            castes, idle = snapshot.ant_castes[order], snapshot.ant_idle[order]
+            sections["groups"] = castes + 16 * foods + 128 * idle
         if not np.array_equal(snapshot.queens, self._queens):
             sections["queens"] = self._queens = snapshot.queens
         sections["states"] = colony.states[self.world, slots]
@@ -283,9 +308,10 @@ class Recorder:
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
         sections.setdefault("progress", self.progress.news())
         sections |= _changes("ground", self._ground, snapshot.ground)
+        sections |= _changes("kinds", self._kinds, snapshot.food_kinds)
         sections |= _changes("trail", self._trail, stored)
         sections |= self._table_changes(slots, numbers, sections["states"])
-        self._ground, self._trail = snapshot.ground, stored
+        self._ground, self._kinds, self._trail = snapshot.ground, snapshot.food_kinds, stored
         return pack(self.types, sections)
 
     def _table_changes(

@@ -26,7 +26,7 @@ class Stage {
     this.covered = 0; // pixels at the top that tools cover
     this.shown = ""; // the moment and the view of the drawn cells
     this.laidOut = "";
-    this.foods = [];
+    this.foods = []; // cells with food, by kind
     this.queens = [];
     this.exists = Uint8Array.from({ length: this.grid.size }, (_, cell) => (this.grid.exists(cell) ? 1 : 0));
     this.count = this.exists.reduce((sum, one) => sum + one);
@@ -42,8 +42,8 @@ class Stage {
     const style = getComputedStyle(document.documentElement);
     const read = (name) => style.getPropertyValue(`--${name}`).trim();
     this.colours = Object.fromEntries(COLOURS.map((name) => [name, read(name)]));
-    // The colours of further nests: "queen 1", "ant 1", ...
-    for (const name of ["queen", "ant"]) {
+    // The colours of further nests and kinds of food: "queen 1", "ant 1", "food 1", ...
+    for (const name of ["queen", "ant", "food"]) {
       read(`${name}s`).split(/\s+/).forEach((colour, n) => (this.colours[`${name} ${n + 1}`] = colour));
     }
     this.words = Object.fromEntries(Object.keys(this.colours).map((name) => [name, word(...bytesOf(this.colours[name]))]));
@@ -191,7 +191,7 @@ class Stage {
   drawCells(moment) {
     this.moment = moment;
     const { grid, history, fills, exists, words, rampWords, cells, pixels } = this;
-    const { ground, trail } = history.worldAt(moment), small = this.camera.scale < DRAWINGS_FROM;
+    const { ground, kinds, trail } = history.worldAt(moment), small = this.camera.scale < DRAWINGS_FROM;
     const held = { [EMPTY]: words.empty, [OBSTACLE]: words.rock, [FOOD]: words["food-floor"],
       [QUEEN]: words["queen-floor"] };
     this.foods = [];
@@ -199,7 +199,7 @@ class Stage {
     for (let cell = 0; cell < grid.size; cell++) {
       if (!exists[cell]) continue;
       const holds = ground[cell];
-      if (holds === FOOD) this.foods.push(cell);
+      if (holds === FOOD) (this.foods[kinds[cell]] ??= []).push(cell);
       else if (holds === QUEEN) this.queens.push(cell);
       if (small && holds === QUEEN) held[QUEEN] = words[this.queenColour(cell)];
       const marked = holds === EMPTY && trail[cell] >= 1;
@@ -227,12 +227,13 @@ class Stage {
     const { context, camera, grid, ratio, colours } = this;
     const radius = Math.max(0.6 * camera.scale, CRUMB);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    for (const [colour, size] of [["food-floor", radius + CRUMB_RING], ["food", radius]]) {
+    const layers = this.foods.flatMap((cells, kind) => [["food-floor", radius + CRUMB_RING, cells], [ofKind(kind), radius, cells]]);
+    for (const [colour, size, cells] of layers) {
       const { canvas, half } = this.sprite(`crumb ${colour}`, size, (drawing) => {
         drawing.fillStyle = colours[colour];
         drawing.fill(circle(0, 0, 1));
       });
-      for (const cell of this.foods) {
+      for (const cell of cells) {
         const [x, y] = this.toPage(grid.centre(cell));
         if (this.sees([x, y])) context.drawImage(canvas, x - half, y - half, 2 * half, 2 * half);
       }
@@ -268,7 +269,8 @@ class Stage {
     const { above, camera, colours, grid } = this;
     if (camera.scale < DRAWINGS_FROM) return;
     const queens = this.queens.map((cell) => [this.queenColour(cell), [cell], CROWN]);
-    for (const [name, cells, outline] of [["food", this.foods, CRUMBS], ...queens]) {
+    const foods = this.foods.map((cells, kind) => [ofKind(kind), cells, CRUMBS]);
+    for (const [name, cells, outline] of [...foods.filter(Boolean), ...queens]) {
       const { canvas, half } = this.sprite(name, 0.72 * camera.scale, (context) => {
         context.fillStyle = colours[name];
         context.fill(new Path2D(outline));
@@ -291,7 +293,7 @@ class Stage {
     const next = history.frames[moment + 1], moves = share > 0 && next && next.passed === 1;
     const same = moves && next.numbers === frame.numbers, z = grid.ranges[2], root = Math.sqrt(3);
     const radius = this.antRadius(frame.cells.length), dots = radius < DOTS_BELOW;
-    const looks = [], squares = []; // by load and nest
+    const looks = [], squares = []; // by `kindOf`
     const side = Math.max(1.5 * camera.scale, 2 * DOT);
     for (let i = 0; i < frame.cells.length; i++) {
       const cell = frame.cells[i];
@@ -306,11 +308,12 @@ class Stage {
       const x = (1.5 * r - camera.x) * camera.scale + this.width / 2;
       const y = (root * (0.5 * r - q) - camera.y) * camera.scale + this.height / 2;
       if (!this.sees([x, y])) continue;
+      const kind = kindOf(frame.poses[i], frame.groups[i]);
       if (dots) {
-        (squares[frame.poses[i] >> 3] ??= new Path2D()).rect(x - side / 2, y - side / 2, side, side);
+        (squares[kind] ??= new Path2D()).rect(x - side / 2, y - side / 2, side, side);
         continue;
       }
-      const look = (looks[frame.poses[i] >> 3] ??= this.antSprite(frame.poses[i] >> 3, radius));
+      const look = (looks[kind] ??= this.antSprite(kind, radius));
       const { canvas, half } = look, angle = (heading * Math.PI) / 3;
       const cos = sharpness * Math.cos(angle), sin = sharpness * Math.sin(angle);
       above.setTransform(cos, sin, -sin, cos, x * sharpness, y * sharpness);
@@ -320,24 +323,27 @@ class Stage {
     if (!dots) return;
     // Crowded dots would hide the world, so they become transparent.
     const covered = (frame.cells.length * side ** 2) / (grid.size * 2.6 * camera.scale ** 2);
-    above.globalAlpha = Math.min(1, 0.6 * Math.max(covered, 1e-9) ** -0.5);
+    const alpha = Math.min(1, 0.6 * Math.max(covered, 1e-9) ** -0.5);
     squares.forEach((square, kind) => {
-      above.fillStyle = this.colours[kind & 1 ? "loaded-dot" : ofNest("ant", kind >> 1)];
+      above.globalAlpha = alpha * opacityOf(kind);
+      above.fillStyle = this.colours[dotColour(kind)];
       above.fill(square);
     });
     above.globalAlpha = 1;
   }
 
-  /* The drawing of an ant; `kind` is 1 with food, plus 2 times the nest. */
+  /* The drawing of an ant of a kind, see `kindOf`. */
   antSprite(kind, radius) {
     const { colours } = this, loaded = kind & 1;
     // A line in the colour of the page separates ants from a dark trail.
     const large = radius >= DRAWN_FROM, edge = large ? Math.min(0.11, 2 / radius) : 2 / radius;
     const crumb = circle(0, -0.7, large ? 0.25 : 0.34), body = new Path2D(large ? BODY : DART);
-    const ink = colours[loaded && !large ? "loaded-dot" : ofNest("ant", kind >> 1)]; // food alone would be too small to see
+    // Food alone would be too small to see.
+    const ink = colours[large ? antColour(kind) : dotColour(kind)], carried = colours[ofKind((kind >> 4) & 7)];
     return this.sprite(`ant ${kind}`, radius, (context) => {
+      context.globalAlpha = opacityOf(kind);
       const legs = new Path2D(LIMBS), sides = large ? [1, -1] : [];
-      for (const [colour, food, more] of [[colours.halo, colours.halo, edge], [ink, colours.food, 0]]) {
+      for (const [colour, food, more] of [[colours.halo, colours.halo, edge], [ink, carried, 0]]) {
         context.fillStyle = context.strokeStyle = colour;
         for (const side of sides) {
           context.save();
@@ -453,6 +459,27 @@ const CROWN = "M-.8-.28-.32-.02 0-.5.32-.02.8-.28.6.6h-1.2z"
 /* The name of a colour of a nest; the seven colours repeat, as in pictures. */
 function ofNest(name, nest) {
   return nest % 7 > 0 ? `${name} ${nest % 7}` : name;
+}
+
+/* The name of the colour of a kind of food. */
+function ofKind(kind) {
+  return kind > 0 ? `food ${kind}` : "food";
+}
+
+/* What determines the drawing of an ant besides its heading, from its pose and group: 1 with food, plus 2
+   times the nest, plus 16 times the kind of food, plus 128 if it is idle. */
+function kindOf(pose, group) {
+  return (pose >> 3) | (group & 0xf0);
+}
+function antColour(kind) {
+  return ofNest("ant", (kind >> 1) & 7);
+}
+function dotColour(kind) {
+  const food = (kind >> 4) & 7;
+  return !(kind & 1) ? antColour(kind) : food ? ofKind(food) : "loaded-dot";
+}
+function opacityOf(kind) {
+  return kind & 128 ? 0.4 : 1;
 }
 
 function circle(x, y, radius) {

@@ -21,7 +21,7 @@ from taichi_ants.live.choices import Choices
 from taichi_ants.live.server import Room
 from taichi_ants.live.session import Log, Session
 from taichi_ants.live.setup import MOST_ANTS, Setup
-from taichi_ants.task import foraging
+from taichi_ants.task import Labour, foraging
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 from taichi_ants.worlds import to_text
 
@@ -288,6 +288,44 @@ def test_a_field_is_shown_and_drawn(browser):
             page.tab.keyboard.press("Enter")
             (edit,) = edits(room, 1)
             assert edit == {"trail": {"level": 90, "cells": [there], "field": "home"}}
+        finally:
+            page.close()
+
+
+def test_castes_and_kinds_of_food_are_shown_and_drawn(browser):
+    task = foraging().but(
+        castes={"nurse": {"threshold": 5.0}, "scout": {"share": 0.5}},
+        foods={"seed": {}, "sap": {"loads": 3}},
+        labour=Labour("thresholds", demand=1.0, relief=1, quit=0.1),
+    )
+    learner = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9)
+    with running(Choices({}), setup=Setup("paper", task, learner, 12)) as room:
+        page = Page(browser, room.url)
+        try:
+            page.press("Shift+ArrowRight")
+            wait(page, "viewer.history.frames.at(-1).tick === 11")
+            assert_same(page, room)
+            colony = room.session.colony
+            legend = page.text("#legend")
+            assert all(name in legend for name in ("seed", "sap", "idle ant"))
+            slot = int(np.flatnonzero(colony.castes[0] == 1)[0])
+            page.read("number => viewer.follow(number)", int(colony.numbers[0, slot]))
+            page.settle()
+            assert page.text("#ant .groups") == "scout"
+            assert page.tab.is_hidden("#kind")
+            page.press("3")
+            assert page.tab.is_visible("#kind")
+            page.tab.select_option("#kind", "sap")
+            there = cell_of(room, 5, 4, 0)
+            page.read("cell => viewer.chooseCell(cell, true)", there)
+            page.tab.focus("#world")
+            page.tab.keyboard.press("Enter")
+            (edit,) = edits(room, 1)
+            assert edit == {"place": {"what": "food", "cells": [there], "kind": "sap"}}
+            wait(page, "viewer.history.worldAt(viewer.history.length - 1).kinds.includes(1)")
+            page.settle()
+            assert "sap" in page.text("#cell")
+            assert page.read("cell => viewer.stage.foods[1].includes(cell)", there)
         finally:
             page.close()
 

@@ -34,6 +34,7 @@ from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import session as session_module
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
+from taichi_ants.live.setup import check_cues
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.viewer import Recording, recorder
 from taichi_ants.viewer.frames import CLOCK, POINT
@@ -603,9 +604,50 @@ def test_a_policy_of_several_nests_is_exported_if_they_share_it(tmp_path):
     assert np.array_equal(load_policy(tmp_path / "policy.npz").q_values, table)
 
 
-def test_worlds_with_kinds_of_food_are_refused_with_what_to_do():
-    with pytest.raises(AntsError, match=r"2 kinds of food, but .* draw all food as F"):
+GROUPS = tasks.foraging().but(
+    castes={"nurse": {"threshold": 5.0}, "scout": {"share": 0.3, "epsilon": 0.4}, "guide": {}},
+    foods={"seed": {"deliver": 90, "regrowth": 5}, "sap": {"loads": 3}},
+    labour=tasks.Labour("thresholds", demand=0.05, relief=1, quit=0.5),
+)
+OF_GROUPS = Setup(
+    text_map.to_text(World((7, 7, 7), (0, 6, 0), [(0, 0, 5), (1, 0, 5), (5, 5, 0)])).replace(
+        "F", "G", 1
+    ),
+    *(GROUPS.but(castes={"guide": {"policy": "trail_follower"}}), LEARNS),
+    ants=20,
+)
+
+
+def test_what_the_task_or_the_page_lacks_is_refused_with_what_to_do():
+    with pytest.raises(AntsError, match=r"2 kinds of food, but the task 1; add the others to"):
         Session(replace(SETUPS["nests"], world="Q   G   F\n"))
+    with pytest.raises(AntsError, match=r"castes.guide.policy` is '/etc/passwd', but the live pag"):
+        replace(OF_GROUPS, task=GROUPS.but(castes={"guide": {"policy": "/etc/passwd"}}))
+    with pytest.raises(AntsError, match=r"the task has castes nurse, scout and guide, which the"):
+        check_cues(GROUPS)
+
+
+@pytest.mark.slow
+def test_a_session_with_castes_and_kinds_of_food_is_replayed(tmp_path):
+    session = Session(OF_GROUPS)
+    session.advance(40)
+    snapshot = session.colony.snapshot()
+    assert set(snapshot.ant_castes.tolist()) == {0, 1, 2}
+    assert snapshot.ant_idle.any()
+    free = np.flatnonzero(snapshot.ground == EMPTY).tolist()[:3]
+    session.apply({"place": {"what": "food", "cells": free, "kind": "sap"}})
+    assert set(session.colony.snapshot().food_kinds[free].tolist()) == {1}
+    session.apply({"task": {"castes.scout.epsilon": 0.1, "foods.seed.deliver": 50}})
+    session.advance(60)
+    session.apply({"episode": {}})
+    session.advance(20)
+    again = replayed(session.to_bytes())
+    assert again.interventions.state() == session.interventions.state()
+    assert gif_bytes(session.log(), most_frames=3).startswith(b"GIF")
+    frames = recording(session.log(), 9)
+    assert frames.header["castes"] == ["nurse", "scout", "guide"]
+    *_, before = session.undone()
+    assert before.colony.episode == 0
 
 
 def test_the_queen_of_any_nest_moves():

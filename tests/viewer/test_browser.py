@@ -16,8 +16,8 @@ from playback import played
 from taichi_ants import Colony, Task, TrainingConfig, World, trace_training, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
-from taichi_ants.task import Life, Pheromone
-from taichi_ants.task.constants import ACTION_NAMES
+from taichi_ants.task import Caste, Food, Labour, Life, Pheromone, Threshold, foraging
+from taichi_ants.task.constants import ACTION_NAMES, FOOD
 from taichi_ants.task.events import Event
 from taichi_ants.viewer import Recording, page, record_colony, record_episode, record_trace
 from taichi_ants.viewer.page import SCRIPTS, part
@@ -572,6 +572,40 @@ def test_nests_have_their_colours_and_their_tables(browser, folder):
         assert shown["loaded"] == many.carrying[0, slot]
     drawn = opened.read("[...viewer.stage.sprites.keys()].map((key) => key.split('.')[0])")
     assert any(key.startswith("ant 2") for key in drawn)
+    opened.close()
+
+
+def test_castes_and_kinds_of_food_have_names_colours_and_tables(browser, folder):
+    castes = {"nurse": Caste(threshold=Threshold("fixed", value=5)), "scout": Caste(share=0.5)}
+    foods = {"seed": Food(deliver=90, regrowth=2), "sap": Food(deliver=40, regrowth=2)}
+    labour = Labour("thresholds", demand=0.05, relief=1, quit=0.5)
+    task = foraging().but(castes=castes, foods=foods, labour=labour, life={"regrowth": None})
+    world = World((8, 8, 8), (6, 0, 0), [(5, 0, 1), (3, 1, 0), (4, 1, 0)], food_kinds=[0, 1, 1])
+    many = Colony(world, task, TrainingConfig("q_learning", 0.2, 0.9, 0.3, 1.0), 3, ants=16)
+    many.begin_episode()
+    many.tick(60)
+    opened = Page(browser, written(folder, "groups", record_colony(many, 40)))
+    opened.read("viewer.player.go(40)")
+    opened.settle()
+    legend = opened.text("#legend")
+    assert all(name in legend for name in ("idle ant", "seed", "sap"))
+    snapshot = many.snapshot()
+    for kind in (0, 1):
+        there = np.flatnonzero((snapshot.ground == FOOD) & (snapshot.food_kinds == kind)).tolist()
+        assert opened.read("kind => viewer.stage.foods[kind] ?? []", kind) == there
+    met = set()
+    for slot, number in enumerate(many.numbers[0].tolist()):
+        shown = opened.read("number => viewer.history.ant(40, number)", number)
+        caste, idle = int(many.castes[0, slot]), bool(many.idle[0, slot])
+        assert (shown["caste"], shown["idle"]) == (caste, idle)
+        values = many.q_values[0, caste, many.states[0, slot]]
+        assert np.array_equal(np.float32(shown["values"]), values)
+        met.add((caste, idle))
+    assert {(0, True), (1, False)} <= met
+    slot = int(np.flatnonzero(many.idle[0])[0])
+    opened.read("number => viewer.follow(number)", int(many.numbers[0, slot]))
+    opened.settle()
+    assert opened.text("#ant .groups") == "nurse · idle"
     opened.close()
 
 

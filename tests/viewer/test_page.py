@@ -127,12 +127,10 @@ def test_notebooks_show_worlds_traces_and_colonies(monkeypatch):
     assert "<iframe " in html_of(record_colony(colony, ticks=2))
     of_castes = Task(castes={"a": Caste()})
     of_foods = Task(foods={"seed": Food(), "sap": Food()}, delivery="truncates")
-    for several in (of_castes, of_foods):  # pages do not show these
+    for several in (of_castes, of_foods):
         begun = Colony(worlds.paper(), several, config, ants=3)
         begun.begin_episode()
-        alternative, source = re.findall(r'"([^"]*)"', html_of(begun))
-        assert html.unescape(alternative) == repr(begun)
-        assert source.startswith("data:image/png;base64,")
+        assert "<iframe " in html_of(begun)
     for world in (worlds.paper(), World((3, 4, 1), (0, 0, 0))):
         alternative, source = re.findall(r'"([^"]*)"', html_of(world))
         assert html.unescape(alternative) == repr(world)

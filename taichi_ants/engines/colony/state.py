@@ -274,6 +274,20 @@ class ColonyState:
         """The weight of the mean of n errors in an update, by n; the last is for all larger n."""
         return self.arrays["weights"]
 
+    def update_weights_of(self, castes: np.ndarray, ants: np.ndarray) -> np.ndarray:
+        """Return the weight of the mean error of several ants of a caste in an update.
+
+        Arrays (n,), int and float64. Castes that do not learn have the weight 0.
+        """
+        weights = self.update_weights[np.minimum(ants, len(self.update_weights) - 1)]
+        if "castes" not in self.arrays:
+            return weights
+        own = self.arrays["caste_weights"]
+        of_castes = own[castes, np.minimum(ants, own.shape[1] - 1)]
+        rows = self.arrays["castes"]
+        weights = np.where(rows[CasteRow.LEARNING_RATE, castes] >= 0, of_castes, weights)
+        return np.where(rows[CasteRow.LEARNS, castes] == 1, weights, 0.0)
+
     @property
     def nbytes(self) -> int:
         """The number of bytes of all arrays."""
