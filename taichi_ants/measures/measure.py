@@ -23,7 +23,7 @@ class Measure:
     Attributes:
         name: The name, with the part after a point: "entropy" or "entropy.trail".
         function: A function of a `Snapshot` that returns a number, numbers by the names of parts,
-            or an array. It must not change the snapshot.
+            or an array. In a run, the arrays of the snapshot are read-only.
         unit: The unit of the value, for axes and tables; "" if it has none.
         summary: A short description for lists.
         of: The name of another measure, whose series the function reads. The function then takes

@@ -134,6 +134,9 @@ class Recorder:
                 continue
             self._read[world] = tick
             snapshot, found = colony.snapshot(world), dict[str, Value]()
+            for array in (*vars(snapshot).values(), *snapshot.fields.values()):
+                if isinstance(array, np.ndarray):  # all measures of the row read it
+                    array.setflags(write=False)
             for name, source in self._sources.items():
                 self._earlier.setdefault((world, name), []).append(source(snapshot))
             for measure in self.measures:

@@ -116,6 +116,8 @@ def test_wrong_requests_are_refused(asked, message):
         (lambda s: {"a": "much"}, "returned 'much'"),
         (lambda s: -math.inf, "returned -inf; it must return a finite number, or nan"),
         (lambda s: s.nothing, "failed with AttributeError"),
+        (lambda s: s.ground.fill(0), "failed with ValueError: .* read-only"),
+        (lambda s: s.fields["trail"].sort(), "failed with ValueError: .* read-only"),
         (lambda s: np.zeros(s.counts["ticks"] + 1), "arrays of different shapes"),
     ],
 )
