@@ -177,7 +177,8 @@ def _show(
     if page and is_missing:
         text = page(settings.out, None, manifest)
         folder.add(lambda place: files.write_text(place / PAGE, text))
-    if as_parquet and not any(name.endswith(".parquet") for name in manifest["files"]):
+    adds = as_parquet and not any(name.endswith(".parquet") for name in manifest["files"])
+    if as_parquet and adds:
         asked = manifest["asked"]
         options = {**asked["options"], "parquet": True}
         folder.add(partial(as_parquet, settings.out), asked={**asked, "options": options})
@@ -185,5 +186,7 @@ def _show(
     print(f"{settings.out}/ already has these results; use --force to compute them again.")
     if not (settings.no_figures or manifest["figures"]):
         print("They have no figures because of --no-figures; use --force to draw figures.")
+    if adds:
+        print("Their tables are now also there as Parquet.")
     if page and is_missing:
         print(f"{PAGE} was missing and has been written again from the other files.")
