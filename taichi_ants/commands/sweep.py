@@ -69,7 +69,7 @@ def sweep(settings: argparse.Namespace) -> None:
         asked.write_series(blocks, ready)
 
     more: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
-    more |= {"as_parquet": asked.write_parquet} if settings.parquet else {}
+    more |= {"as_parquet": asked.write_parquet}
     work_or_show(settings, asked.facts(), work, **more)
 
 

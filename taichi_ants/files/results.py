@@ -11,7 +11,7 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -96,11 +96,9 @@ class ResultFolder:
         return False
 
     def part(self) -> dict[str, Any] | None:
-        """Return the manifest of finished results that are a part of these; None without any."""
+        """Return the manifest of finished results that are all or a part of these, or None."""
         manifest = manifest_in(self.path) if self._grows else None
-        if manifest and manifest["settings"] != self._settings and self._is_part(manifest):
-            return manifest
-        return None
+        return manifest if manifest and self._is_part(manifest) else None
 
     def _is_part(self, manifest: Mapping[str, Any]) -> bool:
         """Return whether all that a manifest has is also a part of this work."""
@@ -225,20 +223,17 @@ class ResultFolder:
         _write_manifest(contents, ready).replace(self.path / MANIFEST)
         self._clear()
 
-    def add(self, write: Callable[[Path], object], **facts: Any) -> None:
-        """Add files to finished results, or replace them, and replace facts in the manifest.
-
-        `write` writes the files to a new folder.
-        """
+    def add(self, name: str, text: str) -> None:
+        """Add a file to finished results, or replace it."""
         self._ready.mkdir(parents=True, exist_ok=True)
         with files.writing(self.path), tempfile.TemporaryDirectory(dir=self._ready) as place:
-            write(Path(place))
-            manifest, made = read_manifest(self.path) | facts, sorted(Path(place).iterdir())
-            manifest["files"] |= {file.name: checksum_of(file) for file in made}
-            # The manifest first, so that a file can be missing but never differ from it.
+            file = Path(place, name)
+            files.write_text(file, text)
+            manifest = read_manifest(self.path)
+            manifest["files"][name] = checksum_of(file)
+            # The manifest first, so that the file can be missing but never differ from it.
             _write_manifest(manifest, Path(place)).replace(self.path / MANIFEST)
-            for file in made:
-                file.replace(self.path / file.name)
+            file.replace(self.path / name)
         self.tidy()
 
     def tidy(self) -> None:

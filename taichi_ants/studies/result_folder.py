@@ -10,7 +10,6 @@ import time
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from operator import methodcaller
 from pathlib import Path
 from typing import Any, TypeVar
@@ -65,7 +64,7 @@ def work_or_show(
             the sweep file. The results contain copies of them.
         grows_in: The argument of `ResultFolder`.
         as_parquet: A function that writes Parquet files from the tables in a folder of results to
-            another folder; None without such files.
+            another folder, for the command's option `parquet`.
     """
     given = {**(inputs or {}), **_given(settings)}
     plugin = hashlib.sha256(given[settings.plugin]).hexdigest() if settings.plugin else None
@@ -73,8 +72,8 @@ def work_or_show(
     shard = getattr(settings, "shard", None)
     runs = study.runs(shard or (1, 1)) if study else None
     folder = ResultFolder(settings.out, facts, leading, runs, take is not None, grows_in)
-    if not settings.force and folder.is_finished():
-        _show(settings, folder, page, as_parquet)
+    if not settings.force and folder.is_finished() and not _lacks(settings, folder):
+        _show(settings, folder, page)
     else:
         began = time.perf_counter()
         with folder.work(settings.force, _asked(settings)) as (blocks, ready):
@@ -88,7 +87,7 @@ def work_or_show(
             report = files.read_text(ready / REPORT)
             seconds = folder.seconds_before + time.perf_counter() - began
             made = provenance(sys.argv) | {"seconds": seconds, "figures": not settings.no_figures}
-            if as_parquet:
+            if as_parquet and settings.parquet:
                 as_parquet(ready, ready)
             made |= {"asked": _again(settings), "inputs": _copied(given, ready)}
             if page:
@@ -97,6 +96,23 @@ def work_or_show(
         print(f"{report}\n{seconds:.1f} s; all results are in {settings.out}/")
     if page:
         print(settings.out / PAGE)
+
+
+def _lacks(settings: Namespace, folder: ResultFolder) -> bool:
+    """Return whether finished results lack figures or tables that they can get without new runs.
+
+    If so, the settings include what the results have.
+    """
+    part = folder.part()
+    if not part:
+        return False
+    figures, options = part["figures"], part["asked"]["options"]
+    parquet = options.get("parquet", False)
+    lacks = not (settings.no_figures or figures) or getattr(settings, "parquet", False) > parquet
+    if lacks:
+        settings.no_figures = settings.no_figures and not figures
+        settings.parquet = getattr(settings, "parquet", False) or parquet
+    return lacks
 
 
 def _asked(settings: Namespace) -> dict[str, Any]:
@@ -163,30 +179,17 @@ def _of_shard(settings: Namespace, number: int, shards: int) -> str:
     )
 
 
-def _show(
-    settings: Namespace,
-    folder: ResultFolder,
-    page: Pages[Results] | None,
-    as_parquet: Callable[[Path, Path], None] | None,
-) -> None:
-    """Print the report of finished results, and make a missing page or missing tables again."""
+def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None) -> None:
+    """Print the report of finished results, and make a missing page again."""
     folder.check(may_lack=PAGE if page else None)
     folder.tidy()
     manifest = read_manifest(settings.out)
     is_missing = not (settings.out / PAGE).exists()
     if page and is_missing:
-        text = page(settings.out, None, manifest)
-        folder.add(lambda place: files.write_text(place / PAGE, text))
-    adds = as_parquet and not any(name.endswith(".parquet") for name in manifest["files"])
-    if as_parquet and adds:
-        asked = manifest["asked"]
-        options = {**asked["options"], "parquet": True}
-        folder.add(partial(as_parquet, settings.out), asked={**asked, "options": options})
+        folder.add(PAGE, page(settings.out, None, manifest))
     print(files.read_text(settings.out / REPORT))
     print(f"{settings.out}/ already has these results; use --force to compute them again.")
     if not (settings.no_figures or manifest["figures"]):
         print("They have no figures because of --no-figures; use --force to draw figures.")
-    if adds:
-        print("Their tables are now also there as Parquet.")
     if page and is_missing:
         print(f"{PAGE} was missing and has been written again from the other files.")

@@ -145,12 +145,8 @@ def test_a_difference_is_named_with_its_place(copy, capsys, monkeypatch):
     folder = ResultFolder(copy, read_manifest(copy)["settings"])
     text = (copy / "runs.csv").read_text()
     at = text.index("\n") + 3
-
-    def write(place):
-        (place / "runs.csv").write_text(f"{text[:at]}?{text[at + 1 :]}")
-        (place / "more.txt").write_text("more")
-
-    folder.add(write)
+    folder.add("runs.csv", f"{text[:at]}?{text[at + 1 :]}")
+    folder.add("more.txt", "more")
     assert call("archive", [copy], capsys)[0] == 0
     known = reproduction.packages()
     monkeypatch.setattr(reproduction, "packages", lambda: {**known, "numpy": "0", "scipy": None})
@@ -375,8 +371,7 @@ def test_a_search_is_archived_and_reproduced(tmp_path, capsys, monkeypatch):
     assert '"strongest"' in odd
     folder = ResultFolder(Path("done"), read_manifest(Path("done"))["settings"])
     trials = Path("done/optuna.journal").read_text()
-    other = trials.replace('"value":', '"value":1', 1)
-    folder.add(lambda place: (place / "optuna.journal").write_text(other))
+    folder.add("optuna.journal", trials.replace('"value":', '"value":1', 1))
     assert call("archive", ["done", "--force"], capsys)[0] == 0
     status, out, _ = call("reproduce", ["done.zip", "--out", "again"], capsys)
     assert status == 1

@@ -399,9 +399,11 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     ):
         assert after[name] == before[name], name
     assert after["manifest.json"] != before["manifest.json"]
-    left_out = "no figures because of --no-figures; use --force to draw figures."
-    assert left_out in compare(*SMALL, "--out", copy)[1]
-    assert left_out not in compare(*SMALL, "--out", copy, "--no-figures")[1]
+    assert "already has these" in compare(*SMALL, "--out", copy, "--no-figures")[1]
+    assert compare(*SMALL, "--out", copy)[0] == 0  # draws them
+    again = contents(copy)
+    assert set(again) == FILES | {"notes.txt"}
+    assert all(again[name] == before[name] for name in FIGURES)
 
 
 GONE = [

@@ -32,7 +32,7 @@ from taichi_ants import (
 )
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies.points import EVALUATION_SEEDS
+from taichi_ants.studies.points import EVALUATION_SEEDS, RunPoint
 from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.task import foraging, observations, paper
 from taichi_ants.worlds import registry
@@ -163,13 +163,28 @@ def test_a_sweep_of_colonies_is_what_the_library_gives(sweep):
 def test_a_finished_sweep_is_shown(sweep):
     assert sweep(RUNS, "--no-figures")[0] == 0
     before = contents(Path("results/sweep-my"))
-    status, out, _ = sweep(RUNS)
+    status, out, _ = sweep(RUNS, "--no-figures")
     assert status == 0
     assert "already has these results" in out
     assert contents(Path("results/sweep-my")) == before
     status, out, err = sweep(RUNS.replace("shaping = [1, 0]", "shaping = [1, 2]"))
     assert status == 2
     assert "that this study lacks (task.rewards.shaping 0); add them" in err
+
+
+def test_figures_are_added_to_finished_results_without_new_runs(sweep, monkeypatch):
+    assert sweep(RUNS, "--no-figures")[0] == 0
+    folder = Path("results/sweep-my")
+    before = contents(folder)
+    monkeypatch.setattr(RunPoint, "do", None)
+    assert sweep(RUNS)[0] == 0
+    after = contents(folder)
+    assert {*after} - {*before} == {"figures/return_last50.png"}
+    assert after.items() >= {n: one for n, one in before.items() if n != "manifest.json"}.items()
+    assert sweep(RUNS, "--no-figures", "--parquet")[0] == 0
+    tables = {"runs.parquet", "summary.parquet"}
+    assert {*contents(folder)} - {*after} == tables  # and the figures are still there
+    assert "already has these results" in sweep(RUNS, "--parquet")[1]
 
 
 WRONG = {
