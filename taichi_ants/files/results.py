@@ -184,8 +184,8 @@ class ResultFolder:
                 ready = Path(name)
                 contents = {"settings": self._settings, "seconds": self.seconds_before}
                 contents |= {**self._runs, **(more or {})}
-                for name in (SPARE, MANIFEST):  # one after the other, so that one is always whole
-                    _write_manifest(contents, ready).replace(self._unfinished / name)
+                for copy in (SPARE, MANIFEST):  # one after the other, so that one is always whole
+                    _write_manifest(contents, ready).replace(self._unfinished / copy)
                 try:
                     yield self._blocks, ready
                 except (AntsError, OSError) as error:

@@ -72,7 +72,8 @@ def work_or_show(
     shard = getattr(settings, "shard", None)
     runs = study.runs(shard or (1, 1)) if study else None
     folder = ResultFolder(settings.out, facts, leading, runs, take is not None, grows_in)
-    if not settings.force and folder.is_finished() and not _lacks(settings, folder):
+    is_finished = not settings.force and folder.is_finished()
+    if is_finished and (shard or not _lacks(settings, folder)):
         _show(settings, folder, page)
     else:
         began = time.perf_counter()
