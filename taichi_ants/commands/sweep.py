@@ -51,7 +51,8 @@ def sweep(settings: argparse.Namespace) -> None:
     with recorded() as inputs:
         command_line.load_plugin(settings.plugin)
         settings.text = settings.text or read_text(settings.file)
-        asked = read(settings.file, settings.text)
+        with command_line.progress_bar("settings") as progress:
+            asked = read(settings.file, settings.text, progress)
     if settings.parquet:
         check_installed()
     if isinstance(asked, Search):

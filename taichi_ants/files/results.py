@@ -120,15 +120,13 @@ class ResultFolder:
         runs, others = self._runs.get("runs"), manifest.get("runs")
         if not (runs and others and {*runs["points"]} & {*others["points"]}):
             return []
-        own, theirs = self._settings, manifest["settings"]
-        here, there, found = *(_varied(one, self._leading) for one in (own, theirs)), list[str]()
-        if theirs.get("design"):  # each sample has its own values
-            samples = [row for row in theirs["vary"] if row not in own["vary"]]
-            found += [count(len(samples), "sample")] if samples else []
-            there = {"seed": there["seed"]}
+        theirs, found = manifest["settings"], list[str]()
+        here, there = (_varied(one, self._leading) for one in (self._settings, theirs))
         for name, values in there.items():
-            lost = [shown(one) for one in values if one not in here.get(name, [])]
-            if lost:
+            lost = [shown(one) for text, one in values.items() if text not in here.get(name, {})]
+            if lost and name == "vary":
+                found.append(count(len(lost), "sample"))
+            elif lost:
                 more = " ..." if len(lost) > _SHOWN else ""
                 found.append(f"{name} {', '.join(lost[:_SHOWN])}{more}")
         return found
@@ -257,17 +255,21 @@ class ResultFolder:
         return (manifest_in(self.path) or {"files": {}})["files"]
 
 
-def _varied(settings: Mapping[str, Any], leading: Sequence[str]) -> dict[str, list[Any]]:
-    """Return the values of the settings that vary in a study, each once, and its seeds."""
-    if rows := settings.get("vary"):
-        several = {name: [row.get(name) for row in rows] for row in rows for name in row}
+def _varied(settings: Mapping[str, Any], leading: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return the seeds of a study and the values of each setting that varies, by their texts.
+
+    A design other than a grid has its samples, as "vary", instead of the values of each setting.
+    """
+    several = {"seed": settings["seeds"]}
+    if settings.get("design"):
+        several["vary"] = settings["vary"]
+    elif rows := settings.get("vary"):
+        every = dict.fromkeys(name for row in rows for name in row)
+        several |= {name: [row.get(name) for row in rows] for name in every}
     else:
         names = [one for one in leading if one in settings] or [n for n in settings if "." in n]
-        several = {n: settings[n] for n in names if isinstance(settings[n], list)}
-    found = {"seed": settings["seeds"]}
-    for name, values in several.items():
-        found[name] = [one for n, one in enumerate(values) if one not in values[:n]]
-    return found
+        several |= {n: settings[n] for n in names if isinstance(settings[n], list)}
+    return {n: {files.to_json(one): one for one in values} for n, values in several.items()}
 
 
 def _is_within(one: Any, other: Any) -> bool:

@@ -355,14 +355,16 @@ class Search:
         return searches.report(head, choices, found.held_out, self.measure, numbers, words)
 
 
-def read(path: Path, text: str | None = None) -> Sweep | Search:
-    """Return the sweep or the search of a file, or of its text.
+def read(
+    path: Path, text: str | None = None, progress: Progress = lambda share: None
+) -> Sweep | Search:
+    """Return the sweep or the search of a file, or of its text; see `sweep_of` for `progress`.
 
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
     with contents(path, text) as file:
-        return Search.of(file) if "search" in file else sweep.sweep_of(file)
+        return Search.of(file) if "search" in file else sweep.sweep_of(file, progress)
 
 
 def _table(file: Settings) -> Settings:

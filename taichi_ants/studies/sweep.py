@@ -41,6 +41,7 @@ from taichi_ants.studies.sweep_file import (
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
 SERIES_FILE, SENSITIVITY = "series.csv", "sensitivity.csv"
 _OF_SERIES = ("seed", "episode", "tick", "measure", "value")  # columns of SERIES_FILE
+_SHOW_EVERY = 100  # points
 _BYTES_OF_A_NUMBER = 20  # in a table
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
@@ -299,8 +300,11 @@ def read_sweep(path: Path) -> Sweep:
         return sweep_of(file)
 
 
-def sweep_of(file: Settings) -> Sweep:
-    """Return the sweep of the contents of a file; AntsError if a setting is not allowed."""
+def sweep_of(file: Settings, progress: Progress = lambda share: None) -> Sweep:
+    """Return the sweep of the contents of a file; AntsError if a setting is not allowed.
+
+    `progress` is called with the share of the points that were built.
+    """
     base, drawn = Base.of(file), Design.of(file)
     axes = tuple(axes_of(base.kind, table, base.fixed) for table in as_list(file.get("vary", [])))
     check_entries(file, {name for one in axes for name in one})
@@ -310,7 +314,11 @@ def sweep_of(file: Settings) -> Sweep:
         raise AntsError(f"sensitivity is for one [vary] table, but there are {len(axes)}.")
     grids = [drawn.rows(one) for one in axes]
     rows, built = tuple(itertools.chain(*grids)), dict[str, Any]()
-    points = tuple(base.point(row, built) for row in rows)
+    points = []
+    for number, row in enumerate(rows, start=1):
+        points.append(base.point(row, built))
+        if number % _SHOW_EVERY == 0:
+            progress(number / len(rows))
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
@@ -330,7 +338,7 @@ def sweep_of(file: Settings) -> Sweep:
         raise AntsError("margin requires against; add against, or leave margin out.")
     ends = list(itertools.accumulate(map(len, grids), initial=0))
     parts, every = tuple(map(slice, ends, ends[1:])), base.reading.get("measure_every")
-    study: Study[Any] = Study(points, base.seeds)
+    study: Study[Any] = Study(tuple(points), base.seeds)
     return Sweep(
         *(base.kind, study, rows, parts, base.measures, every, against, margin, drawn, axes)
     )

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -161,8 +162,8 @@ class Base(NamedTuple):
     def point(self, row: Settings, built: dict[str, Any]) -> Point:
         """Return the point of the fixed settings and a row of others.
 
-        Reuses the worlds in `built`, and adds new ones. Raises AntsError if a setting is not
-        allowed, or there are too few episodes for a measure.
+        Reuses worlds and policies in `built`, and adds new ones. Raises AntsError if a setting is
+        not allowed, or there are too few episodes for a measure.
         """
         point = _point(self.kind, {**self.fixed, **row}, self.seeds, built, self.reading)
         for name in self.measures:
@@ -323,33 +324,27 @@ def _point(
     built: dict[str, Any],
     reading: Mapping[str, Any],
 ) -> Point:
-    """Return the point of some settings; reuse the worlds in `built`, and add new ones.
+    """Return the point of some settings; reuse worlds and policies in `built`, and add new ones.
 
     `reading` are the arguments of the point that are not settings.
     """
     learner = settings.get("training.learner")
-    more = declared(learners.get(str(learner)).hyperparameters) if learner else ()
-    known = [
-        *_own(kind),
-        "task.preset",
-        # A group of settings can be set by a name, if it has names.
-        *(one.path for one in all_of(Task) if not one.is_group or one.has_names),
-        *(one.path for one in (*declared(TrainingConfig), *more)),
-    ]
-    tables = ["world.regions", *(one.path for one in named_groups(Task))]
-    named = "|".join(map(re.escape, tables))
+    known = _known(kind, learners.get(str(learner)).hyperparameters if learner else None)
     settings, events = _without_events(settings)
     for name in settings:
         # The world checks its settings, and named groups check theirs.
-        if name not in known and not re.fullmatch(rf"world\.[^.]*|({named})\..*", name):
-            raise AntsError(f"{shown(name)} is not a setting {_rather(name, kind, known)}.")
+        if name not in known and not _tables().fullmatch(name):
+            raise AntsError(f"{shown(name)} is not a setting {_rather(name, kind, [*known])}.")
     tree = nested(settings)
     world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
     preset = task.pop("preset", "paper")
     check_one_of("task.preset", preset, tuple(Task.named()))
     chosen = Task.named()[preset].but(**task)
     if "policy" in tree:
-        tree["policy"] = FixedPolicy.named(tree["policy"], chosen)
+        key = f"{tree['policy']!r} {chosen.observation}"
+        if key not in built:
+            built[key] = FixedPolicy.named(tree["policy"], chosen)
+        tree["policy"] = built[key]
     if "policy" in tree or (kind == "colony" and not chosen.choice.needs_table):
         training = {**_WITHOUT_LEARNING, **training}
     for name in _OF_LEARNERS[:5]:  # the others have defaults
@@ -361,6 +356,27 @@ def _point(
     if events:
         tree["protocol"] = protocol.read(events)
     return KINDS[kind](built[key], chosen, TrainingConfig(**training), **tree, **reading)
+
+
+@cache
+def _known(kind: str, hyperparameters: type | None) -> dict[str, None]:
+    """Return the names of the settings of points of this kind, except those of named groups."""
+    more = declared(hyperparameters) if hyperparameters else ()
+    names = [
+        *_own(kind),
+        "task.preset",
+        # A group of settings can be set by a name, if it has names.
+        *(one.path for one in all_of(Task) if not one.is_group or one.has_names),
+        *(one.path for one in (*declared(TrainingConfig), *more)),
+    ]
+    return dict.fromkeys(names)
+
+
+@cache
+def _tables() -> re.Pattern[str]:
+    """Return a pattern of the settings of worlds, and of those in tables of entries with names."""
+    tables = ["world.regions", *(one.path for one in named_groups(Task))]
+    return re.compile(rf"world\.[^.]*|({'|'.join(map(re.escape, tables))})\..*")
 
 
 def _without_events(settings: Settings) -> tuple[Settings, dict[str, list[Any]]]:

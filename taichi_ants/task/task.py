@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import partial
+from functools import cache, partial
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, shown
@@ -333,7 +334,7 @@ class Task(Settings, path="task"):
     @classmethod
     def named(cls) -> Mapping[str, Task]:
         """Return the named tasks: "paper", "foraging" and "queueing"."""
-        return {"paper": paper(), "foraging": foraging(), "queueing": queueing()}
+        return _named()
 
     def _check_choice(self) -> None:
         if self.choice.rule == "deneubourg" and self.observation != "paper":
@@ -496,3 +497,8 @@ def queueing() -> Task:
 def paper() -> Task:
     """Return the paper's task, which is the default everywhere."""
     return Task()
+
+
+@cache
+def _named() -> Mapping[str, Task]:
+    return MappingProxyType({"paper": paper(), "foraging": foraging(), "queueing": queueing()})
