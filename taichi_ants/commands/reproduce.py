@@ -58,7 +58,13 @@ def reproduce(settings: argparse.Namespace) -> None:
         of_run = {"shard": None, "workers": None, "ray": None, "force": False, "text": None}
         with reproduction.unpacked(bundle, manifest) as options, redirect_stdout(io.StringIO()):
             asked: dict[str, Any] = {**options, **of_run, "threads": settings.threads, "out": out}
-            started(manifest["asked"]["command"], asked)
+            try:
+                started(manifest["asked"]["command"], asked)
+            except (TypeError, AttributeError, LookupError) as error:  # of options in the manifest
+                raise AntsError(
+                    f"the study in {str(settings.file)!r} cannot run ({type(error).__name__}: "
+                    f"{error}); get another copy of it."
+                ) from error
         files = list(reproduction.compare(bundle, manifest, out))
     _print(files)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 
 
@@ -23,9 +24,18 @@ def status(settings: argparse.Namespace) -> None:
     """Print the state of each folder."""
     from taichi_ants.studies.state import state
 
+    wrong: list[AntsError] = []
     for folder in settings.folders:
-        lines = list(state(folder))
+        try:
+            lines = list(state(folder))
+        except AntsError as error:
+            wrong.append(error)
+            continue
         print(folder, *(f"  {line}" for line in lines), sep="\n")
+    for one in wrong[:-1]:
+        command_line.notice(f"error: {one}")
+    if wrong:
+        raise wrong[-1]
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import errno
 import hashlib
 import io
 import json
@@ -152,6 +153,7 @@ class GrowingTable:
     def __init__(self, path: PathLike, columns: Sequence[str]) -> None:
         self._path, self._columns = path, columns
         with writing(path):
+            Path(path).unlink(missing_ok=True)  # another process may write to it
             self._file = open(path, "wb", buffering=0)  # noqa: SIM115
         self.append((), header=True)
 
@@ -221,7 +223,8 @@ def read_text(path: PathLike, most: int = 1 << 26) -> str:
     with opened(path, most) as file:
         content = file.read(os.fstat(file.fileno()).st_size)
     try:
-        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+        text = content.decode("utf-8").removeprefix("\ufeff")  # which some editors add
+        return text.replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeError as error:
         raise AntsError(f"{named(path)} is not UTF-8 text; name another file.") from error
 
@@ -283,8 +286,10 @@ def writing(path: PathLike) -> Iterator[None]:
     try:
         yield
     except (OSError, UnicodeError) as error:
+        full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
+        more = "free some space and run the command again, or " if full else ""
         raise AntsError(
-            f"cannot write {named(path)}: {_reason(error)}; choose another place."
+            f"cannot write {named(path)}: {_reason(error)}; {more}choose another place."
         ) from error
 
 

@@ -11,7 +11,7 @@ import hashlib
 import json
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -78,15 +78,20 @@ class ResultFolder:
                 return False
             if place == self._unfinished and self._is_part(manifest):
                 continue
-            name = files.named(self.path)
-            if lost := self._lost(manifest):
-                raise AntsError(
-                    f"{name} contains {what} that this study lacks ({', '.join(lost)}); add them, "
-                    "choose another --out, or give --force to replace all."
-                )
+            if place == self._unfinished and self._has_results():
+                return True
+            lost = self._lost(manifest)
+            which = (
+                f"that this study lacks ({', '.join(lost)}); add them"
+                if lost
+                else (f"of other settings ({self._differences(other)})")
+            )
+            others = "give --force to replace them"
+            if place == self._unfinished:
+                others = f"remove {files.named(self._unfinished)} to give it up"
             raise AntsError(
-                f"{name} contains {what} of other settings ({self._differences(other)}); choose "
-                "another --out, or give --force to replace them."
+                f"{files.named(self.path)} contains {what} {which}{',' if lost else ';'} choose "
+                f"another --out, or {others}."
             )
         if self.path.is_dir() and any(item != self._unfinished for item in self.path.iterdir()):
             raise AntsError(
@@ -94,6 +99,15 @@ class ResultFolder:
                 "choose another --out, or give --force to add results to them."
             )
         return False
+
+    def _has_results(self) -> bool:
+        """Return whether the folder has finished results of these settings."""
+        return (manifest_in(self.path) or {"settings": None})["settings"] == self._settings
+
+    def has_other_work(self) -> bool:
+        """Return whether the folder has unfinished work of other settings."""
+        manifest = manifest_in(self._unfinished)
+        return manifest is not None and manifest["settings"] != self._settings
 
     def part(self) -> dict[str, Any] | None:
         """Return the manifest of finished results that are all or a part of these, or None."""
@@ -121,10 +135,14 @@ class ResultFolder:
         if not (runs and others and {*runs["points"]} & {*others["points"]}):
             return []
         theirs, found = manifest["settings"], list[str]()
+        if self._settings.get("design") != theirs.get("design"):
+            return []
         here, there = (_varied(one, self._leading) for one in (self._settings, theirs))
         for name, values in there.items():
             lost = [shown(one) for text, one in values.items() if text not in here.get(name, {})]
             if lost and name == "vary":
+                if not here[name].keys() <= values.keys():  # the ranges are others
+                    return []
                 found.append(count(len(lost), "sample"))
             elif lost:
                 more = " ..." if len(lost) > _SHOWN else ""
@@ -134,6 +152,8 @@ class ResultFolder:
     def _differences(self, other: Mapping[str, Any]) -> str:
         """Return in words how settings differ from those of this work."""
         own, rest, parts = self._settings, list[str](), list[str]()
+        if own.get("design") != other.get("design"):
+            own, other = ({"design": "grid"} | (one.get("design") or {}) for one in (own, other))
         names = [name for name in dict.fromkeys([*own, *other]) if own.get(name) != other.get(name)]
         for name in [one for one in names if one in self._leading] or names:
             one, others = own.get(name), other.get(name)
@@ -143,11 +163,11 @@ class ResultFolder:
                 parts.append(f"{name} is {shown(others)} instead of {shown(one)}")
         return ", ".join([*parts, *([f"not the same {', '.join(rest)}"] if rest else [])])
 
-    def check(self, may_lack: str | None = None) -> None:
+    def check(self, may_lack: Container[str] = ()) -> None:
         """Check that no file of finished results is altered or missing, except `may_lack`."""
         for name, checksum in self._listed().items():
             path = self.path / name
-            if name == may_lack and not path.exists():
+            if name in may_lack and not path.exists():
                 continue
             if not path.is_file() or checksum_of(path) != checksum:
                 raise AntsError(
@@ -167,12 +187,14 @@ class ResultFolder:
         work. Raises AntsError if the folder cannot be written or another process has finished the
         work.
         """
-        self._listed()  # if the manifest is damaged, this raises before the work
+        if not replace:
+            self._listed()  # if the manifest is damaged, this raises before the work
         new = [part for part in (self.path, *self.path.parents) if not part.exists()]
         try:
-            # Without a manifest, the settings of the blocks are unknown.
-            if replace or not manifest_in(self._unfinished):
+            if replace:
                 self._clear()
+            elif not manifest_in(self._unfinished) and any(self._blocks.rglob("*.npz")):
+                shutil.rmtree(self._blocks)  # the settings of the blocks are unknown
             for folder in (self._blocks, self._ready):
                 files.check_writable_folder(folder, self.path)
             self.seconds_before = seconds_of(self._unfinished)
@@ -195,7 +217,8 @@ class ResultFolder:
                         "resume."
                     ) from error
         finally:
-            if not any(self._blocks.rglob("*.npz")):
+            # Another process can have begun the same work.
+            if not any(self._blocks.rglob("*.npz")) and not any(self._ready.glob("*")):
                 self._clear()
             for folder in new:
                 with suppress(OSError, ValueError):  # it is not empty, or was never created
@@ -208,7 +231,10 @@ class ResultFolder:
         """
         paths = sorted(path.relative_to(ready) for path in ready.rglob("*") if path.is_file())
         checksums = {path.as_posix(): checksum_of(ready / path) for path in paths}
-        for name in self._listed():
+        listed = dict[str, str]()
+        with suppress(AntsError):  # a damaged manifest is replaced
+            listed = self._listed()
+        for name in listed:
             file = self.path / name
             if file.is_file() and file.resolve().is_relative_to(self.path.resolve()):
                 file.unlink()
@@ -223,7 +249,8 @@ class ResultFolder:
 
     def add(self, name: str, text: str) -> None:
         """Add a file to finished results, or replace it."""
-        self._ready.mkdir(parents=True, exist_ok=True)
+        with files.writing(self.path):
+            self._ready.mkdir(parents=True, exist_ok=True)
         with files.writing(self.path), tempfile.TemporaryDirectory(dir=self._ready) as place:
             file = Path(place, name)
             files.write_text(file, text)
@@ -332,7 +359,7 @@ def _contents_of(path: Path) -> dict[str, Any]:
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise AntsError(
             f"{files.named(path)} is damaged or of another version of the package; restore it, or "
-            "remove it and run the command of this folder again."
+            "run the command of this folder again with --force."
         ) from error
 
 

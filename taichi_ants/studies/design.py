@@ -51,7 +51,10 @@ class Range:
             AntsError: A key or a value is not allowed; the message begins with `name`.
         """
         for key in table:
-            check_one_of(f"{name} has the key {key!r}, which", key, _OF_RANGE)
+            if key not in _OF_RANGE:
+                raise AntsError(
+                    f"{name} has the key {key!r}, but a range has only {', '.join(_OF_RANGE)}."
+                )
         whole = checked_flag(f"{name}.whole", table.get("whole", whole))
         ends = [_end(f"{name}.{key}", table.get(key), whole) for key in _OF_RANGE[:2]]
         if not ends[0] < ends[1]:
@@ -108,7 +111,7 @@ def axes_of(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, An
     """Yield the settings in nested tables: full names, with a list of values or a range's table."""
     for name, value in tree.items():
         path = f"{before}.{name}" if before else name
-        if isinstance(value, Mapping) and not value.keys() & set(_OF_RANGE[:2]):
+        if isinstance(value, Mapping) and value and not value.keys() & set(_OF_RANGE[:2]):
             yield from axes_of(value, path)
         else:
             yield path, value if isinstance(value, (Mapping, list)) else [value]

@@ -42,10 +42,13 @@ def checked_manifest(folder: Path) -> dict[str, Any]:
     """
     manifest = manifest_in(folder)
     if not manifest:
-        if manifest_in(folder / UNFINISHED):
+        if work := manifest_in(folder / UNFINISHED):
+            is_shard = work.get("options", {}).get("shard")
+            finish = (
+                "join all shards with `taichi-ants merge`" if is_shard else "run its command again"
+            )
             raise AntsError(
-                f"{str(folder)!r} has unfinished work; run its command again to finish it, then "
-                "archive it."
+                f"{str(folder)!r} has unfinished work; {finish} to finish it, then archive it."
             )
         raise AntsError(f"{str(folder)!r} has no results; name the folder of a finished study.")
     version = manifest["settings"].get("version")
@@ -134,8 +137,13 @@ def manifest_of(bundle: bundles.Bundle) -> dict[str, Any]:
             known = known and bundle.checksum_of(RESULTS + name) == checksum
         known = known and {*manifest["inputs"].values()} <= manifest["files"].keys()
         options = manifest["asked"]["options"]
-        read = (options.get(name) for name in ("file", "plugin"))
+        read = [options.get(name) for name in ("file", "plugin")]
         known = known and all(path is None or path in manifest["inputs"] for path in read)
+        known = known and (read[0] is not None) == (manifest["asked"]["command"] == "sweep")
+        texts = [manifest[name] for name in ("python", "command", "finished")]
+        texts += [manifest["commit"] or "", *manifest["packages"].values()]
+        known = known and all(isinstance(one, str) for one in texts)
+        known = known and isinstance(manifest["settings"], dict) and "clean" in manifest
     except (LookupError, TypeError, AttributeError):
         known = False
     if not known:

@@ -21,6 +21,7 @@ from taichi_ants.files.results import (
     MANIFEST,
     PAGE,
     REPORT,
+    UNFINISHED,
     ResultFolder,
     read_manifest,
     seeds_by_point,
@@ -73,7 +74,7 @@ def work_or_show(
     runs = study.runs(shard or (1, 1)) if study else None
     folder = ResultFolder(settings.out, facts, leading, runs, take is not None, grows_in)
     is_finished = not settings.force and folder.is_finished()
-    if is_finished and (shard or not _lacks(settings, folder)):
+    if is_finished and (shard or folder.has_other_work() or not _lacks(settings, folder)):
         _show(settings, folder, page)
     else:
         began = time.perf_counter()
@@ -109,7 +110,11 @@ def _lacks(settings: Namespace, folder: ResultFolder) -> bool:
         return False
     figures, options = part["figures"], part["asked"]["options"]
     parquet = options.get("parquet", False)
-    lacks = not (settings.no_figures or figures) or getattr(settings, "parquet", False) > parquet
+    missing = any(
+        name.endswith(".parquet") and not (settings.out / name).exists() for name in part["files"]
+    )
+    lacks = not (settings.no_figures or figures)
+    lacks |= getattr(settings, "parquet", False) and (missing or not parquet)
     if lacks:
         settings.no_figures = settings.no_figures and not figures
         settings.parquet = getattr(settings, "parquet", False) or parquet
@@ -157,7 +162,7 @@ def _take(folder: ResultFolder, part: Mapping[str, Any], take: Take, blocks: Pat
     saved, runs = Blocks(blocks), part.get("runs", {})
     wanted = seeds_by_point(runs).items() if runs else ()
     if not wanted or not all(saved.has(point, seed) for point, seeds in wanted for seed in seeds):
-        folder.check()
+        folder.check(may_lack=[n for n in part["files"] if n.endswith((".png", ".parquet"))])
         take(folder.path, runs, saved)
         (blocks.parent / MANIFEST).touch()  # now the work begins: `status` measures its speed
 
@@ -182,7 +187,7 @@ def _of_shard(settings: Namespace, number: int, shards: int) -> str:
 
 def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None) -> None:
     """Print the report of finished results, and make a missing page again."""
-    folder.check(may_lack=PAGE if page else None)
+    folder.check(may_lack=[PAGE] if page else [])
     folder.tidy()
     manifest = read_manifest(settings.out)
     is_missing = not (settings.out / PAGE).exists()
@@ -190,6 +195,8 @@ def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None
         folder.add(PAGE, page(settings.out, None, manifest))
     print(files.read_text(settings.out / REPORT))
     print(f"{settings.out}/ already has these results; use --force to compute them again.")
+    if folder.has_other_work():
+        print(f"It also has unfinished work of other settings, in {settings.out / UNFINISHED}/.")
     if not (settings.no_figures or manifest["figures"]):
         print("They have no figures because of --no-figures; use --force to draw figures.")
     if page and is_missing:

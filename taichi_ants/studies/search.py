@@ -40,6 +40,7 @@ TRIALS, HELD_OUT, BEST, STORAGE = "trials.csv", "held_out.csv", "best.toml", "op
 TRIAL_BLOCKS, HELD_OUT_BLOCKS = "trial-", "held-out"
 COMPLETE, PRUNED, FAILED = "complete", "pruned", "failed"
 _WRITE_EVERY = 5.0  # seconds, at least, between two tables of the trials so far
+_TRIED = 20  # trials, at most, of which one must be allowed before the search begins
 _KEYS = ("maximise", "minimise", "trials", "seed", "prune", "prune_after", "held_out", "vary")
 _OF_SWEEPS = ("vary", "against", "margin", "measure_every", *design.KEYS)
 _VERDICTS = {"supported": "better", "contradicted": "worse", "equivalent": "equal"}
@@ -114,9 +115,27 @@ class Search:
         )
         for module in ("optuna", "tomli_w"):
             design.check_installed(module, "search", "[search]")
-        for row in ({}, asked._asked(asked._study(), 0)[1]):  # the default and the first trial
-            base.point(row, {})
+        asked._check_trials()
         return asked
+
+    def _check_trials(self) -> None:
+        """Raise AntsError if the default is not allowed, or none of the first trials."""
+        self._studies({})
+        study, errors = self._study(), list[AntsError]()
+        for number in range(min(self.trials, _TRIED)):
+            trial, row = self._asked(study, number)
+            try:
+                self._studies(row)
+                return
+            except AntsError as error:
+                errors.append(error)
+                self._tell(study, trial, Trial(row, FAILED, {}))
+        raise errors[0]
+
+    def _studies(self, row: Settings) -> list[tuple[slice, Study[Any]]]:
+        """Return the groups of seeds with their studies; AntsError if they are not allowed."""
+        point = self.base.point(row, {})
+        return [(at, self._part(point, at)) for at in self._groups()]
 
     def facts(self) -> dict[str, Any]:
         """Return everything that determines the results."""
@@ -235,14 +254,14 @@ class Search:
     ) -> Trial:
         """Return a trial that has run, until it was pruned."""
         try:
-            point = self.base.point(row, {})
-        except AntsError:  # the rules do not allow these settings together
+            studies = self._studies(row)
+        except AntsError:  # the rules or the world do not allow these settings together
             return Trial(row, FAILED, {})
         seeds = self.base.seeds
         found: dict[str, list[np.ndarray]] = {name: [] for name in self.base.measures}
         state = COMPLETE
-        for at in self._groups():
-            study, place = self._part(point, at), self._place(blocks, trial.number, at)
+        for at, study in studies:
+            place = self._place(blocks, trial.number, at)
             progress = part(trial.number * len(seeds) + at.start, at.stop - at.start)
             for name, array in self._measures(study, place, progress, where).items():
                 found.setdefault(name, []).append(array[0])

@@ -51,7 +51,9 @@ def join(folders: Sequence[Path], out: Path, replace: bool = False) -> dict[str,
             )
     _check_complete(first, manifests, shards)
     _check_overlaps(first, folders, shards)
-    place = ResultFolder(out, first["settings"], runs=first["runs"])
+    runs, sizes = first["runs"], [len(names) for names in first["runs"]["seeds"]]
+    runs = {**runs, "shard": [[0, sizes[n]] for n in runs["seeds_of"]]}  # of all shards
+    place = ResultFolder(out, first["settings"], runs=runs)
     if not replace and place.is_finished():
         raise AntsError(
             f"{str(out)!r} already has these results; choose another --out, or give --force."
@@ -63,14 +65,16 @@ def join(folders: Sequence[Path], out: Path, replace: bool = False) -> dict[str,
                 with files.unfinished(blocks / path.name) as copy:
                     shutil.copyfile(path, copy)
                     os.replace(copy, blocks / path.name)
-    return first
+    has_parquet = any(one["options"].get("parquet") for one in manifests)
+    return {**first, "options": {**first["options"], "parquet": has_parquet}}
 
 
 def _manifest_of(folder: Path) -> dict[str, Any]:
     manifest = manifest_in(folder / UNFINISHED)
     if not manifest:
         what = "finished results" if (folder / MANIFEST).exists() else "no unfinished work"
-        raise AntsError(f"{str(folder)!r} has {what}, not a shard; name folders made with --shard.")
+        wrong = f"has {what}, not a shard" if folder.exists() else "does not exist"
+        raise AntsError(f"{str(folder)!r} {wrong}; name folders made with --shard.")
     if not manifest.get("runs") or not manifest.get("command"):
         raise AntsError(
             f"{str(folder)!r} has unfinished work of a command without --shard; name folders made "

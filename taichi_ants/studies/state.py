@@ -23,6 +23,8 @@ from taichi_ants.files.results import (
 from taichi_ants.studies.blocks import Blocks
 from taichi_ants.studies.search import COMPLETE, HELD_OUT_BLOCKS, TRIAL_BLOCKS, TRIALS
 
+_FEW = 3  # trials of a search from which the time of the others is estimated
+
 
 def state(folder: Path) -> Iterator[str]:
     """Yield lines about a folder of results.
@@ -59,16 +61,20 @@ def _of_work(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
         yield from _of_search(folder, manifest["settings"], several)
     else:
         yield f"unfinished: {several} done"
-    if (folder / FAILED).exists():
+    with suppress(ValueError, TypeError):  # the file is missing or damaged; includes AntsError
         yield from (f"failed: {one}" for one in json.loads(files.read_text(folder / FAILED)))
     if times:
         yield f"last block: {_duration(max(0.0, time.time() - max(times.values())))} ago"
 
 
 def _runs_of(runs: Mapping[str, Any]) -> Iterator[tuple[str, str, float]]:
-    """Yield the point, seed and work of each run, from the result of `Study.runs`."""
-    columns = (runs[name] for name in ("points", "seeds_of", "weights", "shard"))
-    for point, seeds, weight, (first, end) in zip(*columns, strict=True):
+    """Yield the point, seed and work of each run, from the result of `Study.runs`.
+
+    Without its "shard", these are the runs of all shards.
+    """
+    ranges = runs["shard"] or [(0, None)] * len(runs["points"])
+    columns = (runs[name] for name in ("points", "seeds_of", "weights"))
+    for point, seeds, weight, (first, end) in zip(*columns, ranges, strict=True):
         for seed in runs["seeds"][seeds][first:end]:
             yield point, seed, weight
 
@@ -82,13 +88,18 @@ def _of_study(
     several = count(len(times), "block")
     shard = manifest.get("options", {}).get("shard")
     part = f"shard {shard[0]} of {shard[1]}, " if shard else ""
+    every = list(_runs_of({**manifest["runs"], "shard": None})) if shard else runs
+    here = sum(blocks.has(*run[:2]) for run in every) if shard else len(done)
+    others = f"of all shards: {here} of {count(len(every), 'run')} done in this folder"
     if shard and len(done) == len(runs):
         yield f"finished: {part}{count(len(runs), 'run')}, in {several}"
+        yield from [others] if here > len(done) else []
         return
     yield (
         f"unfinished: {part}{len(done)} of {count(len(runs), 'run')} done "
         f"({100 * work / max(total, 1e-9):.0f} % of the work), in {several}"
     )
+    yield from [others] if here > len(done) else []
     # The speed of the process that worked last, or of all of them before it has finished a block.
     started = start_of(folder)
     when = [times.get(blocks.path_of(*run[:2]) or folder, 0.0) for run in done]
@@ -103,9 +114,14 @@ def _of_search(folder: Path, settings: Mapping[str, Any], several: str) -> Itera
     begun = sorted((folder / BLOCKS).glob(f"{TRIAL_BLOCKS}*"))
     compares = (folder / BLOCKS / HELD_OUT_BLOCKS).exists()
     done = trials if compares else int(begun[-1].name.removeprefix(TRIAL_BLOCKS)) if begun else 0
-    yield f"unfinished: {done} of {count(trials, 'trial')} done, in {several}"
-    if 0 < done < trials and (seconds := seconds_of(folder)):
-        yield f"left: about {_duration(seconds / done * (trials - done))}"
+    more = ", and the comparison with held-out seeds has begun" if compares else ""
+    yield f"unfinished: {done} of {count(trials, 'trial')} done, in {several}{more}"
+    # The first trials include the start of the process, so they say little about the others.
+    if _FEW <= done < trials and (seconds := seconds_of(folder)):
+        seeds = settings["search.prune_after"] or len(settings["seeds"])
+        runs = sum(len(list(one.iterdir())) for one in begun) * seeds
+        left = runs / done * (trials - done) + 2 * len(settings["search.held_out"])
+        yield f"left: about {_duration(seconds / runs * left)}"
     if (folder / ROWS / TRIALS).exists():
         minimises = "search.minimise" in settings
         measure = settings["search.minimise" if minimises else "search.maximise"]
@@ -117,7 +133,7 @@ def _of_search(folder: Path, settings: Mapping[str, Any], several: str) -> Itera
 
 
 def _duration(seconds: float) -> str:
-    for size, unit in ((86400, "days"), (3600, "hours"), (60, "minutes")):
+    for size, unit in ((86400, "day"), (3600, "hour"), (60, "minute")):
         if seconds >= 2 * size:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{seconds:.0f} seconds"
+            return count(round(seconds / size), unit)
+    return count(round(seconds), "second")

@@ -226,7 +226,7 @@ def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
     axes: dict[str, Axis] = {}
     for name, values in given.items():
         if not values:
-            raise AntsError(f"{name} is an empty list; give at least one value.")
+            raise AntsError(f"{name} in [vary] is empty; give at least one value, or a range.")
         for one in fixed:  # a group and one of its settings exclude each other, too
             if f"{one}.".startswith(f"{name}.") or f"{name}.".startswith(f"{one}."):
                 other = "" if one == name else f" {one}"
@@ -241,7 +241,10 @@ def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
             whole = declaration.kind is int if declaration else whole
             axes[name] = axis = Range.of(name, values, whole)
             if name in _whole_numbers(kind):
+                if not axis.whole:
+                    raise AntsError(f"{name}.whole is False, but {name} is whole; leave it out.")
                 checked_whole(f"{name}.from", axis.low, 0 if name == "episodes" else 1)
+                checked_whole(f"{name}.to", axis.high)
             values = [axis.low, axis.high]
         else:
             if name == "world.ranges" and not all(isinstance(one, list) for one in values):

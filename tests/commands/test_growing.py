@@ -203,7 +203,7 @@ def test_shards_that_do_not_fit_are_refused(sweep, capsys):
     assert "8 of 24 runs are missing in these folders; give shard 3 of 3 too" in refused("s1", "s2")
     assert "not shards of the same work (seeds differ)" in refused("s1", "s2", "other")
     assert "'finished' has finished results, not a shard" in refused("s1", "finished")
-    assert "'nothing' has no unfinished work, not a shard" in refused("s1", "nothing")
+    assert "'nothing' does not exist" in refused("s1", "nothing")
     assert sweep(RUNS, "s3", "--shard", "3/3")[0] == 0
     shutil.copytree("s1", "wrong")
     for path in Path("wrong/unfinished/blocks").iterdir():
@@ -236,6 +236,15 @@ def test_a_damaged_block_of_a_shard_is_computed_again_by_its_command(part, sweep
     assert "is damaged or has other settings, so it is computed again" in err
     assert call("merge", ["s1", "s2", "--out", "merged"], capsys)[::2] == (0, "")
     assert_same_results("plain", "merged")
+
+
+def test_a_merge_that_was_killed_counts_the_runs_of_all_shards(sweep, capsys, monkeypatch):
+    for n in (1, 2):
+        assert sweep(RUNS, f"s{n}", "--shard", f"{n}/2")[0] == 0
+    with monkeypatch.context() as patch:
+        patch.setattr("taichi_ants.commands.merge.started", lambda *given: None)
+        assert call("merge", ["s1", "s2", "--out", "merged"], capsys)[0] == 0
+    assert "unfinished: 24 of 24 runs done" in call("status", ["merged"], capsys)[1]
 
 
 def test_a_merge_replaces_other_results_only_if_asked(sweep, capsys):
@@ -393,6 +402,13 @@ def test_a_finished_shard_is_not_unfinished(sweep, capsys):
     _, out, _ = call("status", ["a"], capsys)
     assert "  finished: shard 2 of 3, 8 runs, in " in out
     assert "unfinished" not in out
+    assert "of all shards" not in out
+    Path("a/unfinished/failed.json").write_text("{")  # damaged
+    assert sweep(RUNS, "a", "--shard", "1/3")[0] == 0
+    status, out, err = call("status", ["nothing", "a", "none"], capsys)
+    assert "  of all shards: 16 of 24 runs done in this folder" in out
+    assert status == 2
+    assert err.count("has neither results nor unfinished work") == 2
 
 
 def workers_of(pid):

@@ -224,7 +224,7 @@ WRONG = {
         "discount = 0.9\nepsilon = 0.1",
         ["training.epsilon is in [vary]"],
     ),
-    "empty": ("[1, 0]", "[]", ["task.rewards.shaping is an empty list"]),
+    "empty": ("[1, 0]", "[]", ["task.rewards.shaping in [vary] is empty"]),
     "seeds": ("seeds = [7, 2, 5]", "seeds = 0", ["seeds is 0", "or a list of seeds"]),
     "seed twice": ("[7, 2, 5]", "[7, 7]", ["seeds contains 7 more than once"]),
     "world": ("[task]", '[world]\npreset = "mars"\n[task]', ["'mars'", "open, paper"]),

@@ -196,14 +196,41 @@ def test_a_damaged_manifest_is_named(place, damage, tmp_path):
     if place == "unfinished":
         assert not folder.is_finished()  # by the copy
         (tmp_path / place / "manifest-copy.json").write_text(damage)
-    with pytest.raises(AntsError, match=r"manifest\.json' is damaged or .* or remove it and"):
+    with pytest.raises(AntsError, match=r"manifest\.json' is damaged or .* again with --force"):
         folder.is_finished()
-    if place == "unfinished":
-        assert finish(tmp_path, replace=True).is_finished()
-        return
-    with pytest.raises(AntsError, match=r"manifest\.json' is damaged"):
-        folder.work(replace=True).__enter__()
+    if place == ".":
+        with pytest.raises(AntsError, match=r"manifest\.json' is damaged"):
+            folder.work().__enter__()
+    assert finish(tmp_path, replace=True).is_finished()
     assert names(tmp_path) == ["manifest.json", "report.txt", "table.csv"]
+
+
+def test_a_process_that_stops_leaves_the_work_of_others_alone(tmp_path):
+    with ResultFolder(tmp_path, SETTINGS).work() as (blocks, ready):
+        for replace in (False, False):  # before the first block
+            with pytest.raises(KeyboardInterrupt):
+                interrupted_work(tmp_path, replace=replace, block=None)
+        (ready / "table.csv").write_text("mine")
+        (blocks / "0.npz").write_text("done")
+    assert not ResultFolder(tmp_path, SETTINGS).is_finished()
+
+
+def test_a_process_that_begins_leaves_the_folders_of_others_alone(tmp_path, monkeypatch):
+    """Another process has made its folders, but not its manifest yet."""
+    theirs = tmp_path / "unfinished" / "ready" / "tmp"
+    theirs.mkdir(parents=True)
+    stop_after_a_block(tmp_path)
+    assert theirs.exists()
+
+
+def test_finished_results_are_shown_beside_other_unfinished_work(tmp_path):
+    folder = finish(tmp_path)
+    stop_after_a_block(tmp_path, OTHER)
+    assert folder.is_finished()
+    assert folder.has_other_work()
+    with pytest.raises(AntsError, match=r"or remove .*unfinished' to give it up\.$"):
+        ResultFolder(tmp_path, {**SETTINGS, "rate": 0.1}).is_finished()
+    assert not ResultFolder(tmp_path, OTHER).is_finished()
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "manifest-copy.json"])

@@ -319,6 +319,19 @@ def test_the_state_of_a_search_that_was_stopped(tmp_path, capsys, monkeypatch):
     assert [one.value for one in stored.trials] == [one["deliveries"] for one in rows]
 
 
+def test_trials_that_the_world_or_the_rules_refuse_only_fail(plain, tmp_path):
+    """Also the first one; a search none of whose trials is allowed is refused at once."""
+    many = TEXT.replace("vary.task.pheromone.level", "vary.ants = { from = 1, to = 900 }\n#")
+    found = read(many.replace("trials = 40", "trials = 12")).measured(tmp_path, lambda share: None)
+    failed = [one.settings["ants"] for one in found.trials if one.state == "failed"]
+    others = [one.settings["ants"] for one in found.trials if one.state != "failed"]
+    assert max(others) < min(failed)
+    for seed in range(4):
+        read(many.replace("trials = 40", f"trials = 12\nseed = {seed}"))
+    with pytest.raises(AntsError, match="the number of ants"):
+        read(many.replace("from = 1, to = 900", "from = 5000, to = 9000"))
+
+
 WRONG = {
     "no table": ("[search]", "[task.life]\n[search.x]", ["`search.x` is not a setting"]),
     "key": ("trials = 40", "trails = 40", ["`search.trails`", "trials"]),
