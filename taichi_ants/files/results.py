@@ -157,7 +157,8 @@ class ResultFolder:
         names = [name for name in dict.fromkeys([*own, *other]) if own.get(name) != other.get(name)]
         for name in [one for one in names if one in self._leading] or names:
             one, others = own.get(name), other.get(name)
-            if {type(one), type(others)} & {list, dict} or not (name in own and name in other):
+            is_short = not {type(one), type(others)} & {list, dict} and name != "plugin"
+            if not (is_short and name in own and name in other):
                 rest.append(name)
             else:
                 parts.append(f"{name} is {shown(others)} instead of {shown(one)}")

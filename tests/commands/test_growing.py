@@ -156,6 +156,22 @@ def test_what_contradicts_is_refused_by_name(change, names, sweep):
     assert contents(Path("a")) == before
 
 
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("samples = 8", "samples = 4"), "that this study lacks (4 samples); add them"),
+        (("samples = 8", "samples = 8\ndesign_seed = 3"), "(design_seed is 0 instead of 3)"),
+        (("to = 0.2", "to = 0.3"), "(not the same training.learning_rate, vary)"),
+        (('"sobol"', '"random"'), "(design is 'sobol' instead of 'random')"),
+    ],
+)
+def test_what_contradicts_a_design_is_refused_by_name(change, words, sweep):
+    assert sweep(DRAWN, "a")[0] == 0
+    status, _, err = sweep(DRAWN.replace(*change), "a")
+    assert status == 2
+    assert words in err
+
+
 def test_altered_results_do_not_grow(sweep):
     assert sweep(FEWER["runs"], "a")[0] == 0
     with open("a/runs.csv", "a") as file:

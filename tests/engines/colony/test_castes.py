@@ -14,12 +14,10 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.envs.colony import ColonyWorlds
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
-from taichi_ants.live.setup import Setup
 from taichi_ants.offline import record_colony
 from taichi_ants.task import Labour, Threshold
 from taichi_ants.task.caste import chances_in, numbers_in
 from taichi_ants.task.events import Event
-from taichi_ants.viewer.recorder import Recorder
 
 TRAINING = TrainingConfig("q_learning", 0.5, 0.9, 0.1, 1.0)
 WORLD = worlds.open_world(seed=3, ranges=(50, 50, 50))
@@ -225,9 +223,7 @@ GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
             "only colonies support castes",
         ),
         (lambda: limits_of(worlds.paper(), CASTES), "a bound on deliveries does not support"),
-        (lambda: Recorder(follows(CASTES)), "the viewer does not support castes"),
         (lambda: record_colony(follows(CASTES), 1, 1), "record_colony does not support castes"),
-        (lambda: Setup("paper", CASTES, TRAINING), "the live page does not support castes"),
         (lambda: ColonyWorlds(1, CASTES, GIVEN, 2, "nest"), "an environment does not"),
         (
             lambda: Colony(worlds.paper(), CASTES, sharing="frozen"),

@@ -21,7 +21,6 @@ from taichi_ants.rendering import colony_snapshots, frames
 from taichi_ants.task import Caste, Food
 from taichi_ants.task.constants import FOOD
 from taichi_ants.task.events import Event
-from taichi_ants.viewer.recorder import Recorder
 
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
 KINDS = {"seed": Food(pick_up=2, deliver=5, loads=3), "sugar": Food(deliver=20)}
@@ -243,7 +242,6 @@ def test_pictures_show_every_queen():
         (lambda: limits_of(WORLD), "the world has 2 nests and 2 kinds of food"),
         (lambda: limits_of(replace(WORLD, other_queens=(), food_kinds=()), Task(foods=KINDS)),
          "`task.foods` has the kinds seed and sugar; a bound on deliveries does not support kinds"),
-        (lambda: Recorder(begun()), "the viewer does not support kinds of food"),
         (lambda: record_colony(two_nests(), 1, 5), "record_colony supports one nest"),
         (lambda: AddAnts(number=1, nest=2).apply(Interventions(begun())), "nest is 2"),
         (lambda: Place("food", [[1, 0, 0]], kind="wax").apply(Interventions(begun())),
