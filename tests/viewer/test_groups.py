@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import own_rules  # noqa: F401 - registers rules
 import pytest
 from playback import unpack
 
-from taichi_ants import Colony, Task, TrainingConfig, World, worlds
+from taichi_ants import Colony, Task, TrainingConfig, World, rules, worlds
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import Place
 from taichi_ants.learners.config import update_weights
@@ -125,9 +124,15 @@ def test_the_table_of_a_caste_and_a_nest_is_that_of_their_ants():
     assert dict(recorder.header()["about"])["table"] == "one per nest and caste"
 
 
+def lively(reward, tick):
+    """Return a reward that depends on more than the event."""
+    return reward + tick % 3
+
+
 @pytest.mark.slow
 def test_frames_have_your_own_rewards():
-    task = foraging().but(reward="shaped", life={"regrowth": 0})
+    rules.register("reward")(lively)
+    task = foraging().but(reward="lively", life={"regrowth": 0})
     colony = Colony(worlds.open_world(3, (9, 9, 9)), task, CONFIG, 1, ants=20)
     colony.begin_episode()
     recorder = Recorder(colony)
