@@ -126,7 +126,7 @@ def test_the_table_of_a_caste_and_a_nest_is_that_of_their_ants():
 
 def lively(reward, tick):
     """Return a reward that depends on more than the event."""
-    return reward + tick % 3
+    return min(reward + tick % 3, 1000)
 
 
 @pytest.mark.slow
