@@ -307,7 +307,12 @@ MUTATIONS = [
     ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
     ("viewer/recorder.py", "np.full_like(self._table, np.nan)", "self._table.copy()", SESSION),
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
-    ("viewer/recorder.py", "ants[place], len(weights) - 1", "1, len(weights) - 1", RECORDING),
+    (
+        "viewer/recorder.py",
+        "weights_of(castes, ants[place])",
+        "weights_of(castes, place * 0 + 1)",
+        RECORDING,
+    ),
     ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
     ("viewer/recorder.py", "self._before = self.ticks", "self._before = 0", SESSION),
     # Server.
@@ -391,7 +396,7 @@ MUTATIONS = [
     ("files/bundles.py", "size > MOST_BYTES or len(members)", "len(members)", ARCHIVE),
     ("commands/reproduce.py", "    if different:", "    if False:", ARCHIVE),
     ("commands/reproduce.py", "if not settings.trust_plugins:", "if False:", ARCHIVE),
-    ("files/inputs.py", "return _copies.get(os.fspath(path), path)", "return path", ARCHIVE),
+    ("files/inputs.py", "return copy or path", "return path", ARCHIVE),
     ("report/odd.py", "if one not in found:", "if not found:", ODD),
     ("report/odd.py", "all(value == usual for value in values)", "values[0] == usual", ODD),
     ("report/odd_rules.toml", "{level} - {slope} · a", "{level} - {cap} · a", ODD),

@@ -361,11 +361,13 @@ def read_ahead(c: ti.template()):
 def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
     """Return a kernel of whole ticks whose work is divided into parts, see `Order`.
 
-    Without `waits`, each part is a world of a single chunk, and does all ticks independently. With
-    `waits`, each part does its share of the chunks, and waits for the others at a barrier after
-    each group of phases. A parallel loop per group would take 20 to 200 microseconds more, because
-    threads would sleep and wake up. If a part does not arrive, all parts leave, and another launch
-    starts with the next group, see `Order.FIRST`.
+    Without `waits`, each part is a world of a single chunk, and does all ticks independently.
+    Threads take parts in order, so successive parts are worlds that are far apart: the counts of
+    neighbours share cache lines, and threads that write to the same lines slow each other down.
+    With `waits`, each part does its share of the chunks, and waits for the others at a barrier
+    after each group of phases. A parallel loop per group would take 20 to 200 microseconds more,
+    because threads would sleep and wake up. If a part does not arrive, all parts leave, and another
+    launch starts with the next group, see `Order.FIRST`.
     """
     groups, planning = shared_out(tick_phases(v)), shared_out(planning_phases(v))
     last = shared_out(last_phases(v))
@@ -397,10 +399,14 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
         ti.loop_config(block_dim=1)
         for i in range(c.orders[Order.PARTS]):
             read_ahead(c)
-            part, parts, at = i, c.orders[Order.PARTS], 0
+            part, parts, at, n = i, c.orders[Order.PARTS], 0, c.orders[Order.TICKS]
             if ti.static(waits):
                 part = ti.cast(ti.atomic_add(c.barrier[Barrier.STARTED], 1), ti.i32)
-            for _ in range(c.orders[Order.TICKS]):
+            else:
+                lanes = c.orders[Order.LANES]
+                part = (i % lanes) * (parts // lanes) + i // lanes
+                n = ti.select(part < c.n_worlds, n, 0)  # the last lane can have fewer worlds
+            for _ in range(n):
                 for group in ti.static(groups):
                     at = share(group, c, part, parts, at)
                 if ti.static(v.plans_together):

@@ -74,7 +74,9 @@ class Stepper:
         """Advance the colony by n ticks."""
         end = state.ticks + n
         if state.schedule == "by_world":
-            self._launch_ticks(state, n, parts=len(state.seeds))
+            n_worlds = len(state.seeds)
+            lanes = min(runtime.start().threads, n_worlds)
+            self._launch_ticks(state, n, parts=lanes * -(-n_worlds // lanes), lanes=lanes)
         usual = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
         interval = max(_FEWEST_TICKS, min(_MOST_TICKS, usual))
         while state.ticks < end:
@@ -105,10 +107,10 @@ class Stepper:
         if compiled:
             self.threads.took(threads, (time.perf_counter() - began) / n)
 
-    def _launch_ticks(self, state: ColonyState, n: int, parts: int) -> None:
+    def _launch_ticks(self, state: ColonyState, n: int, parts: int, lanes: int = 1) -> None:
         """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""
         orders, barrier = state.arrays["orders"], state.arrays["barrier"]
-        orders[:], barrier[:] = (n, parts, 0, _SPINS), 0
+        orders[:], barrier[:] = (n, parts, lanes, 0, _SPINS), 0
         self.launch(state, "ticks")
         if (opened := int(barrier[Barrier.OPENED])) < 0:
             orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
