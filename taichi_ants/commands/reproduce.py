@@ -62,8 +62,9 @@ def reproduce(settings: argparse.Namespace) -> None:
                 started(manifest["asked"]["command"], asked)
             except (TypeError, AttributeError, LookupError) as error:  # of options in the manifest
                 raise AntsError(
-                    f"the study in {str(settings.file)!r} cannot run ({type(error).__name__}: "
-                    f"{error}); get another copy of it."
+                    f"the study in {str(settings.file)!r} cannot run here "
+                    f"({type(error).__name__}: {error}); install the versions in its "
+                    "requirements.txt, or get another copy of it."
                 ) from error
         files = list(reproduction.compare(bundle, manifest, out))
     _print(files)

@@ -81,17 +81,15 @@ class ResultFolder:
             if place == self._unfinished and self._has_results():
                 return True
             lost = self._lost(manifest)
-            which = (
-                f"that this study lacks ({', '.join(lost)}); add them"
-                if lost
-                else (f"of other settings ({self._differences(other)})")
-            )
+            which = f"of other settings ({self._differences(other)});"
+            if lost:
+                which = f"that this study lacks ({', '.join(lost)}); add them,"
             others = "give --force to replace them"
             if place == self._unfinished:
                 others = f"remove {files.named(self._unfinished)} to give it up"
             raise AntsError(
-                f"{files.named(self.path)} contains {what} {which}{',' if lost else ';'} choose "
-                f"another --out, or {others}."
+                f"{files.named(self.path)} contains {what} {which} choose another --out, or "
+                f"{others}."
             )
         if self.path.is_dir() and any(item != self._unfinished for item in self.path.iterdir()):
             raise AntsError(

@@ -153,7 +153,12 @@ class Sweep:
         return {name: known.get(name, "double") for name in columns}
 
     def write_parquet(self, source: Path, folder: Path) -> None:
-        """Write Parquet files to a folder from the tables in a folder of results."""
+        """Write Parquet files to a folder from the tables in a folder of results.
+
+        Raises:
+            AntsError: pyarrow is not installed.
+        """
+        parquet.check_installed()
         for name in (RUNS, SUMMARY, SERIES_FILE):
             if (source / name).exists():
                 types = self._types(files.csv_columns(source / name))

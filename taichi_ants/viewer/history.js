@@ -323,8 +323,9 @@ class History {
 
   /* An ant at a moment, with its next action; null if it does not live then.
 
-     {number, nest, caste, kind, idle, cell, heading, loaded, state, values, act}; `kind` is that of its
-     food, and act is null if unknown or if the ant is idle, else {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}. why is
+     {number, nest, caste, kind, idle, cell, heading, loaded, state, values, act}. kind is that of its
+     food. act is null if unknown or if the ant is idle, else
+     {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}. why is
      "best", "tie" (of `ties` actions) or "explored", by the values at the time of the choice, one
      tick earlier if it was made `ahead`. tdError is a mean over `sharers`; before and after are
      action values. */

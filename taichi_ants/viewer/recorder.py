@@ -82,13 +82,13 @@ class Recorder:
 
     Args:
         colony: A colony in an episode.
-        world: The number of the world; AntsError if there is no such world.
+        world: The number of the world.
         title: The title of the page; "" for a description of the colony.
         follow: The number of the ant that the page follows at first.
         pheromone: The name of the pheromone that the page shows: the trail, or a field.
 
     Raises:
-        AntsError: There is no such pheromone.
+        AntsError: `world` is not the number of a world, or `pheromone` not the name of a field.
     """
 
     def __init__(

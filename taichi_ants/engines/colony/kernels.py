@@ -357,6 +357,12 @@ def read_ahead(c: ti.template()):
     return value
 
 
+@ti.func
+def world_of(i, parts, lanes):
+    """Return the world of part i: threads that take successive parts get distant worlds."""
+    return (i % lanes) * (parts // lanes) + i // lanes
+
+
 @cache
 def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
     """Return a kernel of whole ticks whose work is divided into parts, see `Order`.
@@ -403,8 +409,7 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
             if ti.static(waits):
                 part = ti.cast(ti.atomic_add(c.barrier[Barrier.STARTED], 1), ti.i32)
             else:
-                lanes = c.orders[Order.LANES]
-                part = (i % lanes) * (parts // lanes) + i // lanes
+                part = world_of(i, parts, c.orders[Order.LANES])
                 n = ti.select(part < c.n_worlds, n, 0)  # the last lane can have fewer worlds
             for _ in range(n):
                 for group in ti.static(groups):

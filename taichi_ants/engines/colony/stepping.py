@@ -75,7 +75,7 @@ class Stepper:
         end = state.ticks + n
         if state.schedule == "by_world":
             n_worlds = len(state.seeds)
-            lanes = min(runtime.start().threads, n_worlds)
+            lanes = lanes_for(n_worlds)
             self._launch_ticks(state, n, parts=lanes * -(-n_worlds // lanes), lanes=lanes)
         usual = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
         interval = max(_FEWEST_TICKS, min(_MOST_TICKS, usual))
@@ -141,6 +141,11 @@ def features_of(state: ColonyState) -> Features:
         n_nests=state.n_nests,
         **state.task.compiled(state.learns),
     )
+
+
+def lanes_for(n_worlds: int) -> int:
+    """Return the number of threads among which independent worlds are dealt, see `Order.LANES`."""
+    return min(runtime.start().threads, n_worlds)
 
 
 def _has_barrier(running: runtime.Runtime) -> bool:

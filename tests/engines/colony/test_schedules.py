@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from taichi_ants import Colony, TrainingConfig, runtime, train, worlds
-from taichi_ants.engines.colony import layout, stepping
+from taichi_ants.engines.colony import kernels, layout, stepping
 from taichi_ants.engines.colony.layout import Order
 from taichi_ants.engines.colony.stepping import ThreadChoice
 from taichi_ants.task import Field, Life, Pheromone, Task
@@ -59,6 +61,26 @@ def test_threads_and_schedules_give_the_same(monkeypatch):
         assert_same(expected, history(threads=2, schedule=schedule))
     monkeypatch.setattr(stepping, "_has_barrier", lambda running: False)  # as on a GPU
     assert_same(expected, history(threads=2, schedule="by_chunk"))
+
+
+@pytest.mark.parametrize(("n_worlds", "threads"), [(1, 2), (2, 2), (7, 2), (20, 3), (256, 16)])
+def test_threads_take_distant_worlds(n_worlds, threads, monkeypatch):
+    """The counts of neighbours share cache lines, which slows threads down that write to them."""
+    monkeypatch.setattr(runtime, "start", lambda: runtime.Runtime("cpu", threads))
+    orders = []
+    monkeypatch.setattr(stepping.Stepper, "launch", lambda *given: orders.append(given[1].orders()))
+    state = SimpleNamespace(schedule="by_world", seeds=range(n_worlds), capacity=8, ticks=0)
+    state.arrays = {"orders": np.zeros(len(Order), int), "barrier": np.zeros(24, int)}
+    state.orders = lambda: state.arrays["orders"].tolist()
+    stepping.Stepper().advance(state, 5)
+    ((_, parts, lanes, *_),) = orders
+    found = [kernels.world_of.__wrapped__(part, parts, lanes) for part in range(parts)]
+    assert sorted(one for one in found if one < n_worlds) == list(range(n_worlds))
+    assert lanes == min(threads, n_worlds)
+    for first in range(0, parts, lanes):
+        together = sorted(found[first : first + lanes])  # worlds that threads take at a time
+        assert all(np.diff(together) == parts // lanes)
+    assert parts - n_worlds < lanes
 
 
 def test_threads_that_do_not_come_are_not_waited_for_without_end(monkeypatch):
