@@ -386,7 +386,9 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
     shown = [name for page in pages for name in re.findall(r"\]\(figures/([\w.]+)\)", page)]
     drawn = (*gallery.FIGURES, gallery.VIEWER, gallery.LIVE, *shown)
     figures = {f"docs/figures/{name}" for name in drawn}
-    assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY}
+    readme = (ROOT / "README.md").read_text("utf-8")
+    findings = set(re.findall(r'src(?:set)?="(renders/finding_[^"]+)"', readme))  # by findings.py
+    assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY} | findings
 
 
 @pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
