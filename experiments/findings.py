@@ -82,7 +82,7 @@ def _axes(colours: dict[str, str], title: str, below: str = "") -> tuple[Figure,
 
 
 def draw_policies(behaviours: np.ndarray, colours: dict[str, str]) -> Figure:
-    """Draw a dot for each policy."""
+    """Return a picture with a dot for each policy."""
     figure, axes = _axes(colours, "100 trained policies", "none delivers")
     walks, circles = (int((behaviours == one).sum()) for one in (WALKS, CIRCLES))
     x, y = np.divmod(np.arange(len(behaviours)), 5)
@@ -103,7 +103,7 @@ def draw_policies(behaviours: np.ndarray, colours: dict[str, str]) -> Figure:
 
 
 def draw_winners(shares: np.ndarray, colours: dict[str, str]) -> Figure:
-    """Draw how often each learner seems to be the best."""
+    """Return a picture of how often each learner seems to be the best."""
     figure, axes = _axes(colours, "Which learner wins?", "one run per configuration, repeated")
     for n, (name, share) in enumerate(zip(LEARNERS, shares, strict=True)):
         axes.barh(-n, share, 0.62, color=colours[_STEP])
@@ -115,7 +115,7 @@ def draw_winners(shares: np.ndarray, colours: dict[str, str]) -> Figure:
 
 
 def draw_deliveries(by_rules: dict[str, tuple[int, int]], colours: dict[str, str]) -> Figure:
-    """Draw deliveries by rules, of learned policies and of those by hand."""
+    """Return a picture of deliveries by rules, of learned policies and of those by hand."""
     figure, axes = _axes(colours, "Food that 64 ants deliver", "in 1000 ticks, by the rules")
     for n, (rules, pair) in enumerate(by_rules.items()):
         name = {"A + B + C": "three rules"}.get(rules, rules)

@@ -1,8 +1,9 @@
 """Make the film at the top of the README: ants learn from nothing, and find a way round a wall.
 
-The command runs 100 colonies of 64 ants, each with its own seed, measures when lanes form and when
-ants have found a detour, and films the colony whose two times are closest to the median. It writes
-`hero_dark.webp` and `hero_light.webp`, in about a minute on two cores.
+The command runs 100 colonies of 64 ants, each with its own seed. It measures when lanes form and
+how long the ants then search for a way round a wall. It films the colony whose two times are
+closest to the median, and writes `hero_dark.webp` and `hero_light.webp`. This takes about two
+minutes of processor time.
 """
 
 from __future__ import annotations
@@ -168,7 +169,10 @@ class Course:
 
 
 def run(seeds: list[int], after: int = 0, keep: bool = False) -> Course:
-    """Run colonies until all have found a detour, and `after` ticks more."""
+    """Return the course of colonies until all have found a detour, and of `after` more ticks.
+
+    With `keep`, it has a snapshot of the first colony before each tick, and of the end.
+    """
     colony, parts, n = colony_of(seeds), stroke(), len(seeds)
     course = Course(*(np.full(n, -1) for _ in range(3)), [np.zeros(n, int)])
     picked, came = np.full((n, ANTS), LONGEST), np.zeros(n, int)

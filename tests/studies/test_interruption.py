@@ -171,7 +171,9 @@ def test_while_a_command_is_imported(module, start, tmp_path):
     assert not (tmp_path / "results").exists()
 
 
-SCRIPTS = ("ant_system", "fixed_rules", "gallery", "goss", "offline", "utility")
+SCRIPTS = (
+    *("ant_system", "findings", "fixed_rules", "gallery", "goss", "hero", "offline", "utility"),
+)
 COUNTING = """
 import runpy, signal, sys
 
