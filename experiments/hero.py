@@ -36,13 +36,28 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.task.events import Event
 
 ROOT = Path(__file__).parents[1]
+# The dots of an ant, (x, y, radius) in sizes of a hexagon: it looks along y.
+_LEGS = [
+    (side * (0.12 + 0.62 * out), y + turn * out, 0.075)
+    for side in (-1, 1)
+    for y, turn in ((0.12, 0.42), (0.0, 0.0), (-0.1, -0.5))
+    for out in (0.2, 0.4, 0.6, 0.8, 1.0)
+]
+BODY = (
+    *_LEGS,
+    (0, -0.78, 0.34),
+    (0, -0.56, 0.37),
+    (0, -0.2, 0.18),
+    (0, 0.05, 0.21),
+    (0, 0.48, 0.29),
+)
 Cells = set[tuple[int, int]]  # axial coordinates
 RADIUS = 34  # of the grid, a hexagon of cells that is larger than the picture
 _REACH = range(1 - RADIUS, RADIUS)
 ALL_CELLS = [(q, r) for q in _REACH for r in _REACH if abs(q - r) < RADIUS]
 SEEDS, ANTS = 100, 64
 SIZE, BAND, HEXAGON = (960, 600), 92, 11.0  # pixels: the picture, the text above the world, a cell
-ROUND, FADE, QUALITY = 14, 0.4, 70  # radius of corners, seconds, of 100
+ROUND, FADE, QUALITY = 14, 0.4, 64  # radius of corners, seconds, of 100
 FPS, DRAWN_AT = 20, 2  # frames per second; pictures are drawn twice as large, for smooth edges
 
 # Lanes: 25 deliveries in 100 ticks. The wall starts 60 ticks later. Detour: ten loads that were
@@ -87,7 +102,7 @@ LOOKS = {
     ),
     "light": Look(
         *(0xFFFFFF, 0xFBF4E6, 0x2A979D, 0xBFB29A, 0x83765E, 0x54432F),
-        *(0x2A2018, 0xDD4A0C, 0xC2265B, 0x221C15, 0x6A5F52),
+        *(0x2A2018, 0xDD4A0C, 0x8E24AA, 0x221C15, 0x6A5F52),
     ),
 }
 
@@ -253,6 +268,7 @@ class Painter:
                 for one in (rock, wall)
             )
             light = np.clip(4 * (soft - np.roll(soft, (3, 2), (0, 1))), 0, 1)  # from top left
+            light[:3] = light[:, :2] = 0  # which `roll` takes from the other side
             shares = [np.clip(15 * (one - 0.42), 0, 1) for one in (soft, of_wall)]
             self.rock = ground.tobytes(), np.stack([shares[0], light, shares[1]])
         return self.rock[1][..., None]
@@ -271,19 +287,13 @@ class Painter:
         turn = (now.ant_headings - before.ant_headings + 3) % 6 - 3
         angle = (before.ant_headings + share * turn) * (math.pi / 3)
         ahead = np.stack([np.sin(angle), -np.cos(angle)], axis=-1) * size
+        aside = np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1)
         old, new = self.places(before.ant_cells), self.places(now.ant_cells)
         at = old + share * (new - old)
-        carriers = now.ant_carries
-        body = (
-            (-0.62, 0.43),
-            (-0.2, 0.27),
-            (0.12, 0.25),
-            (0.52, 0.33),
-        )  # the place and the radius of each part
-        tables += [
-            marks(at + off * ahead, radius * size, Mark.DOT, look.ant) for off, radius in body
-        ]
-        tables.append(marks((at + 1.05 * ahead)[carriers], 0.45 * size, Mark.DOT, look.food))
+        for x, y, radius in BODY:
+            tables.append(marks(at + y * ahead + x * aside, radius * size, Mark.DOT, look.ant))
+        loads = (at + 1.0 * ahead)[now.ant_carries]
+        tables.append(marks(loads, 0.42 * size, Mark.DOT, look.food))
         return tables
 
     def places(self, cells: np.ndarray) -> np.ndarray:
