@@ -57,7 +57,7 @@ _REACH = range(1 - RADIUS, RADIUS)
 ALL_CELLS = [(q, r) for q in _REACH for r in _REACH if abs(q - r) < RADIUS]
 SEEDS, ANTS = 100, 64
 SIZE, BAND, HEXAGON = (960, 600), 92, 11.0  # pixels: the picture, the text above the world, a cell
-ROUND, FADE, QUALITY = 14, 0.4, 64  # radius of corners, seconds, of 100
+ROUND, FADE, QUALITY = 14, 0.4, 54  # radius of corners, seconds, of 100
 FPS, DRAWN_AT = 20, 2  # frames per second; pictures are drawn twice as large, for smooth edges
 
 # Lanes: 25 deliveries in 100 ticks. The wall starts 60 ticks later. Detour: ten loads that were
