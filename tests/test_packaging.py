@@ -68,6 +68,7 @@ def test_a_package_index_shows_no_broken_links(built):
     assert shown.startswith("# Taichi Ants")
     assert "(`docs/paper.md`)" in shown
     assert re.findall(r"\]\((?!https?:)", shown) == []
+    assert "<" not in re.sub(r"<!-- tests -->|<repository address>", "", shown)  # no HTML
 
 
 def test_the_source_distribution_can_run_the_tests(built):
