@@ -20,6 +20,7 @@ CELL_NEARER = 0xDCE3F2  # a cell nearer to the queen; on the policy sheet only
 FLOOR_FOOD = 0xFBE6D4
 FLOOR_QUEEN = 0xF0DDFA
 ANT = 0x14171C
+FOOD_DOT = 0x9A3F00  # an ant with food that is a dot, for which the colour of food is too light
 INK = 0x1F2429  # text
 FAINT_INK = 0x6B737C
 RULE = 0xC9CED4  # bars of actions
@@ -48,11 +49,12 @@ TRAIL_RAMP.setflags(write=False)
 
 # The darkest colours of further fields, which repeat.
 _FIELDS = (0xCC79A7, 0xC9A227, 0x8C6BB1, 0xA65628)
+N_FIELDS = len(_FIELDS)
 
 
 def field_ramp(number: int) -> np.ndarray:
     """Return the colours of further field `number`, from 0, from weak to strong, uint32 (256,)."""
-    ends = channels(np.array([CELL_EMPTY, _FIELDS[number % len(_FIELDS)]])).astype(float)
+    ends = channels(np.array([CELL_EMPTY, _FIELDS[number % N_FIELDS]])).astype(float)
     parts = np.linspace(0.25, 1.0, 256)[:, None]
     mixed = np.rint(ends[0] * (1 - parts) + ends[1] * parts).astype(np.uint32)
     return mixed @ np.array([1 << 16, 1 << 8, 1], np.uint32)

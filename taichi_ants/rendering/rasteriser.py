@@ -33,7 +33,6 @@ _QUEEN, _QUEEN_OUTLINE = 2.5, 7.0  # pixels, the queen's minimum radius and that
 _DOTS_BELOW = 2.5  # size of a hexagon below which ants are dots
 _DARTS_BELOW = 11.0  # size below which ants are darts
 _DOT = 0.9  # pixels, the minimum radius of a dot
-_DOT_WITH_FOOD = 0x9A3F00
 _FILL = 0.83  # radius of an ant as a share of its hexagon, whose inner circle has 0.866
 
 _COLOURS = {Mark.FOOD: colours.CELL_FOOD, Mark.QUEEN: colours.CELL_QUEEN}
@@ -112,8 +111,7 @@ def ants(
 ) -> np.ndarray:
     """Return marks (n,) of ants. The default of `radius` suits cells of the radius `hexagon`."""
     if hexagon < _DOTS_BELOW:
-        # The colour of the first kind of food is too light for a dot of this size.
-        loaded = np.where(load == np.uint32(colours.CELL_FOOD), _DOT_WITH_FOOD, load)
+        loaded = np.where(load == np.uint32(colours.CELL_FOOD), colours.FOOD_DOT, load)
         colour = np.where(carries, loaded, colour)
         return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)
     without, with_food = Mark.ANT, Mark.ANT_WITH_FOOD
