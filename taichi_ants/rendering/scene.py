@@ -149,7 +149,8 @@ class Scene:
             self._legend_top = bottom
             hexagon = self._rasteriser.hexagon
             cue = task.homing_cue if task else COMPASS
-            draw_legend(self._background, room, bottom, column, letters, hexagon, cue)
+            place = self._background, room, bottom, column, letters, hexagon
+            self._scale_line = draw_legend(*place, cue)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """Return the picture of a snapshot and its panel, uint8 (height, width, 3).
@@ -176,10 +177,8 @@ class Scene:
     def _draw_more_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
         """Draw the scales of fields, and an entry for each further field, nest and kind of food."""
         left, _, width, size = self._status_place
-        rows = len(_LEGEND) * round(1.55 * size)
-        y = self._legend_top + rows + sum(round(part * size) for part in (1.45, 0.45, 1.75))
-        most = f"{self._rasteriser.darkest(snapshot.trail)} and more"
-        text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
+        most, end = f"{self._rasteriser.darkest(snapshot.trail)} and more", left + width
+        text.write(frame, most, end, self._scale_line, size, colours.FAINT_INK, align="right")
         radius = 0.82 * size
         kinds = 1 if snapshot.world is None else snapshot.world.n_food_kinds
         foods = self._foods or [f"of kind {n}" for n in range(kinds)]
@@ -277,10 +276,10 @@ def draw_legend(
     size: int,
     hexagon: float,
     homing_cue: str = COMPASS,
-) -> None:
+) -> int:
     """Draw the legend of colours, shapes and letters, `_LEGEND_HEIGHT` text sizes high.
 
-    `hexagon` is the size of the world's cells in pixels. A scene adds the level of darkest trails.
+    `hexagon` is the size of the world's cells in pixels. Return the y of the text below the ramp.
     """
     pitch, radius = round(1.55 * size), 0.82 * size
     for row, (kind, carries, letter, label) in enumerate(_LEGEND):
@@ -302,6 +301,7 @@ def draw_legend(
     frame[y : y + round(0.7 * size), left : left + width] = ramp
     y += round(1.75 * size)
     text.write(frame, "1", left, y, size, colours.FAINT_INK)
+    return y
 
 
 def fill(

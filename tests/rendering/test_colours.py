@@ -97,8 +97,11 @@ def close(ones: list[int], others: list[int], least: float = 10) -> list[tuple[s
 
 @pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
 def test_all_that_can_meet_stays_apart(theme) -> None:
-    """For everybody, in a page and in a picture; the backgrounds of food and queen differ by what
-    is drawn on them."""
+    """For everybody, in a page and in a picture.
+
+    The backgrounds of food and queen differ by what is drawn on them, and loads of further kinds of
+    food from ants of further nests by their place.
+    """
     of = theme_of(theme)
     samples = steps_of(of["trail"])
     grounds = [*of["empty"], *of["rock"], *samples]
