@@ -277,9 +277,9 @@ def draw_legend(
     hexagon: float,
     homing_cue: str = COMPASS,
 ) -> int:
-    """Draw the legend of colours, shapes and letters, `_LEGEND_HEIGHT` text sizes high.
+    """Return the y of the text below the ramp, after drawing the legend of colours and letters.
 
-    `hexagon` is the size of the world's cells in pixels. Return the y of the text below the ramp.
+    It is `_LEGEND_HEIGHT` text sizes high. `hexagon` is the size of the world's cells in pixels.
     """
     pitch, radius = round(1.55 * size), 0.82 * size
     for row, (kind, carries, letter, label) in enumerate(_LEGEND):
