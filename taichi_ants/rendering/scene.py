@@ -177,8 +177,8 @@ class Scene:
     def _draw_more_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
         """Draw the scales of fields, and an entry for each further field, nest and kind of food."""
         left, _, width, size = self._status_place
-        most, end = f"{self._rasteriser.darkest(snapshot.trail)} and more", left + width
-        text.write(frame, most, end, self._scale_line, size, colours.FAINT_INK, align="right")
+        most, y = f"{self._rasteriser.darkest(snapshot.trail)} and more", self._scale_line
+        text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
         radius = 0.82 * size
         kinds = 1 if snapshot.world is None else snapshot.world.n_food_kinds
         foods = self._foods or [f"of kind {n}" for n in range(kinds)]
