@@ -184,12 +184,18 @@ def make_live(folder: Path, browser: Any) -> None:
 
 
 def _keep(picture: bytes, path: Path) -> None:
-    """Write a picture in 256 colours."""
+    """Write a picture in 256 colours, one of them that of the queen, who has few pixels."""
     from PIL import Image
 
+    from taichi_ants.rendering.colours import CELL_QUEEN, channels
+
     path.parent.mkdir(parents=True, exist_ok=True)
+    palette = Image.new("P", (1, 1))
     with Image.open(io.BytesIO(picture)) as image:
-        image.convert("RGB").quantize(256).save(path, optimize=True)
+        others = image.convert("RGB").quantize(255).getpalette()
+        palette.putpalette([*others, *channels(CELL_QUEEN).tolist()])
+        few = image.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE)
+        few.save(path, optimize=True)
     print(f"{path}: {path.stat().st_size // 1000} kB")
 
 

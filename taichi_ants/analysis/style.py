@@ -31,9 +31,11 @@ COLOURS = (BLUE, ORANGE, RED, WINE, SKY, "#CC79A7", INK, "#009E73", "#999933", G
 @cache
 def _settings() -> Mapping[Any, Any]:
     from matplotlib import rc_params_from_file
+    from matplotlib.rcsetup import cycler
 
     path = Path(__file__).with_name("taichi_ants.mplstyle")
-    return rc_params_from_file(path, use_default_template=False)
+    style = rc_params_from_file(path, use_default_template=False)
+    return {**style, "axes.prop_cycle": cycler(color=COLOURS)}
 
 
 def styled() -> AbstractContextManager:
@@ -46,11 +48,8 @@ def styled() -> AbstractContextManager:
 def use() -> None:
     """Apply the style of the project to all figures of a notebook."""
     from matplotlib import rcParams
-    from matplotlib.rcsetup import cycler
 
-    rcParams.update(_settings())
-    colours = cycler(color=COLOURS)
-    rcParams.update({"axes.prop_cycle": colours, "figure.figsize": (8.0, 3.0), "figure.dpi": 110})
+    rcParams.update({**_settings(), "figure.figsize": (8.0, 3.0), "figure.dpi": 110})
 
 
 def new_figure(height: float) -> Figure:

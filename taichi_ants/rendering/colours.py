@@ -11,7 +11,7 @@ from enum import IntEnum
 import numpy as np
 
 PAGE = 0xFFFFFF  # also the area outside the world, and the lines between cells
-CELL_EMPTY = 0xE9ECEF
+CELL_EMPTY = 0xEAEEF4
 CELL_OBSTACLE = 0x464B52
 CELL_FOOD = 0xD55E00
 CELL_QUEEN = 0xA312DC
@@ -20,6 +20,7 @@ CELL_NEARER = 0xDCE3F2  # a cell nearer to the queen; on the policy sheet only
 FLOOR_FOOD = 0xFBE6D4
 FLOOR_QUEEN = 0xF0DDFA
 ANT = 0x14171C
+FOOD_DOT = 0x9A3F00  # an ant with food that is a dot, for which the colour of food is too light
 INK = 0x1F2429  # text
 FAINT_INK = 0x6B737C
 RULE = 0xC9CED4  # bars of actions
@@ -47,22 +48,23 @@ TRAIL_RAMP.setflags(write=False)
 
 
 # The darkest colours of further fields, which repeat.
-_FIELDS = (0xCC79A7, 0xC9A227, 0x8C6BB1, 0xA65628)
+_FIELDS = (0xD57AF3, 0xCAA228, 0x9564D3, 0xA6582A)
+N_FIELDS = len(_FIELDS)
 
 
 def field_ramp(number: int) -> np.ndarray:
     """Return the colours of further field `number`, from 0, from weak to strong, uint32 (256,)."""
-    ends = channels(np.array([CELL_EMPTY, _FIELDS[number % len(_FIELDS)]])).astype(float)
-    parts = np.linspace(0.25, 1.0, 256)[:, None]
+    ends = channels(np.array([CELL_EMPTY, _FIELDS[number % N_FIELDS]])).astype(float)
+    parts = np.linspace(0.31, 1.0, 256)[:, None]
     mixed = np.rint(ends[0] * (1 - parts) + ends[1] * parts).astype(np.uint32)
     return mixed @ np.array([1 << 16, 1 << 8, 1], np.uint32)
 
 
-# The colours of the queens and ants of nests, and of kinds of food, by number, which repeat.
-_QUEENS = (CELL_QUEEN, 0xC1121F, 0x7A4A00, 0xE0559A, 0x2B4BFF, 0x6B7A00, 0x3A3A3A)
-_ANTS = (ANT, 0x7A0F18, 0x4D2F00, 0x8F2C5C, 0x1A2A8F, 0x444D00, 0x5A5A5A)
-_FOODS = (CELL_FOOD, 0x8C1C13, 0x5E8C31, 0xF2D53C, 0x5C4033, 0x3D5A80, 0x000000, 0xE9A6A6)
-QUEENS, ANTS, FOODS = (np.array(each, np.uint32) for each in (_QUEENS, _ANTS, _FOODS))
+# The colours of nests, for the queen and her ants, and of kinds of food, by number, which repeat.
+_NESTS = (0x83000F, 0x76583D, 0x610854, 0x0625AA, 0x808002, 0x63686D)
+_FOODS = (CELL_FOOD, 0x810508, 0x6B904C, 0xEBC01C, 0x5D4135, 0x3E5C83, 0x181100, 0xDD9297)
+QUEENS, ANTS = (np.array([first, *_NESTS], np.uint32) for first in (CELL_QUEEN, ANT))
+FOODS = np.array(_FOODS, np.uint32)
 
 
 def floors(of_things: np.ndarray, first: int) -> np.ndarray:

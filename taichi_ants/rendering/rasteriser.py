@@ -33,7 +33,6 @@ _QUEEN, _QUEEN_OUTLINE = 2.5, 7.0  # pixels, the queen's minimum radius and that
 _DOTS_BELOW = 2.5  # size of a hexagon below which ants are dots
 _DARTS_BELOW = 11.0  # size below which ants are darts
 _DOT = 0.9  # pixels, the minimum radius of a dot
-_DOT_WITH_FOOD = 0x9A3F00
 _FILL = 0.83  # radius of an ant as a share of its hexagon, whose inner circle has 0.866
 
 _COLOURS = {Mark.FOOD: colours.CELL_FOOD, Mark.QUEEN: colours.CELL_QUEEN}
@@ -112,8 +111,7 @@ def ants(
 ) -> np.ndarray:
     """Return marks (n,) of ants. The default of `radius` suits cells of the radius `hexagon`."""
     if hexagon < _DOTS_BELOW:
-        # The colour of the first kind of food is too light for a dot of this size.
-        loaded = np.where(load == np.uint32(colours.CELL_FOOD), _DOT_WITH_FOOD, load)
+        loaded = np.where(load == np.uint32(colours.CELL_FOOD), colours.FOOD_DOT, load)
         colour = np.where(carries, loaded, colour)
         return marks(places, max(_FILL * hexagon, _DOT), Mark.DOT, colour, opacity=opacity)
     without, with_food = Mark.ANT, Mark.ANT_WITH_FOOD
@@ -160,7 +158,7 @@ class Rasteriser:
         grid: The grid of all worlds to draw.
         width, height, margin: The size of the pictures and the margin on each side, in pixels.
         beyond: Leave space for the cells just outside the border of the world.
-        strongest: The trail level of the darkest colour.
+        strongest: The trail level of the darkest colour; None fits it to each picture.
         of_fields: The same for further fields, by name; `strongest` for those that it lacks.
 
     Attributes:
@@ -174,8 +172,8 @@ class Rasteriser:
         height: int,
         margin: float = 0.0,
         beyond: bool = False,
-        strongest: int = DEPOSIT_LEVEL,
-        of_fields: Mapping[str, int] | None = None,
+        strongest: int | None = DEPOSIT_LEVEL,
+        of_fields: Mapping[str, int | None] | None = None,
     ) -> None:
         self.grid, self._strongest, self._of_fields = grid, strongest, of_fields or {}
         self.width, self.height = width, height
@@ -265,9 +263,9 @@ class Rasteriser:
         floors = colours.floors(colours.QUEENS, colours.FLOOR_QUEEN)
         floors = colours.QUEENS if small else floors
         of_cells[queens] = floors[np.arange(len(queens)) % len(floors)]
-        ramps = [(colours.TRAIL_RAMP, snapshot.trail, self._strongest)]
+        ramps = [(colours.TRAIL_RAMP, snapshot.trail, self.darkest(snapshot.trail))]
         ramps += [
-            (colours.field_ramp(number), levels, self._of_fields.get(name, self._strongest))
+            (colours.field_ramp(number), levels, self.darkest(levels, name))
             for number, (name, levels) in enumerate(snapshot.further_fields.items())
         ]
         for ramp, of_field, strongest in reversed(ramps):  # the trail covers further fields
@@ -277,6 +275,20 @@ class Rasteriser:
             of_cells[marked] = ramp[(share * 255 + 0.5).astype(np.int32)]
         of_cells[~self.grid.exists] = colours.PAGE
         return of_cells
+
+    def darkest(self, levels: np.ndarray, field: str = "") -> int:
+        """Return the level of the darkest colour of a further field, or of the trail.
+
+        A level that fits is 1, 2 or 5 times a power of 10, so it changes rarely in an animation;
+        at most 5 % of the visible levels are above it.
+        """
+        fixed = self._of_fields.get(field, self._strongest)
+        if fixed is not None:
+            return fixed
+        seen = levels[levels >= 1]
+        most = float(np.quantile(seen, 0.95)) if len(seen) else 1.0
+        power = 10 ** math.floor(math.log10(most))
+        return next(one * power for one in (1, 2, 5, 10) if one * power >= most)
 
     def _places(self, cells: np.ndarray) -> np.ndarray:
         """Pixel coordinates (n, 2) of flat indices (n,)."""

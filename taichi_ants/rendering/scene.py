@@ -14,7 +14,7 @@ from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks, numbered
-from taichi_ants.task import Observation, Task, observations
+from taichi_ants.task import Observation, Pheromone, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.states import REACHABLE_STATES, TASK_NAMES
@@ -81,6 +81,12 @@ def check_size(size: tuple[int, int]) -> tuple[int, int]:
     return size[0], size[1]
 
 
+def _scale(pheromone: Pheromone) -> int | None:
+    """Return the level of the darkest colour, None if the rules do not tell usual levels."""
+    told = pheromone.deposit in ("none", "set", "fading") and not pheromone.diffusion
+    return pheromone.darkest if told else None
+
+
 class Scene:
     """Draws snapshots of worlds of one grid as pictures of one size.
 
@@ -96,7 +102,8 @@ class Scene:
         view: Leave space for cells in view outside the border of the world.
         strongest: The trail level, 1 or more, at and above which trails have the darkest colour.
         task: The task of the ants, from which the legend takes cues and the names of kinds of
-            food, and fields their strongest levels; it replaces `strongest`.
+            food, and fields their strongest levels; it replaces `strongest`. If deposits diffuse,
+            add up or follow your rule, each picture fits the scale to its levels.
 
     Raises:
         AntsError: An argument is of the wrong kind, or the size is not allowed.
@@ -115,13 +122,12 @@ class Scene:
     ) -> None:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
-        strongest = task.pheromone.darkest if task else strongest
-        of_fields = {name: one.darkest for name, one in task.fields.items()} if task else {}
+        strongest = checked_whole("strongest", strongest)
+        of_fields = {name: _scale(one) for name, one in task.fields.items()} if task else {}
         self._foods = list(task.foods) if task else []
         width, height = check_size(size)
         expect("title", title, str)
         view = checked_flag("view", view)
-        strongest = checked_whole("strongest", strongest)
         self._overlay = checked_flag("overlay", overlay)
         letters = round(min(width, height) / 38)
         self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
@@ -131,7 +137,8 @@ class Scene:
         if self._has_panel:
             room -= _PANEL_WIDTH * letters + margin
         self._rasteriser = Rasteriser(
-            grid, room, height, margin, view and overlay, strongest, of_fields
+            *(grid, room, height, margin, view and overlay),
+            *(_scale(task.pheromone) if task else strongest, of_fields),
         )
         if self._has_panel:
             column = width - margin - room
@@ -142,7 +149,8 @@ class Scene:
             self._legend_top = bottom
             hexagon = self._rasteriser.hexagon
             cue = task.homing_cue if task else COMPASS
-            draw_legend(self._background, room, bottom, column, letters, hexagon, strongest, cue)
+            place = self._background, room, bottom, column, letters, hexagon
+            self._scale_line = draw_legend(*place, cue)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """Return the picture of a snapshot and its panel, uint8 (height, width, 3).
@@ -167,8 +175,10 @@ class Scene:
         return frame
 
     def _draw_more_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
-        """Draw an entry for each further field, nest and kind of food above the legend."""
-        left, _, _, size = self._status_place
+        """Draw the scales of fields, and an entry for each further field, nest and kind of food."""
+        left, _, width, size = self._status_place
+        most, y = f"{self._rasteriser.darkest(snapshot.trail)} and more", self._scale_line
+        text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
         radius = 0.82 * size
         kinds = 1 if snapshot.world is None else snapshot.world.n_food_kinds
         foods = self._foods or [f"of kind {n}" for n in range(kinds)]
@@ -185,8 +195,9 @@ class Scene:
             y = self._legend_top - (len(entries) - row) * round(1.55 * size)
             x, middle, end = left + 0.85 * size, y + 0.75 * size, left + round(2.1 * size)
             if mark == Mark.HEXAGON:
-                strongest = int(colours.field_ramp(number)[-1])
-                tables = [marks((x, middle), radius, mark, strongest)]
+                tables = [marks((x, middle), radius, mark, int(colours.field_ramp(number)[-1]))]
+                levels = snapshot.further_fields[str(name)]
+                name = f"{name}, {self._rasteriser.darkest(levels, str(name))} and more"
             else:
                 tables = numbered((x, middle), radius, mark, number)
             if mark == Mark.QUEEN:
@@ -264,12 +275,11 @@ def draw_legend(
     width: int,
     size: int,
     hexagon: float,
-    strongest: int,
     homing_cue: str = COMPASS,
-) -> None:
-    """Draw the legend of colours, shapes and letters, `_LEGEND_HEIGHT` text sizes high.
+) -> int:
+    """Return the y of the text below the ramp, after drawing the legend of colours and letters.
 
-    `hexagon` is the size of the world's cells in pixels, `strongest` the level of darkest trails.
+    It is `_LEGEND_HEIGHT` text sizes high. `hexagon` is the size of the world's cells in pixels.
     """
     pitch, radius = round(1.55 * size), 0.82 * size
     for row, (kind, carries, letter, label) in enumerate(_LEGEND):
@@ -291,8 +301,7 @@ def draw_legend(
     frame[y : y + round(0.7 * size), left : left + width] = ramp
     y += round(1.75 * size)
     text.write(frame, "1", left, y, size, colours.FAINT_INK)
-    most = f"{strongest} and more"
-    text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
+    return y
 
 
 def fill(

@@ -28,13 +28,17 @@ _SIDES = {".gif": (1, 65_535), ".mp4": (2, 16_384), "": (1, 2**31 - 1)}
 _SAME = 255  # colour index of unchanged pixels in a GIF; palettes use fewer colours
 _LONGEST = 600  # seconds for which a GIF shows one picture; the format allows 655
 
-# Colours of scenes, which are in every palette.
-_KEPT = (
-    *(colours.PAGE, colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.CELL_FOOD),
-    *(colours.CELL_QUEEN, colours.FLOOR_FOOD, colours.FLOOR_QUEEN, colours.ANT),
-    *(colours.INK, colours.FAINT_INK, colours.RULE, colours.CHOSEN, colours.CELL_NEARER),
-    *colours.TRAIL_RAMP[::6].tolist(),
-    *(int(one) for each in (colours.QUEENS, colours.FOODS) for one in each[1:4]),
+# Colours of scenes, which are in every palette. Steps of ramps are too small to see.
+_KEPT = np.unique(
+    [
+        *(colours.PAGE, colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.CELL_NEARER),
+        *(colours.INK, colours.FAINT_INK, colours.RULE, colours.CHOSEN, colours.FOOD_DOT),
+        *(*colours.QUEENS, *colours.ANTS, *colours.FOODS),
+        *colours.floors(colours.QUEENS, colours.FLOOR_QUEEN),
+        *colours.floors(colours.FOODS, colours.FLOOR_FOOD),
+        *colours.TRAIL_RAMP[::6],
+        *(word for n in range(colours.N_FIELDS) for word in colours.field_ramp(n)[255::-36]),
+    ]
 )
 
 
@@ -217,18 +221,21 @@ def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: f
     """
     from PIL import GifImagePlugin, Image
 
-    colour_table = _palette(first).tobytes()
-    palette = Image.new("P", (1, 1))
-    palette.putpalette(colour_table)
+    palette = _palette(first)
+    nearest = np.full(1 << 24, -1, np.int16)  # the index of each colour in the palette, once known
     height, width = first.shape[:2]
     file.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0xF7, 0, 0))
-    file.write(colour_table.ljust(3 * 256, b"\0"))
+    file.write(palette.tobytes().ljust(3 * 256, b"\0"))
     file.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # repeat without end
 
     def drawn() -> Iterator[tuple[int, bytes]]:
         for number, frame in enumerate(frames, start=1):
-            image = Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE)
-            yield number, image.tobytes()
+            words = frame.astype(np.int32) @ (1 << 16, 1 << 8, 1)
+            new = np.unique(words[nearest[words] < 0])
+            for some in np.array_split(new, 1 + len(new) // 4096):
+                away = colours.channels(some)[:, None].astype(np.int32) - palette
+                nearest[some] = (away**2).sum(axis=2).argmin(axis=1)
+            yield number, nearest[words].astype(np.uint8).tobytes()
 
     before, shown = np.full((height, width), _SAME, np.uint8), 0
     most = _LONGEST * fps
@@ -251,14 +258,11 @@ def _palette(first: np.ndarray) -> np.ndarray:
     """Return a palette for all frames, uint8 (n, 3): the colours of scenes and the first frame."""
     from PIL import Image
 
-    kept = colours.channels(np.array(_KEPT))
+    kept = colours.channels(_KEPT)
     # Colours packed into integers sort several times faster than rows.
     sample = colours.channels(np.unique(first.astype(np.int32) @ (1 << 16, 1 << 8, 1)))
-    free = Image.fromarray(sample[None]).quantize(200).getpalette()
-    others = np.array(free, dtype=np.uint8).reshape(-1, 3)
-    # Pillow looks up colours by their upper bits, so a close colour would replace a scene's.
-    away = np.abs(others[:, None].astype(int) - kept).sum(axis=2).min(axis=1)
-    return np.concatenate([kept, others[away > 20]])
+    free = Image.fromarray(sample[None]).quantize(_SAME - len(kept)).getpalette()
+    return np.concatenate([kept, np.array(free, dtype=np.uint8).reshape(-1, 3)])[:_SAME]
 
 
 def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:

@@ -43,8 +43,8 @@ class Stage {
     const read = (name) => style.getPropertyValue(`--${name}`).trim();
     this.colours = Object.fromEntries(COLOURS.map((name) => [name, read(name)]));
     // The colours of further nests and kinds of food: "queen 1", "ant 1", "food 1", ...
-    for (const name of ["queen", "ant", "food"]) {
-      read(`${name}s`).split(/\s+/).forEach((colour, n) => (this.colours[`${name} ${n + 1}`] = colour));
+    for (const [name, several] of [["queen", "nests"], ["ant", "nests"], ["food", "foods"]]) {
+      read(several).split(/\s+/).forEach((colour, n) => (this.colours[`${name} ${n + 1}`] = colour));
     }
     this.words = Object.fromEntries(Object.keys(this.colours).map((name) => [name, word(...bytesOf(this.colours[name]))]));
     // Colours of trails from just above 0 to the strongest one.

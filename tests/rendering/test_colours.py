@@ -3,46 +3,51 @@
 from __future__ import annotations
 
 import itertools
+import re
 
 import numpy as np
 import pytest
+import vision
+from vision import DEFICIENCIES, lab
 
 from taichi_ants.analysis.style import COLOURS
 from taichi_ants.rendering import colours
+from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS
+from taichi_ants.viewer.page import part
 
-# Full strength, linear light: Machado, Oliveira and Fernandes (2009).
-DEFICIENCIES = {
-    "none": np.eye(3),
-    "protanopia": [
-        [0.152286, 1.052583, -0.204868],
-        [0.114503, 0.786281, 0.099216],
-        [-0.003882, -0.048116, 1.051998],
-    ],
-    "deuteranopia": [
-        [0.367322, 0.860646, -0.227968],
-        [0.280085, 0.672501, 0.047413],
-        [-0.011820, 0.042940, 0.968881],
-    ],
-    "tritanopia": [
-        [1.255528, -0.076749, -0.178779],
-        [-0.078411, 0.930809, 0.147602],
-        [0.004733, 0.691367, 0.303900],
-    ],
-}
+# CIELAB pairs and their CIEDE2000 from Sharma, Wu and Dalal (2005), table 1: blues, greys, hues
+# that differ by half a turn, and large differences.
+SHARMA = [
+    ((50, 2.6772, -79.7751), (50, 0, -82.7485), 2.0425),
+    ((50, -1.3802, -84.2814), (50, 0, -82.7485), 1.0),
+    ((50, 0, 0), (50, -1, 2), 2.3669),
+    ((50, 2.49, -0.001), (50, -2.49, 0.0009), 7.1792),
+    ((50, 2.49, -0.001), (50, -2.49, 0.0011), 7.2195),
+    ((50, 2.5, 0), (73, 25, -18), 27.1492),
+    ((50, 2.5, 0), (58, 24, 15), 19.4535),
+    ((60.2574, -34.0099, 36.2677), (60.4626, -34.1751, 39.4387), 1.2644),
+    ((22.7233, 20.0904, -46.6940), (23.0331, 14.9730, -42.5619), 2.0373),
+    ((90.8027, -2.0831, 1.4410), (91.1528, -1.6435, 0.0447), 1.4441),
+    ((2.0776, 0.0795, -1.1350), (0.9033, -0.0636, -0.5514), 0.9082),
+]
 
 
-def lab(words: object, deficiency: str = "none") -> np.ndarray:
-    """CIELAB (..., 3) of colours 0xRRGGBB as somebody sees them."""
-    share = colours.channels(np.asarray(words)) / 255
-    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
-    linear = np.clip(linear @ np.array(DEFICIENCIES[deficiency]).T, 0, 1)
-    to_xyz = np.array(
-        [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
-    )
-    ratio = linear @ to_xyz.T / [0.9505, 1.0, 1.089]
-    root = np.where(ratio > 0.008856, np.cbrt(ratio), 7.787 * ratio + 16 / 116)
-    x, y, z = np.moveaxis(root, -1, 0)
-    return np.stack([116 * y - 16, 500 * (x - y), 200 * (y - z)], axis=-1)
+@pytest.mark.parametrize(("one", "other", "difference"), SHARMA)
+def test_ciede2000_is_that_of_the_published_pairs(one, other, difference) -> None:
+    assert vision.ciede2000(one, other) == pytest.approx(difference, abs=6e-5)
+    assert vision.ciede2000(other, one) == pytest.approx(difference, abs=6e-5)
+
+
+@pytest.mark.parametrize("deficiency", DEFICIENCIES)
+def test_greys_look_the_same_to_everybody(deficiency) -> None:
+    """And what one kind of cone cannot tell apart, the others do: red and green, blue and green."""
+    for grey in (0x000000, 0x808080, 0xFFFFFF):
+        assert vision.ciede2000(lab(grey), lab(grey, deficiency)) < 0.1
+    confused = {"protanopia": (0x8B6914, 0x5E7A0F), "deuteranopia": (0xB35900, 0x8A7000)}
+    confused["tritanopia"] = (0x0090A0, 0x009080)
+    for one, other in [confused[deficiency]] if deficiency in confused else ():
+        seen = vision.ciede2000(lab(one, deficiency), lab(other, deficiency))
+        assert seen < vision.ciede2000(lab(one), lab(other)) / 1.5
 
 
 def test_white_black_and_red() -> None:
@@ -76,43 +81,77 @@ def test_a_stronger_trail_is_more_striking(deficiency) -> None:
     assert 10 < striking[0] < striking[-1] / 2
 
 
-@pytest.mark.parametrize("deficiency", DEFICIENCIES)
-def test_things_stay_apart(deficiency) -> None:
-    things = {
-        "empty": colours.CELL_EMPTY,
-        "obstacle": colours.CELL_OBSTACLE,
-        "food": colours.CELL_FOOD,
-        "queen": colours.CELL_QUEEN,
-        "ant": colours.ANT,
-    }
-    for (one, first), (other, second) in itertools.combinations(things.items(), 2):
-        apart = np.linalg.norm(lab(first, deficiency) - lab(second, deficiency))
-        assert apart > 22, (one, other, apart)
-    ramp = lab(colours.TRAIL_RAMP, deficiency)
-    least = {"empty": 10, "obstacle": 20, "food": 18, "queen": 30, "ant": 35}
-    for name, word in things.items():
-        apart = np.linalg.norm(ramp - lab(word, deficiency), axis=1).min()
-        assert apart > least[name], (name, apart)
+def theme_of(number: int) -> dict[str, list[int]]:
+    """The colours of a theme of the pages, by name; the light ones are those of the pictures."""
+    block = part("colours.css").split("}")[number]
+    found = re.findall(r"--([a-z-]+): (#[^;]+);", block)
+    return {name: [int(word[1:], 16) for word in value.split()] for name, value in found}
 
 
-@pytest.mark.parametrize("several", [colours.QUEENS, colours.ANTS, colours.FOODS])
-def test_nests_and_kinds_of_food_stay_apart(several) -> None:
-    """Two at least for people with colour deficiencies, and all for others."""
-    for one, other in itertools.combinations(several.tolist(), 2):
-        assert np.linalg.norm(lab(one) - lab(other)) > 12, (hex(one), hex(other))
-    for deficiency in DEFICIENCIES:
-        apart = lab(int(several[0]), deficiency) - lab(int(several[1]), deficiency)
-        assert np.linalg.norm(apart) > 12, deficiency
+def close(ones: list[int], others: list[int], least: float = 10) -> list[tuple[str, str, float]]:
+    """The pairs of different colours that are closer than `least` for somebody."""
+    pairs = [(one, other) for one in ones for other in others if one != other]
+    near = vision.apart(*np.array(pairs).T)
+    return [(f"{a:06x}", f"{b:06x}", d) for (a, b), d in zip(pairs, near, strict=True) if d < least]
 
 
-def test_fields_and_kinds_of_food_stay_apart() -> None:
-    """All of them, and for people with colour deficiencies the first field and two kinds."""
-    fields = [int(colours.field_ramp(number)[-1]) for number in range(4)]
-    for field, food in itertools.product(fields, colours.FOODS.tolist()):
-        assert np.linalg.norm(lab(field) - lab(food)) > 20, (hex(field), hex(food))
-    for deficiency in DEFICIENCIES:
-        for food in colours.FOODS[:2].tolist():
-            assert np.linalg.norm(lab(fields[0], deficiency) - lab(food, deficiency)) > 20
+@pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
+def test_all_that_can_meet_stays_apart(theme) -> None:
+    """For everybody, in a page and in a picture.
+
+    The backgrounds of food and queen differ by what is drawn on them, and loads of further kinds of
+    food from ants of further nests by their place.
+    """
+    of = theme_of(theme)
+    samples = steps_of(of["trail"])
+    grounds = [*of["empty"], *of["rock"], *samples]
+    assert not close(of["empty"] + of["rock"], grounds)
+    assert not close(of["page"], of["rock"] + samples)
+    nests = of["queen"] + of["ant"] + of["nests"]
+    assert len(of["nests"]) == MAX_NESTS - 1
+    assert not close(nests, nests + grounds + of["loaded-dot"])
+    assert not close(of["queen"] + of["nests"], of["queen-floor"])
+    foods = of["food"] + of["foods"]
+    assert len(foods) == MAX_FOOD_KINDS
+    assert not close(foods, foods + of["food-floor"] + of["empty"] + of["ant"])
+    assert not close(of["foods"], of["loaded-dot"])
+    assert not close(of["food"] + of["loaded-dot"], grounds)
+    # These have an edge in another colour, which is seen where the mark itself is not.
+    for mark in (of["chosen"], of["mark"], of["ink"], of["ant"], of["nests"]):
+        assert not close(mark, of["halo"])
+    assert not close(of["halo"], samples)
+
+
+def steps_of(samples: list[int]) -> list[int]:
+    """Colours of a ramp with four steps between its samples."""
+    parts = colours.channels(np.array(samples)).T
+    places = np.linspace(0, len(samples) - 1, 4 * len(samples) - 3)
+    steps = np.rint([np.interp(places, range(len(samples)), part) for part in parts])
+    return (steps.T.astype(int) @ (1 << 16, 1 << 8, 1)).tolist()
+
+
+def test_pictures_have_the_light_colours_of_pages() -> None:
+    """All of them, so what holds for one holds for the other."""
+    light = theme_of(0)
+    assert light["queen"] + light["nests"] == colours.QUEENS.tolist()
+    assert light["ant"] + light["nests"] == colours.ANTS.tolist()
+    assert light["food"] + light["foods"] == colours.FOODS.tolist()
+    assert light["loaded-dot"] == [colours.FOOD_DOT]
+    assert colours.TRAIL_RAMP[np.linspace(0, 255, 9).round().astype(int)].tolist() == light["trail"]
+
+
+def test_drawings_and_fields_stay_apart_in_pictures() -> None:
+    """Where only pictures have colours: floors of each nest and kind, and further fields."""
+    for things, first in (
+        (colours.QUEENS, colours.FLOOR_QUEEN),
+        (colours.FOODS, colours.FLOOR_FOOD),
+    ):
+        assert (vision.apart(things, colours.floors(things, first)) > 10).all()
+    fields = [int(colours.field_ramp(number)[-1]) for number in range(colours.N_FIELDS)]
+    grounds = [colours.CELL_EMPTY, colours.CELL_OBSTACLE, *colours.TRAIL_RAMP[::8].tolist()]
+    assert not close(fields, fields + grounds + [colours.ANT])
+    weakest = [int(colours.field_ramp(number)[0]) for number in range(colours.N_FIELDS)]
+    assert not close(weakest, [colours.CELL_EMPTY])
 
 
 @pytest.mark.parametrize("deficiency", DEFICIENCIES)

@@ -15,7 +15,13 @@ from PIL import Image
 
 from taichi_ants import AntsError, rendering
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.rendering import Episode, check_animation, save_animation, save_picture
+from taichi_ants.rendering import (
+    Episode,
+    check_animation,
+    colours,
+    save_animation,
+    save_picture,
+)
 from taichi_ants.worlds import paper
 
 SIZE = (330, 324)
@@ -53,6 +59,22 @@ def test_gif(tmp_path, frames) -> None:
     # 8 frames a second take 12.5 hundredths each: 12 and 13 in turn.
     assert sum(durations) == pytest.approx(len(frames) * 125, abs=10)
     assert set(durations) == {120, 130}
+
+
+def test_a_gif_keeps_the_colours_of_the_legend(tmp_path, frames) -> None:
+    """All nests, kinds of food and fields, also those that the first frame lacks."""
+    fields = [colours.field_ramp(number)[-1] for number in range(colours.N_FIELDS)]
+    several = [colours.QUEENS, colours.ANTS, colours.FOODS, fields]
+    several.append(colours.floors(colours.QUEENS, colours.FLOOR_QUEEN))
+    several.append(colours.floors(colours.FOODS, colours.FLOOR_FOOD))
+    words = [*(colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.INK), *np.concatenate(several)]
+    flat = frames[0].copy()
+    flat[: len(words)] = colours.channels(np.array(words))[:, None]
+    noise = np.random.default_rng(0).integers(0, 256, frames[0].shape, np.uint8)
+    for first in (frames[0], noise):
+        save_animation(tmp_path / "a.gif", [first, flat])
+        pictures, _ = decoded(tmp_path / "a.gif")
+        assert (pictures[1][: len(words)] == flat[: len(words)]).all()
 
 
 def test_frames_may_be_drawn_into_one_array(tmp_path) -> None:

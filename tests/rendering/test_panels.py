@@ -209,7 +209,7 @@ def test_ants_of_the_legend_look_as_those_of_the_world() -> None:
 
     def legend(hexagon: float) -> np.ndarray:
         frame = np.full((260, 200, 3), 255, dtype=np.uint8)
-        scene.draw_legend(frame, 4, 4, 180, 16, hexagon, 250)
+        scene.draw_legend(frame, 4, 4, 180, 16, hexagon)
         return frame
 
     darts, legs, dots = legend(8.0), legend(20.0), legend(1.0)

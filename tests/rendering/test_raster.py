@@ -16,7 +16,7 @@ from taichi_ants import runtime
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import Scene, Snapshot, at_start, colours, rasteriser, text
 from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.task import Field, Food, Task
+from taichi_ants.task import Field, Food, Pheromone, Task
 from taichi_ants.worlds import World, paper
 
 GOLDEN = Path(__file__).parent / "golden" / "world.png"
@@ -241,8 +241,10 @@ def test_nests_and_kinds_of_food_have_colours(hexagon) -> None:
     for colour in colours.FOODS[5:6] if hexagon == "small" else colours.FOODS[[0, 5]]:
         assert (loads == colours.channels(colour)).all(axis=2).any(), hex(colour)
         assert colour == colours.CELL_FOOD or not (frame == colours.channels(colour)).all(2).any()
-    plain = scene.draw(start)
-    assert not (plain == colours.channels(colours.ANTS[1])).all(axis=2).any()
+    shown = [
+        (one == colours.channels(colours.ANTS[1])).all(axis=2) for one in (frame, scene.draw(start))
+    ]
+    assert shown[0].sum() > shown[1].sum()  # the queen of the nest has the colour, too
 
 
 def test_the_legend_shows_queens_ants_and_foods_in_their_colours(monkeypatch) -> None:
@@ -282,6 +284,33 @@ def test_fields_have_scales_of_their_own() -> None:
     darkest = colours.channels(int(colours.field_ramp(0)[-1]))
     dark = [(frame[:, :700] == darkest).all(axis=2).sum() for frame in frames]
     assert dark[0] > 100 > dark[1]
+
+
+@pytest.mark.parametrize(
+    ("rules", "told"),
+    [
+        ({}, ["250", "250"]),
+        ({"diffusion": 0.5}, ["20", "2000"]),
+        ({"deposit": "add", "cap": 5000}, ["20", "2000"]),
+    ],
+)
+def test_the_scale_fits_fields_whose_levels_rules_do_not_tell(rules, told, monkeypatch) -> None:
+    """Far below and above a deposit; the legend has the scale, and levels use all its colours."""
+    written, write = [], text.write
+    monkeypatch.setattr(text, "write", lambda *a, **k: (written.append(a[1]), write(*a, **k)))
+    world, task = World((9, 9, 9), (0, 0, 0)), Task(pheromone=Pheromone(**rules))
+    start = at_start(world)
+    levels = np.where(start.ground == 0, np.arange(len(start.ground)) % 17, 0)
+    for factor, most in zip((1, 100), told, strict=True):
+        snapshot = dataclasses.replace(start, trail=(factor * levels).astype(np.float32))
+        scene = Scene(world.grid, task=task)
+        frame = scene.draw(snapshot)[:, :900]
+        assert written[-1] == f"{most} and more"
+        strong = colours.channels(colours.TRAIL_RAMP[192:])
+        is_strong = (frame[:, :, None] == strong).all(axis=3).any()
+        assert is_strong == (rules != {} or factor == 100)
+    empty = dataclasses.replace(start, trail=np.zeros(len(levels), np.float32))
+    assert Scene(world.grid, task=task).draw(empty).shape == (720, 1280, 3)
 
 
 def test_the_legend_names_the_homing_cue() -> None:

@@ -559,10 +559,10 @@ def test_nests_have_their_colours_and_their_tables(browser, folder):
     queens = many.grid.index(world.queens).tolist()
     assert opened.read("cell => viewer.stage.queenColour(cell)", queens[0]) == "queen"
     assert opened.read("cell => viewer.stage.queenColour(cell)", queens[1]) == "queen 1"
-    assert opened.read("viewer.stage.colours['queen 1']") == "#c1121f"
+    assert opened.read("viewer.stage.colours['queen 1']") == "#83000f"
     assert opened.text("#legend").count("nest") == 2
     legend = opened.read("document.querySelector('#legend').innerHTML")
-    assert all(colour in legend for colour in ("#c1121f", "#7a0f18", "nest 0", "nest 1"))
+    assert all(colour in legend for colour in ("#83000f", "#a312dc", "nest 0", "nest 1"))
     nests, numbers = many.nests[0], many.numbers[0]
     for slot, number in enumerate(numbers.tolist()):
         shown = opened.read("number => viewer.history.ant(40, number)", number)
