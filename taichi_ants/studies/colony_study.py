@@ -156,7 +156,7 @@ def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
 
 def greedy(point: ColonyPoint) -> ColonyPoint:
     """Return the point that evaluates the same ants without exploration."""
-    calm = replace(point, training=replace(point.training, min_epsilon=0.0))
+    calm = replace(point, evaluation_epsilon=0.0)
     return replace(calm, pool=None, episodes=0, after=point) if point.episodes else calm
 
 

@@ -30,7 +30,14 @@ from taichi_ants.studies.design import Axis, Range
 from taichi_ants.studies.points import ColonyPoint, Progress
 from taichi_ants.studies.runner import VALUE, Study
 from taichi_ants.studies.sweep import Sweep
-from taichi_ants.studies.sweep_file import Base, Settings, axes_of, contents, measure_of
+from taichi_ants.studies.sweep_file import (
+    Base,
+    Settings,
+    axes_of,
+    check_training,
+    contents,
+    measure_of,
+)
 
 if TYPE_CHECKING:
     import optuna
@@ -121,6 +128,8 @@ class Search:
     def _check_trials(self) -> None:
         """Raise AntsError if the default is not allowed, or none of the first trials."""
         self._studies({})
+        if "episodes" not in self.axes:
+            check_training([*self.base.fixed, *self.axes], [self.base.point({}, {})])
         study, errors = self._study(), list[AntsError]()
         for number in range(min(self.trials, _TRIED)):
             trial, row = self._asked(study, number)

@@ -34,6 +34,7 @@ from taichi_ants.studies.sweep_file import (
     as_list,
     axes_of,
     check_entries,
+    check_training,
     contents,
     measure_of,
 )
@@ -324,6 +325,11 @@ def sweep_of(file: Settings, progress: Progress = lambda share: None) -> Sweep:
         points.append(base.point(row, built))
         if number % _SHOW_EVERY == 0:
             progress(number / len(rows))
+    ends = list(itertools.accumulate(map(len, grids), initial=0))
+    parts = tuple(map(slice, ends, ends[1:]))
+    check_training(base.fixed, points)
+    for names, part in zip(axes, parts, strict=True):
+        check_training(names, points[part])
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
@@ -341,8 +347,7 @@ def sweep_of(file: Settings, progress: Progress = lambda share: None) -> Sweep:
         (against,) = pairs
     elif "margin" in file:
         raise AntsError("margin requires against; add against, or leave margin out.")
-    ends = list(itertools.accumulate(map(len, grids), initial=0))
-    parts, every = tuple(map(slice, ends, ends[1:])), base.reading.get("measure_every")
+    every = base.reading.get("measure_every")
     study: Study[Any] = Study(tuple(points), base.seeds)
     return Sweep(
         *(base.kind, study, rows, parts, base.measures, every, against, margin, drawn, axes)
