@@ -33,7 +33,7 @@ from taichi_ants import (
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies.points import EVALUATION_SEEDS, RunPoint
-from taichi_ants.studies.sweep import read_sweep
+from taichi_ants.studies.sweep import read_sweep, sweep_of
 from taichi_ants.task import foraging, observations, paper
 from taichi_ants.worlds import registry
 
@@ -653,3 +653,44 @@ def test_mistakes_in_events_end_in_one_sentence(name, sweep):
     assert_one_sentence(err)
     for word in words:
         assert word in err
+
+
+def test_settings_of_a_training_that_does_not_happen_are_refused():
+    file = {"episodes": 0, "policy": "trail_follower"}
+    colony = {**file, "kind": "colony", "measures": ["deliveries"], "vary": {"ants": [2, 3]}}
+    runs = {**file, "kind": "runs", "measures": ["greedy_return"], "vary": {"max_steps": [9, 20]}}
+    more = r", or set evaluation_epsilon to let them explore\.$"
+    for one, training, end in (
+        (colony, {"training": {"epsilon": 0.3}}, more),
+        (colony, {"vary": {"training.epsilon": [0.0, 0.1]}}, more),
+        (runs, {"training": {"epsilon": 0.3}}, r"\.$"),
+    ):
+        with pytest.raises(AntsError, match=f"^training.epsilon .* is 0; leave it out{end}"):
+            sweep_of({**one, **training})
+
+
+def test_a_training_is_allowed_if_a_part_of_the_sweep_learns():
+    both = [{"policy": ["random"], "episodes": 0}, {"episodes": 3}]
+    file = {"kind": "colony", "measures": ["deliveries"], "ticks": 20, "vary": both}
+    training = {"learner": "sarsa", "learning_rate": 0.1, "discount": 0.9, "epsilon_decay": 0.9}
+    follows, learns = sweep_of({**file, "training": {**training, "epsilon": 0.3}}).study.points
+    assert (follows.exploration, learns.exploration) == (0.0, 0.01)
+    varied = [{**both[0], "training.epsilon": [0.1, 0.2]}, {**both[1], "training.epsilon": 0.1}]
+    with pytest.raises(AntsError, match=r"^training\.epsilon has no effect"):
+        sweep_of({**file, "training": training, "vary": varied})
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"evaluation_epsilon": 1.5}, "epsilon is 1.5; it must be a number between 0 and 1"),
+        ({"task": {"choice": "deneubourg"}, "evaluation_epsilon": 0.1}, "ants do not explore"),
+        ({"kind": "runs", "evaluation_epsilon": 0.1}, "of kind 'runs', but of 'colony'"),
+    ],
+)
+def test_the_exploration_of_an_evaluation_is_checked(more, message):
+    file = {"kind": "colony", "measures": ["deliveries"], "episodes": 0, "vary": {"rollouts": [1]}}
+    file |= {} if "task" in more else {"policy": "random"}
+    file |= {"measures": ["greedy_return"]} if more.get("kind") == "runs" else {}
+    with pytest.raises(AntsError, match=message):
+        sweep_of({**file, **more})
