@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.findings import means_in_words
-from taichi_ants.analysis.statistics import Estimator, bootstrap_interval, estimates
+from taichi_ants.analysis.findings import gaps_in_words, means_in_words
+from taichi_ants.analysis.statistics import Estimator, estimates
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
 if TYPE_CHECKING:
@@ -32,13 +32,19 @@ def seed_rows(
             yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
-def centre_columns(found: Mapping[str, Estimator]) -> dict[str, float]:
-    """Return the columns of a table for the estimates of several measures."""
+def centre_columns(
+    found: Mapping[str, Estimator], with_gaps: Sequence[str] = ()
+) -> dict[str, float]:
+    """Return the columns of a table for the estimates of several measures.
+
+    Measures in `with_gaps` have a column with the number of seeds without a value.
+    """
     return {
         f"{name}_{field}": value
         for name, one in found.items()
         for field, value in one._asdict().items()
-        if one.iqm is not None or "iqm" not in field
+        if (one.iqm is not None or "iqm" not in field)
+        and (field != "left_out" or name in with_gaps)
     }
 
 
@@ -70,14 +76,14 @@ def report(
     point with that value; `notes` has its text.
     """
     names = columns_of(settings)
-    ends = {name: bootstrap_interval(array) for name, array in values.items()}
     lines = []
-    for p, one in enumerate(settings):
+    for one, centres in zip(settings, centres_of(values), strict=True):
         cells = [_shown(one.get(name, MISSING)) for name in names]
-        for name, array in values.items():
-            low, high = (end[p] for end in ends[name])
-            mean = f"{array[p].mean():.4g}"
-            cells.append(mean if np.isnan(low) else f"{mean} [{low:.4g}, {high:.4g}]")
+        for centre in centres.values():
+            ends = f" [{centre.ci_low:.4g}, {centre.ci_high:.4g}]"
+            without = f" ({centre.left_out} left out)" if centre.left_out else ""
+            mean = f"{centre.mean:.4g}" if np.isfinite(centre.mean) else MISSING
+            cells.append(f"{mean}{'' if np.isnan(centre.ci_low) else ends}{without}")
         lines.append(cells)
     headers = [*(short(name, names) for name in names), *values]
     if against:
@@ -85,6 +91,8 @@ def report(
         headers.append(f"{next(iter(values))} against {other}")
         lines = [[*line, note] for line, note in zip(lines, notes, strict=True)]
     title = means_in_words(next(iter(values.values())).shape[1])
+    if any(np.isnan(array).any() for array in values.values()):
+        title += "; runs without a value are left out"
     return plain_text([Table(title, headers, lines, text_columns=len(headers))], _TERMINAL)
 
 
@@ -100,9 +108,9 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
     names = columns_of(settings)
     others = [name for name in names[1:] if len({str(one.get(name)) for one in settings}) > 1]
     alike = [f"{short(n, names)} {_shown(settings[0][n])}" for n in names[1:] if n not in others]
-    numbers = values.mean(axis=1), *bootstrap_interval(values)
+    numbers = [(one.mean, one.ci_low, one.ci_high) for one in estimates(values, uses_iqm=False)]
     lines: dict[str, list[tuple[Any, ...]]] = {}
-    for one, *point in zip(settings, *numbers, strict=True):
+    for one, point in zip(settings, numbers, strict=True):
         label = ", ".join(f"{short(n, names)} {_shown(one[n])}" for n in others if n in one)
         lines.setdefault(label or words, []).append((one.get(names[0]), *point))
     with style.styled():
@@ -111,7 +119,8 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
         draw_lines(axes, lines)
         axes.set(xlabel=names[0], ylabel=words)
         caption = ", ".join([means_in_words(values.shape[1]), *alike])
-        style.frame(figure, sentence(words), f"{caption}.", style.legend_entries([axes]))
+        caption = f"{caption}.{gaps_in_words(values)}"
+        style.frame(figure, sentence(words), caption, style.legend_entries([axes]))
     style.save(figure, path)
 
 
@@ -141,13 +150,13 @@ def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> No
     elif _far_apart(places):
         style.logarithmic(axes.xaxis, (1,))
         axes.set_xticks(sorted(set(places)))
-    means = [mean for points in lines.values() for _, mean, *_ in points]
+    means = [one[1] for points in lines.values() for one in points if np.isfinite(one[1])]
     if numbers and _far_apart(means):
         style.logarithmic(axes.yaxis, (1, 2, 5) if max(means) < 1000 * min(means) else (1,))
 
 
 def _far_apart(numbers: Sequence[float]) -> bool:
-    return min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
+    return len(numbers) > 0 and min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
 
 
 def are_numbers(places: Sequence[Any]) -> bool:

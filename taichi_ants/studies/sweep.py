@@ -18,6 +18,7 @@ from taichi_ants.analysis import designs, sensitivity, sweeps
 from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.paper import measures as of_runs
+from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.files import parquet
 from taichi_ants.files.results import REPORT, ROWS
@@ -234,9 +235,11 @@ class Sweep:
             pairs = [(p, rows.index(other)) for p, other in enumerate(others) if other in rows]
             pairs = [(p, other) for p, other in pairs if p != other]
             several = [Contrast("", own[p] - own[other], above(self.margin)) for p, other in pairs]
-            for (p, _), one in zip(pairs, judge(several), strict=True):
+            for (p, other), one in zip(pairs, judge(several), strict=True):
                 said = _WORDS.get(one.verdict.value, "undecided")
                 numbers = {"difference": one.effect, "low": one.low, "high": one.high}
+                if np.isnan(values).any():
+                    numbers["left_out"] = int(np.isnan(own[p] - own[other]).sum())
                 found[some.start + p] = {**rows[p], "finding": said, **numbers}
         return found
 
@@ -246,14 +249,15 @@ class Sweep:
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
         with_iqm = [name for name in values if measure_of(self.kind, name).uses_iqm]
+        gaps = [name for name, array in values.items() if np.isnan(array).any()]
         rows = [
-            {**one, "seeds": len(self.study.seeds), **sweeps.centre_columns(centres)}
+            {**one, "seeds": len(self.study.seeds), **sweeps.centre_columns(centres, gaps)}
             for one, centres in zip(self.settings, sweeps.centres_of(values, with_iqm), strict=True)
         ]
         files.write_csv(folder / SUMMARY, rows, sweeps.columns_of(rows))
         found = self.findings(values[first])
         if self.against:
-            more = ("finding", "difference", "low", "high")
+            more = ["finding", "difference", "low", "high", *["left_out"] * (first in gaps)]
             files.write_csv(folder / FINDINGS, found.values(), [*columns, *more])
         notes = [found.get(p, {}).get("finding", "") for p in range(len(self.settings))]
         if self.design.kind == GRID:
@@ -263,8 +267,13 @@ class Sweep:
         indices = self.indices(values)
         if indices:
             report = f"{report}\n{sensitivity.report(indices, len(self.study.seeds))}"
-            of_all = [one._asdict() for several in indices.values() for one in several]
-            files.write_csv(folder / SENSITIVITY, of_all, sensitivity.Index._fields)
+            fields = [name for name in sensitivity.Index._fields if name != "left_out" or gaps]
+            of_all = [
+                {name: getattr(one, name) for name in fields}
+                for several in indices.values()
+                for one in several
+            ]
+            files.write_csv(folder / SENSITIVITY, of_all, fields)
         files.write_text(folder / REPORT, report)
         if draws:
             self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
@@ -386,9 +395,5 @@ def _ends(outcome: Outcome, name: str) -> Outcome:
     for key, array in outcome.items():
         column = key.removeprefix(SERIES)
         if key != column and (column == name or column.startswith(f"{name}.")):
-            last = array[..., -1]
-            known = ~np.isnan(last)
-            n = known.sum(axis=1)
-            sums = np.where(known, last, 0.0).sum(axis=1)
-            found[column] = np.divide(sums, n, out=np.full(len(n), math.nan), where=n > 0)
+            found[column] = known_means(array[..., -1])
     return found
