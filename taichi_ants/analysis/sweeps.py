@@ -139,7 +139,9 @@ def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> No
         ordered = sorted(points, key=lambda point: point[0]) if numbers else points
         x = [place if numbers else ticks.index(_shown(place)) + shift for place, *_ in ordered]
         mean, low, high = np.array([point[1:] for point in ordered], float).reshape(-1, 3).T
-        (line,) = axes.plot(x, mean, marker=marker, markersize=4.5, color=colour, label=label)
+        (line,) = axes.plot(
+            x, mean, marker=marker, markersize=4.5, color=colour, label=style.label(label)
+        )
         if numbers:
             axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
         else:

@@ -259,7 +259,8 @@ def do_study(
     files.write_text(folder / REPORT, plain_text(tables.on_one_screen(*results), _WIDTH))
     _save_policies(conditions, asked, values, blocks, folder / POLICIES, **how)
     if draws:
-        style.save_all(draw_all(results.rows), folder / FIGURES)
+        with style.all_or_none(folder / FIGURES):
+            style.save_all(draw_all(results.rows), folder / FIGURES)
     return results
 
 

@@ -253,6 +253,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     """Run a command, report an error or interruption in one sentence, and exit Python."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
+    os.environ["MPLBACKEND"] = "agg"  # figures are files, and the user's backend may be missing
     status = 0
     try:
         with stoppable(interrupted):

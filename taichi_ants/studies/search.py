@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from taichi_ants import checks, files
-from taichi_ants.analysis import searches, sweeps
+from taichi_ants.analysis import searches, style, sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, shown
 from taichi_ants.files.results import REPORT, ROWS
@@ -346,7 +346,8 @@ class Search:
             names, logs = list(design.varying(self.axes)), design.logarithmic(self.axes)
             path = folder / sweep.FIGURES / "search.png"
             files.check_writable_folder(path.parent)
-            searches.draw(path, rows, names, logs, (self.measure, words), self.maximises)
+            with style.all_or_none(path.parent):
+                searches.draw(path, rows, names, logs, (self.measure, words), self.maximises)
 
     def best_file(self, found: Found) -> str:
         """Return a sweep file (TOML) that runs the best settings with the held-out seeds."""

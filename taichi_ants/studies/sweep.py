@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.analysis import designs, sensitivity, sweeps
+from taichi_ants.analysis import designs, sensitivity, style, sweeps
 from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.paper import measures as of_runs
@@ -276,7 +276,8 @@ class Sweep:
             files.write_csv(folder / SENSITIVITY, of_all, fields)
         files.write_text(folder / REPORT, report)
         if draws:
-            self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
+            with style.all_or_none(folder / FIGURES):
+                self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
 
     def indices(self, values: dict[str, np.ndarray]) -> dict[str, list[sensitivity.Index]]:
         """Return the sensitivity indices by measure, from values that `measured` returned.

@@ -9,8 +9,16 @@ import numpy as np
 import pytest
 from command_lines import assert_one_sentence, call
 
-from taichi_ants import AntsError, Colony, TrainingConfig, measures, rules, save_policy, worlds
-from taichi_ants.files import read_csv
+from taichi_ants import (
+    AntsError,
+    Colony,
+    TrainingConfig,
+    files,
+    measures,
+    rules,
+    save_policy,
+    worlds,
+)
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.measures import registry
 from taichi_ants.studies.points import EVALUATION_SEEDS
@@ -267,13 +275,13 @@ def test_runs_without_a_value_are_left_out_and_counted(tmp_path):
     values = np.random.default_rng(0).uniform(size=(3, 12))
     values[0, 3] = values[1, [4, 5]] = values[2] = np.nan
     sweep.write({"entropy.trail": values}, tmp_path, draws=True)
-    rows = read_csv(tmp_path / "summary.csv")
-    assert [row["entropy.trail_left_out"] for row in rows] == ["1", "2", "12"]
-    assert [row["seeds"] for row in rows] == ["12"] * 3
+    rows = files.read_csv(tmp_path / "summary.csv")
+    assert [row["entropy.trail_left_out"] for row in rows] == [1, 2, 12]
+    assert [row["seeds"] for row in rows] == [12] * 3
     assert float(rows[1]["entropy.trail_mean"]) == np.nanmean(values[1])
-    assert rows[2]["entropy.trail_mean"] == ""
-    found = read_csv(tmp_path / "findings.csv")
-    assert [row["left_out"] for row in found] == ["3", "12"]
+    assert rows[2]["entropy.trail_mean"] is None
+    found = files.read_csv(tmp_path / "findings.csv")
+    assert [row["left_out"] for row in found] == [3, 12]
     both = ~np.isnan(values[:2]).any(axis=0)
     wanted = (values[1] - values[0])[both].mean()
     assert float(found[0]["difference"]) == pytest.approx(wanted)
