@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Settings = Mapping[str, Any]
+Lines = Mapping[str, Sequence[tuple[Any, ...]]]
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # 7 with 10 colours give 70 different lines
 _TERMINAL = 200  # the maximum number of columns
 _WIDE = 20  # the ratio of largest to smallest from which an axis is logarithmic
@@ -124,10 +125,12 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
     style.save(figure, path)
 
 
-def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> None:
+def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
     """Draw means with intervals, by label: for each point, x, mean, and the ends of the interval.
 
-    If any x is not a number, the points of a label are not joined by a line.
+    If any x is not a number, the points of a label are not joined by a line. `shared` are the lines
+    of panels with the same vertical axis, which is not logarithmic if a mean or an end is not
+    positive.
     """
     places = [place for points in lines.values() for place, *_ in points]
     numbers = are_numbers(places)
@@ -153,7 +156,8 @@ def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> No
         style.logarithmic(axes.xaxis, (1,))
         axes.set_xticks(sorted(set(places)))
     means = [one[1] for points in lines.values() for one in points if np.isfinite(one[1])]
-    if numbers and _far_apart(means):
+    drawn = (one for each in (lines, *shared) for points in each.values() for _, *one in points)
+    if numbers and _far_apart(means) and not any(y <= 0 for one in drawn for y in one):
         style.logarithmic(axes.yaxis, (1, 2, 5) if max(means) < 1000 * min(means) else (1,))
 
 

@@ -223,7 +223,8 @@ def _help_of_entries(group: Setting) -> str:
     """Return the help of options such as --task.fields.home.level, for any name."""
     names = ", ".join(one.name.replace("_", "-") for one in declared(group.entry))
     option = f"--{group.path.replace('_', '-')}.NAME.SETTING"
-    return f"{option}: {group.rule.help}; SETTING is one of {names}. "
+    settings = f"SETTING is one of {names}" if names else "each rule declares its own"
+    return f"{option}: {group.rule.help}; {settings}. "
 
 
 def _literal(text: str) -> Any:

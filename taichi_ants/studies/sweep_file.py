@@ -69,7 +69,7 @@ def measure_of(kind: str, name: str) -> Measure:
         AntsError: There is no such measure; the message lists all names.
     """
     known = MEASURES[kind]
-    if name in known:
+    if isinstance(name, str) and name in known:
         return known[name]
     if not isinstance(name, str) or name.partition(".")[0] not in _registered(kind):
         raise AntsError(f"measures is {shown(name)}; it must be one of {_names_of(kind)}.")

@@ -61,7 +61,7 @@ def test_without_measures_the_rows_are_the_counts():
     result = run()
     rows = {(row["measure"], row["episode"], row["seed"]): row["value"] for row in result.rows()}
     assert rows["moves", 1, 3] == result.moves[1, 3]
-    assert len(rows) == 11 * 2 * 5
+    assert len(rows) == 12 * 2 * 5
 
 
 def test_rows_of_lone_ants(trained):

@@ -30,6 +30,7 @@ from taichi_ants import (
     train,
     worlds,
 )
+from taichi_ants.analysis import sweeps
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies.points import EVALUATION_SEEDS, RunPoint
@@ -694,3 +695,41 @@ def test_the_exploration_of_an_evaluation_is_checked(more, message):
     file |= {"measures": ["greedy_return"]} if more.get("kind") == "runs" else {}
     with pytest.raises(AntsError, match=message):
         sweep_of({**file, **more})
+
+
+def test_a_figure_that_fails_does_not_cost_the_tables(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(RUNS)
+
+    def fails(*_):
+        raise RuntimeError("no font")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(sweeps, "draw", fails)
+        status, out, err = call("sweep", ["my.toml", "--out", "done"], capsys)
+    assert (status, "all results are in done/" in out) == (0, True)
+    assert err == "warning: there are no figures, because one failed with RuntimeError: no font.\n"
+    assert not Path("done/figures").exists()
+    before = Path("done/summary.csv").read_bytes()
+    assert call("sweep", ["my.toml", "--out", "done"], capsys)[0] == 0  # draws them
+    assert Path("done/figures/return_last50.png").exists()
+    assert Path("done/summary.csv").read_bytes() == before
+
+
+def test_the_backend_of_the_user_may_be_missing(tmp_path):
+    (tmp_path / "my.toml").write_text(RUNS)
+    command = [sys.executable, str(EXPERIMENTS / "sweep.py"), "my.toml", "--out", "done"]
+    more = environment(tmp_path, MPLBACKEND="nonsense")
+    done = subprocess.run(command, cwd=tmp_path, env=more, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "done/figures/return_last50.png").exists()
+
+
+@pytest.mark.parametrize("kind", ["runs", "colony"])
+@pytest.mark.parametrize("wrong", [["return_last50"], {"a": 1}, 3])
+def test_measures_that_are_not_names_are_refused(kind, wrong):
+    file = {"kind": kind, "measures": [wrong], "vary": {"rollouts": [1, 2]}}
+    with pytest.raises(AntsError) as error:
+        sweep_of(file)
+    assert_one_sentence(f"error: {error.value}\n")
+    assert str(error.value).startswith(f"measures is {wrong}; it must be one of")
