@@ -211,7 +211,7 @@ class Model:
         if "measures" not in self.settings:
             several = OF_STUDY if self.of_colony else {n: one.words for n, one in OF_RUNS.items()}
             yield from ((f"`{name}`", words) for name, words in several.items())
-        for name in _list_of(self.sweep.get("measures", self.settings.get("measures", []))):
+        for name in _list_of(self.settings.get("measures", [])):
             try:
                 words = measure_of("colony" if self.of_colony else "runs", name).words
             except AntsError:

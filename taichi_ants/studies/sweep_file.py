@@ -37,6 +37,10 @@ _OF_FILE = (  # keys that are not settings of points
 )
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
+# Measures of reward, and the deliveries that sweeps report beside them: ants can collect rewards
+# without delivering.
+_BESIDE = {"reward": "deliveries", "greedy_return": "greedy_deliveries"}
+_BESIDE |= {f"return_{of}": f"deliveries_{of}" for of in ("first50", "second50", "last50", "all")}
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
 
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
@@ -136,6 +140,8 @@ class Base(NamedTuple):
         for name in wanted:
             measure_of(kind, name)
         _check_once("measures", wanted)
+        beside = [_BESIDE[name] for name in wanted if name in _BESIDE]
+        wanted = list(dict.fromkeys([*wanted, *beside]))
         for name in protocol.EVENTS:
             if isinstance(file.get(name), dict):
                 raise AntsError(f"[{name}] is one table; write [[{name}]] in double brackets.")

@@ -181,7 +181,7 @@ def test_figures_are_drawn(series, trained, tmp_path):
         "Deliveries,\nfood items", "Entropy (trail)"
     ]  # fmt: skip
     assert figure.axes[-1].get_xlabel() == "Tick"
-    assert [len(axes.lines) for axes in trained.plot().axes] == [2, 2]
+    assert [len(axes.lines) for axes in trained.plot().axes] == [2, 2, 2]
 
 
 def test_several_results_are_drawn_together(series, trained):

@@ -108,6 +108,10 @@ def read_csv(path):
         return list(csv.DictReader(file))
 
 
+# Deliveries are reported beside returns.
+MEASURES = ["return_last50", "greedy_deliveries", "deliveries_last50"]
+
+
 def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
     status, out, err = sweep(RUNS)
     assert (status, err) == (0, "")
@@ -118,7 +122,7 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
     }
     rows = read_csv(folder / "runs.csv")
     names = ["training.learning_rate", "training.epsilon", "task.rewards.shaping"]
-    assert list(rows[0]) == [*names, "seed", "return_last50", "greedy_deliveries"]
+    assert list(rows[0]) == [*names, "seed", *MEASURES]
     assert len(rows) == 2 * 3 * 2 * 3
     for row in rows[::5]:
         rate, epsilon = (float(row[name]) for name in names[:2])
@@ -126,6 +130,7 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
         task = Task(delivery="truncates", rewards=Rewards(shaping=int(row[names[2]])))
         trained = train(worlds.paper(), config, int(row["seed"]), 50, 60, task)
         assert float(row["return_last50"]) == trained.returns.mean()
+        assert float(row["deliveries_last50"]) == trained.deliveries.mean()
     summary = read_csv(folder / "summary.csv")
     assert len(summary) == 12
     for number, line in enumerate(summary):
