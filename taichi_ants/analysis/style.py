@@ -51,7 +51,7 @@ def styled() -> AbstractContextManager:
 
 @contextmanager
 def all_or_none(folder: Path) -> Iterator[None]:
-    """Draw figures into a folder; if one fails, remove the folder and report that on stderr.
+    """Yield while figures are drawn into a folder; if one fails, remove it and report the error.
 
     So a figure that fails does not cost the tables, which must have been written before.
     """

@@ -42,7 +42,8 @@ def test_the_row_of_a_lone_ant_is_the_one_of_the_guide(tmp_path, capsys):
     wanted = row_of(file, tmp_path)
     found: dict = {}
     exec(compile(RUNS, "sweeps.md", "exec"), found)
-    assert [float(one) for one in capsys.readouterr().out.split()] == [*wanted.values()]
+    printed = [float(one) for one in capsys.readouterr().out.split()]
+    assert printed == [wanted[name] for name in file["measures"]]
     assert found["trace"].rewards.sum() == found["greedy"].returns.ravel()[0]
 
 
