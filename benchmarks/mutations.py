@@ -399,9 +399,9 @@ MUTATIONS = [
     ("commands/reproduce.py", "    if different:", "    if False:", ARCHIVE),
     ("commands/reproduce.py", "if not settings.trust_plugins:", "if False:", ARCHIVE),
     ("files/inputs.py", "return copy or path", "return path", ARCHIVE),
-    ("report/odd.py", "if one not in found:", "if not found:", ODD),
-    ("report/odd.py", "all(value == usual for value in values)", "values[0] == usual", ODD),
-    ("report/odd_rules.toml", "{level} - {slope} · a", "{level} - {cap} · a", ODD),
+    ("report/odd.py", 'return row.get(f"{group}.{other}") in needed', "return True", ODD),
+    ("report/odd.py", "one[n] if name in varies", "one[0] if name in varies", ODD),
+    ("report/odd.py", 'and not row["episodes"]', "and False", ODD),
 ]
 
 

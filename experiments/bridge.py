@@ -1,4 +1,4 @@
-"""Train colonies on a double bridge, and measure whether the shorter branch wins.
+"""Train colonies on a double bridge, and measure which branch they use.
 
 python experiments/bridge.py --quick
 """

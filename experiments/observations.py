@@ -1,7 +1,8 @@
-"""Compare all pairs of an observation and a learner, after equal numbers of ticks.
+"""Compare what ants gain from each observation, with several learners and equal numbers of ticks.
 
-The sweep is experiments/sweeps/observations.toml. For your own sweep, copy and change that file,
-and run it with experiments/sweep.py. See docs/observations.md.
+One ant learns alone with every learner, and 16 ants learn into one table with every learner that
+can share it. The sweep is experiments/sweeps/observations.toml. For your own sweep, copy and change
+that file, and run it with experiments/sweep.py. See docs/sweep_results.md.
 """
 
 from pathlib import Path

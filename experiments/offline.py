@@ -1,10 +1,11 @@
 """Learn offline from recorded data, and evaluate policies from data.
 
-The script prints three tables, with means and 95 % intervals over seeds. Table (a) has the share of
-rollouts in which policies learned offline deliver, for each behaviour policy that recorded the
-data, number of transitions and learner. It includes online Q-learning after as many transitions.
-Table (b) shows how well off-policy evaluation ranks ten policies. Table (c) has the deliveries of
-colonies that follow policies learned from data of ants that are born and die. See docs/offline.md.
+The script prints three tables; most columns are means over seeds with 95 % intervals. Table (a) has
+the share of greedy rollouts that deliver, for each behaviour policy that recorded the data, number
+of transitions and offline learner, and for online Q-learning after as many transitions. Table (b)
+shows how well three methods of off-policy evaluation rank ten policies. Table (c) has the
+deliveries of colonies that follow policies learned from data of ants that live for ever, or that
+are born and die. See docs/offline_study.md.
 """
 
 from __future__ import annotations

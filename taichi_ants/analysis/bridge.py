@@ -119,8 +119,9 @@ def write_results(
     files.write_text(folder / REPORT, report(found, ticks))
     if draws:
         figures = files.check_writable_folder(folder / "figures")
-        draw(figures / "bridge.png", found, ticks)
-        draw_late(figures / "late.png", found, ticks)
+        with style.all_or_none(figures):
+            draw(figures / "bridge.png", found, ticks)
+            draw_late(figures / "late.png", found, ticks)
 
 
 def report(found: Crossings, ticks: int) -> str:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.analysis import style
+from taichi_ants.analysis.findings import gaps_in_words
+from taichi_ants.analysis.statistics import known_means
 from taichi_ants.analysis.sweeps import Settings, are_numbers, report, short
 from taichi_ants.analysis.tables import sentence
 
@@ -23,7 +25,7 @@ _PARTS = 8  # of a range, each with a mean
 def first_rows(settings: Sequence[Settings], values: Mapping[str, np.ndarray], words: str) -> str:
     """Return a report on the points with the highest first measure; `words` is the design."""
     name, first = next(iter(values.items()))
-    means = first.mean(axis=1)
+    means = known_means(first)
     order = np.argsort(-means, kind="stable")[:MOST_ROWS]  # nan comes last
     table = report([settings[p] for p in order], {n: array[order] for n, array in values.items()})
     most = f"the {len(order)} with the highest {name}" if len(order) < len(means) else "all"
@@ -46,7 +48,9 @@ def draw(
     Raises:
         AntsError: The file (.png) cannot be written.
     """
-    means = values.mean(axis=1)
+    means = known_means(values)
+    settings = [one for one, mean in zip(settings, means, strict=True) if np.isfinite(mean)]
+    means = means[np.isfinite(means)]
     rows = -(-len(names) // COLUMNS)
     with style.styled():
         figure = style.new_figure(1.2 + 2.0 * rows)
@@ -61,7 +65,7 @@ def draw(
         over = f"the mean over {seeds} seeds" if seeds > 1 else "one seed"
         caption = (
             f"A dot is a point of the design, {over}. Lines: means over an eighth of the points, "
-            "or over those with the same choice."
+            f"or over those with the same choice.{gaps_in_words(values)}"
         )
         style.frame(figure, f"{sentence(words)} against each setting", caption, {})
     style.save(figure, path)

@@ -89,7 +89,8 @@ class Contrast:
 
     Attributes:
         label: The name in tables, for example "Q-learning minus SARSA".
-        values: Float64 (seeds,), or (k, seeds) with `of_estimates`; nan where a value is missing.
+        values: Float64 (seeds,), or (k, seeds) with `of_estimates`. Seeds with a missing value
+            (nan) are left out, unless it is missing for all seeds.
         uses_iqm: Whether it is judged by the interquartile mean (IQM) over seeds.
         possible: The range of possible estimates; the interval is clipped to it.
         of_estimates: A smooth function of k estimates, float (k, ...) -> float (...), or None. It
@@ -104,14 +105,19 @@ class Contrast:
     possible: tuple[float, float] = UNBOUNDED
     of_estimates: Callable[[np.ndarray], np.ndarray] | None = None
 
+    def __post_init__(self) -> None:
+        known = ~np.isnan(np.atleast_2d(self.values)).any(axis=0)
+        if known.any():
+            object.__setattr__(self, "values", self.values[..., known])
+
     @property
     def seeds(self) -> int:
-        """The number of seeds."""
+        """The number of seeds that have values."""
         return self.values.shape[-1]
 
     @property
     def missing(self) -> bool:
-        """Whether there are no values or any of them is nan."""
+        """Whether no seed has all values."""
         return not self.seeds or bool(np.isnan(self.values).any())
 
     def reading(self, uses_iqm: bool) -> tuple[np.ndarray, bool]:
@@ -179,6 +185,13 @@ def means_in_words(seeds: int) -> str:
     """Return "Means over 20 seeds with 95 % intervals", for example, for captions."""
     few = f" (too few for these: use {LEAST_SEEDS} or more)" if seeds < LEAST_SEEDS else ""
     return f"Means over {seeds} seeds with 95 % intervals{few}" if seeds > 1 else "One seed"
+
+
+def gaps_in_words(values: np.ndarray) -> str:
+    """Return " 3 of 40 runs have no value and are left out.", for example; "" if all have one."""
+    without = int(np.isnan(values).sum())
+    runs = f"{without} of {count(values.size, 'run')}"
+    return f" {runs} ha{'s' if without == 1 else 've'} no value, left out." if without else ""
 
 
 def weakest(findings: Sequence[Finding]) -> Finding:

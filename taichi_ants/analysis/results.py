@@ -215,7 +215,9 @@ def plot(
                 colour = style.COLOURS[number % len(style.COLOURS)]
                 mean, low, high = _means(values, _RESAMPLES)
                 marker = "o" if len(x) < 2 else None
-                axes.plot(x, mean, color=colour, marker=marker, label=table.groups[number])
+                axes.plot(
+                    x, mean, color=colour, marker=marker, label=style.label(table.groups[number])
+                )
                 axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
             unit = table.units.get(name, "")
             whole, _, part = name.partition(".")

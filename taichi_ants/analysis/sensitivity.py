@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal
+from taichi_ants.analysis.statistics import RANDOM_SEED, all_equal, known_means
 from taichi_ants.analysis.sweeps import short
 from taichi_ants.analysis.tables import Table, interval, number, percent, plain_text, sentence
 
@@ -26,7 +26,8 @@ _WIDTH = 120
 class Index(NamedTuple):
     """A row of the table: the indices of one setting for one measure, with 95 % intervals.
 
-    `seed_share` is the same for all settings of a measure.
+    `seed_share`, and the number of points that are left out, are the same for all settings of a
+    measure.
     """
 
     measure: str
@@ -38,26 +39,30 @@ class Index(NamedTuple):
     total_low: float
     total_high: float
     seed_share: float
+    left_out: int
 
 
 def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[Index]:
     """Return the indices of settings, from values of a measure float64 (points, seeds).
 
-    The points are those of Saltelli's scheme without second order: N * (len(names) + 2) rows. The
-    list is empty if a value is missing (nan), or all means over seeds are equal.
+    The points are those of Saltelli's scheme without second order: N groups of len(names) + 2 rows.
+    Seeds without a value (nan) do not count. Groups in which a point has no value are left out. The
+    list is empty if fewer than two remain, or all means over seeds are equal.
     """
     from SALib.analyze import sobol
 
-    means = values.mean(axis=1)
-    if not np.isfinite(means).all() or all_equal(means[None])[0]:
+    means, step = known_means(values), len(names) + 2
+    kept = np.repeat(np.isfinite(means).reshape(-1, step).all(axis=1), step)
+    means, left_out = means[kept], int((~kept).sum())
+    if len(means) < 2 * step or all_equal(means[None])[0]:
         return []
     problem = {"num_vars": len(names), "names": list(names), "bounds": [[0, 1]] * len(names)}
     how = {"calc_second_order": False, "num_resamples": RESAMPLES, "seed": RANDOM_SEED}
     found = sobol.analyze(problem, means, **how)
-    share = seed_share(values, len(names))
+    share = seed_share(values[kept], len(names))
     columns = (found[name].tolist() for name in ("S1", "S1_conf", "ST", "ST_conf"))
     return [
-        Index(measure, name, one, one - a, one + a, total, total - b, total + b, share)
+        Index(measure, name, one, one - a, one + a, total, total - b, total + b, share, left_out)
         for name, one, a, total, b in zip(names, *columns, strict=True)
     ]
 
@@ -67,12 +72,15 @@ def seed_share(values: np.ndarray, n_settings: int) -> float:
 
     It is estimated from the points that are drawn independently, the first and the last of each
     group of the scheme. What a seed adds to all points alike does not count, because all points
-    have the same seeds. Nan for one seed.
+    have the same seeds. Points at which a seed has no value do not count. Nan for one seed.
     """
     step, seeds = n_settings + 2, values.shape[1]
     if seeds < 2:
         return float("nan")
     drawn = np.concatenate([values[::step], values[step - 1 :: step]])
+    drawn = drawn[~np.isnan(drawn).any(axis=1)]
+    if len(drawn) < 2:
+        return float("nan")
     rest = drawn - drawn.mean(axis=1, keepdims=True) - drawn.mean(axis=0) + drawn.mean()
     noise = np.square(rest).sum() / ((len(drawn) - 1) * (seeds - 1)) / seeds
     variance = drawn.mean(axis=1).var(ddof=1)
@@ -85,7 +93,7 @@ def report(found: Mapping[str, Sequence[Index]], seeds: int) -> str:
     for measure, several in found.items():
         if not several:
             blocks.append(
-                f"{measure} has no indices: it has no value at some points, or is constant."
+                f"{measure} has no indices: it has values at too few points, or is constant."
             )
             continue
         names = [one.setting for one in several]
@@ -103,8 +111,10 @@ def report(found: Mapping[str, Sequence[Index]], seeds: int) -> str:
 
 
 def _noise(several: Sequence[Index], seeds: int) -> str:
-    share = percent(several[0].seed_share)
-    return f"Means over {seeds} seeds; seeds make {share} of their variance, in each total index."
+    share, without = percent(several[0].seed_share), several[0].left_out
+    more = f" {without} points are left out, because one of their group has no value."
+    noise = f"Means over {seeds} seeds; seeds make {share} of their variance, in each total index."
+    return noise + more * bool(without)
 
 
 def draw(path: Path, several: Sequence[Index], words: str, seeds: int) -> None:

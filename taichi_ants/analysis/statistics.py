@@ -96,7 +96,10 @@ def interquartile_values(values: np.ndarray) -> np.ndarray:
 
 
 class Estimator(NamedTuple):
-    """Estimates of a measure over seeds: mean, IQM or None, 95 % intervals (nan for one seed)."""
+    """Estimates of a measure over seeds: mean, IQM or None, 95 % intervals (nan for one seed).
+
+    Seeds without a value (nan) are left out; without any value, the estimates are nan.
+    """
 
     mean: float
     ci_low: float
@@ -104,6 +107,7 @@ class Estimator(NamedTuple):
     iqm: float | None = None
     iqm_ci_low: float = math.nan
     iqm_ci_high: float = math.nan
+    left_out: int = 0
 
     @property
     def apart(self) -> bool:
@@ -118,7 +122,20 @@ def estimates(values: np.ndarray, uses_iqm: bool = True) -> list[Estimator]:
     if uses_iqm:
         columns += [interquartile_mean(values), *bootstrap_interval(values, iqm=True)]
     exact = (without_noise(column, values).tolist() for column in columns)
-    return [Estimator(*row) for row in zip(*exact, strict=True)]
+    found = [Estimator(*row) for row in zip(*exact, strict=True)]
+    missing = np.isnan(values)
+    for row in np.flatnonzero(missing.any(axis=1)):
+        if not missing[row].all():
+            (found[row],) = estimates(values[row, ~missing[row]][None], uses_iqm)
+        found[row] = found[row]._replace(left_out=int(missing[row].sum()))
+    return found
+
+
+def known_means(values: np.ndarray) -> np.ndarray:
+    """Return the mean of each row of values (rows, seeds) without nan; nan if all are nan."""
+    known = ~np.isnan(values)
+    n, sums = known.sum(axis=1), np.where(known, values, 0.0).sum(axis=1)
+    return np.divide(sums, n, out=np.full(len(n), np.nan), where=n > 0)
 
 
 def without_noise(numbers: np.ndarray, values: np.ndarray) -> np.ndarray:

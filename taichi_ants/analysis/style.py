@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager
+import shutil
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,10 +41,33 @@ def _settings() -> Mapping[Any, Any]:
 
 
 def styled() -> AbstractContextManager:
-    """Return the matplotlib context in which to make and save figures."""
-    from matplotlib import rc_context
+    """Return the matplotlib context in which to make and save figures.
 
-    return rc_context(dict(_settings()))
+    Settings of the user, such as those of a matplotlibrc, have no effect in it.
+    """
+    from matplotlib import rc_context, rcParamsDefault
+
+    usual = {name: value for name, value in rcParamsDefault.items() if "backend" not in name}
+    return rc_context({**usual, **_settings()})
+
+
+@contextmanager
+def all_or_none(folder: Path) -> Iterator[None]:
+    """Yield while figures are drawn into a folder; if one fails, remove it and report the error.
+
+    So a figure that fails does not cost the tables, which must have been written before.
+    """
+    try:
+        yield
+    except Exception as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        reason = " ".join(f"{type(error).__name__}: {error}".split()).rstrip(".")
+        print(f"warning: there are no figures, because one failed with {reason}.", file=sys.stderr)
+
+
+def label(name: str) -> str:
+    """Return a name as the label of an artist; matplotlib hides labels that begin with _."""
+    return f"\u200b{name}" if name.startswith("_") else name  # a space without width
 
 
 def use() -> None:

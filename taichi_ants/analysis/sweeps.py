@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants.analysis import style
-from taichi_ants.analysis.findings import means_in_words
-from taichi_ants.analysis.statistics import Estimator, bootstrap_interval, estimates
+from taichi_ants.analysis.findings import gaps_in_words, means_in_words
+from taichi_ants.analysis.statistics import Estimator, estimates
 from taichi_ants.analysis.tables import MISSING, Table, plain_text, sentence
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Settings = Mapping[str, Any]
+Lines = Mapping[str, Sequence[tuple[Any, ...]]]
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")  # 7 with 10 colours give 70 different lines
 _TERMINAL = 200  # the maximum number of columns
 _WIDE = 20  # the ratio of largest to smallest from which an axis is logarithmic
@@ -32,13 +33,19 @@ def seed_rows(
             yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
-def centre_columns(found: Mapping[str, Estimator]) -> dict[str, float]:
-    """Return the columns of a table for the estimates of several measures."""
+def centre_columns(
+    found: Mapping[str, Estimator], with_gaps: Sequence[str] = ()
+) -> dict[str, float]:
+    """Return the columns of a table for the estimates of several measures.
+
+    Measures in `with_gaps` have a column with the number of seeds without a value.
+    """
     return {
         f"{name}_{field}": value
         for name, one in found.items()
         for field, value in one._asdict().items()
-        if one.iqm is not None or "iqm" not in field
+        if (one.iqm is not None or "iqm" not in field)
+        and (field != "left_out" or name in with_gaps)
     }
 
 
@@ -70,14 +77,14 @@ def report(
     point with that value; `notes` has its text.
     """
     names = columns_of(settings)
-    ends = {name: bootstrap_interval(array) for name, array in values.items()}
     lines = []
-    for p, one in enumerate(settings):
+    for one, centres in zip(settings, centres_of(values), strict=True):
         cells = [_shown(one.get(name, MISSING)) for name in names]
-        for name, array in values.items():
-            low, high = (end[p] for end in ends[name])
-            mean = f"{array[p].mean():.4g}"
-            cells.append(mean if np.isnan(low) else f"{mean} [{low:.4g}, {high:.4g}]")
+        for centre in centres.values():
+            ends = f" [{centre.ci_low:.4g}, {centre.ci_high:.4g}]"
+            without = f" ({centre.left_out} left out)" if centre.left_out else ""
+            mean = f"{centre.mean:.4g}" if np.isfinite(centre.mean) else MISSING
+            cells.append(f"{mean}{'' if np.isnan(centre.ci_low) else ends}{without}")
         lines.append(cells)
     headers = [*(short(name, names) for name in names), *values]
     if against:
@@ -85,6 +92,8 @@ def report(
         headers.append(f"{next(iter(values))} against {other}")
         lines = [[*line, note] for line, note in zip(lines, notes, strict=True)]
     title = means_in_words(next(iter(values.values())).shape[1])
+    if any(np.isnan(array).any() for array in values.values()):
+        title += "; runs without a value are left out"
     return plain_text([Table(title, headers, lines, text_columns=len(headers))], _TERMINAL)
 
 
@@ -100,9 +109,9 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
     names = columns_of(settings)
     others = [name for name in names[1:] if len({str(one.get(name)) for one in settings}) > 1]
     alike = [f"{short(n, names)} {_shown(settings[0][n])}" for n in names[1:] if n not in others]
-    numbers = values.mean(axis=1), *bootstrap_interval(values)
+    numbers = [(one.mean, one.ci_low, one.ci_high) for one in estimates(values, uses_iqm=False)]
     lines: dict[str, list[tuple[Any, ...]]] = {}
-    for one, *point in zip(settings, *numbers, strict=True):
+    for one, point in zip(settings, numbers, strict=True):
         label = ", ".join(f"{short(n, names)} {_shown(one[n])}" for n in others if n in one)
         lines.setdefault(label or words, []).append((one.get(names[0]), *point))
     with style.styled():
@@ -111,14 +120,17 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
         draw_lines(axes, lines)
         axes.set(xlabel=names[0], ylabel=words)
         caption = ", ".join([means_in_words(values.shape[1]), *alike])
-        style.frame(figure, sentence(words), f"{caption}.", style.legend_entries([axes]))
+        caption = f"{caption}.{gaps_in_words(values)}"
+        style.frame(figure, sentence(words), caption, style.legend_entries([axes]))
     style.save(figure, path)
 
 
-def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> None:
+def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
     """Draw means with intervals, by label: for each point, x, mean, and the ends of the interval.
 
-    If any x is not a number, the points of a label are not joined by a line.
+    If any x is not a number, the points of a label are not joined by a line. `shared` are the lines
+    of panels with the same vertical axis, which is not logarithmic if a mean or an end is not
+    positive.
     """
     places = [place for points in lines.values() for place, *_ in points]
     numbers = are_numbers(places)
@@ -130,7 +142,9 @@ def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> No
         ordered = sorted(points, key=lambda point: point[0]) if numbers else points
         x = [place if numbers else ticks.index(_shown(place)) + shift for place, *_ in ordered]
         mean, low, high = np.array([point[1:] for point in ordered], float).reshape(-1, 3).T
-        (line,) = axes.plot(x, mean, marker=marker, markersize=4.5, color=colour, label=label)
+        (line,) = axes.plot(
+            x, mean, marker=marker, markersize=4.5, color=colour, label=style.label(label)
+        )
         if numbers:
             axes.fill_between(x, low, high, color=colour, alpha=0.15, linewidth=0)
         else:
@@ -141,13 +155,14 @@ def draw_lines(axes: Axes, lines: Mapping[str, Sequence[tuple[Any, ...]]]) -> No
     elif _far_apart(places):
         style.logarithmic(axes.xaxis, (1,))
         axes.set_xticks(sorted(set(places)))
-    means = [mean for points in lines.values() for _, mean, *_ in points]
-    if numbers and _far_apart(means):
+    means = [one[1] for points in lines.values() for one in points if np.isfinite(one[1])]
+    drawn = (one for each in (lines, *shared) for points in each.values() for _, *one in points)
+    if numbers and _far_apart(means) and not any(y <= 0 for one in drawn for y in one):
         style.logarithmic(axes.yaxis, (1, 2, 5) if max(means) < 1000 * min(means) else (1,))
 
 
 def _far_apart(numbers: Sequence[float]) -> bool:
-    return min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
+    return len(numbers) > 0 and min(numbers) > 0 and max(numbers) / min(numbers) >= _WIDE
 
 
 def are_numbers(places: Sequence[Any]) -> bool:

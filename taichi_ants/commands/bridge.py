@@ -1,4 +1,4 @@
-"""Train colonies on a double bridge, and measure whether the shorter branch wins.
+"""Train colonies on a double bridge, and measure which branch they use.
 
 Colonies learn on a bridge with branches of 23 and 36 steps. The command evaluates them on that
 bridge, on its mirror image, on one with equal branches, and on one whose short branch opens late.
@@ -28,7 +28,10 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--episodes", **counts, default=60, help="number of training episodes")
     add("--ticks", **counts, default=1000, help="ticks per training episode")
     add("--evaluation-ticks", **counts, default=3000, help="ticks per evaluation")
-    quick = f"use {QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks"
+    quick = (
+        f"use {QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks: to see "
+        "that the study runs, not for conclusions"
+    )
     add("--quick", action="store_true", help=quick)
     command_line.add_common(parser)
     command_line.add_results(parser, "bridge")

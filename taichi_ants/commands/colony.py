@@ -110,7 +110,10 @@ def _add_study(parser: command_line.Parser) -> None:
     add("--episodes", **counts, default=60, help="number of training episodes")
     add("--ticks", **counts, default=1000, help="ticks per episode")
     add("--rollouts", **counts, default=4, help="number of evaluation episodes")
-    quick = "use fewer seeds, sizes, episodes and ticks, and only the kinds paper, open and piles"
+    quick = (
+        f"use {QUICK['seeds']} seeds, too few for verdicts, fewer sizes, episodes and ticks, and "
+        "only the kinds paper, open and piles: to see that the study runs, not for conclusions"
+    )
     add("--quick", action="store_true", help=quick)
     parser.open_settings, parser.own_settings = ("training",), PLANNED
     command_line.add_settings(parser, _learning(0.3))

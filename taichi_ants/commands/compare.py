@@ -74,7 +74,10 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--world", default="paper", metavar="WORLD", help=WORLDS)
     add_common(parser)
     add_machines(parser)
-    quick = f"use at most {QUICK_SEEDS} seeds and draw no animations"
+    quick = (
+        f"use at most {QUICK_SEEDS} seeds and draw no animations: a first look at the results, "
+        "whose intervals are wide"
+    )
     add("--quick", action="store_true", help=quick)
     add_results(parser, "compare")
     parser.open_settings, parser.own_settings = ("world", "training"), _FIXED

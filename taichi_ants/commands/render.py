@@ -196,8 +196,7 @@ def show_colony(settings: argparse.Namespace, world: World) -> str:
     from taichi_ants.viewer import record_colony, save_page
 
     q_values, task, title = find_policy(settings, world)
-    config = replace(training_config(settings), epsilon=settings.epsilon, min_epsilon=0.0)
-    who = (config, settings.seed, settings.ants)
+    who = (TrainingConfig.frozen(settings.epsilon), settings.seed, settings.ants)
     colony = Colony(world, task, *who, sharing="frozen", q_values=q_values)
     colony.begin_episode()
     ticks, every, follow = settings.ticks, settings.frame_interval, settings.follow

@@ -230,7 +230,10 @@ def read_text(path: PathLike, most: int = 1 << 26) -> str:
 
 
 def read_csv(path: PathLike) -> list[dict[str, Any]]:
-    """Return the rows of a file that `write_csv` wrote: numbers as float, empty fields as None."""
+    """Return the rows of a file that `write_csv` wrote, with empty fields as None.
+
+    Numbers are floats, except that whole ones above 2^53 are integers.
+    """
     try:
         header, *lines = csv.reader(io.StringIO(read_text(path, 1 << 30)))
         rows = [zip(header, line, strict=True) for line in lines if line]
@@ -323,6 +326,8 @@ def _reason(error: Exception) -> str:
 
 def _number_in(text: str) -> float | str | None:
     try:
-        return float(text)
+        number = float(text)
     except ValueError:
         return text or None
+    # Such whole numbers, for example seeds, can differ although they are equal as floats.
+    return int(text) if abs(number) > 1 << 53 and text.lstrip("-").isdigit() else number

@@ -85,6 +85,11 @@ class TrainingConfig(Settings, path="training"):
         plain = {name: getattr(value, "item", lambda v=value: v)() for name, value in pairs.items()}
         object.__setattr__(self, "hyperparameters", tuple(sorted(plain.items())))
 
+    @classmethod
+    def frozen(cls, epsilon: float = 0.0) -> TrainingConfig:
+        """Return the settings of ants that explore with a constant epsilon, and do not learn."""
+        return cls("q_learning", 1.0, 1.0, epsilon, 1.0)
+
     @property
     def least_epsilon(self) -> float:
         """The epsilon at which decay ends: the smaller of `min_epsilon` and `epsilon`."""

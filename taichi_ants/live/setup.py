@@ -150,7 +150,7 @@ class Setup:
         if isinstance(self.policy, TrainingConfig):
             training, options["sharing"] = self.policy, self.sharing
         else:
-            training = TrainingConfig("q_learning", 1.0, 0.0, self.epsilon, 1.0, min_epsilon=0.0)
+            training = TrainingConfig.frozen(self.epsilon)
             options |= {"sharing": "frozen", "q_values": self.policy}
         return Colony(self.build_world(), self.task, training, self.seed, **options)
 

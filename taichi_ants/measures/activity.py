@@ -15,8 +15,9 @@ if TYPE_CHECKING:
 
 
 def blocked_share(snapshot: Snapshot) -> float:
-    """Return the share of the moves of the episode that failed; 0 before the first move."""
-    return snapshot.counts["blocked"] / max(1, snapshot.counts["moves"])
+    """Return the share of the moves of the episode that failed; nan before the first move."""
+    counts = snapshot.counts
+    return counts["blocked"] / counts["moves"] if counts["moves"] else math.nan
 
 
 def activity(snapshot: Snapshot) -> float:

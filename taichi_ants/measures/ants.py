@@ -21,6 +21,11 @@ def living(snapshot: Snapshot) -> int:
     return len(snapshot.ant_cells)
 
 
+def waiting_births(snapshot: Snapshot) -> int:
+    """Return the number of food items that wait at the queens to become ants."""
+    return snapshot.counts["waiting_births"]
+
+
 def carriers(snapshot: Snapshot) -> float:
     """Return the share of the living ants that carry food; nan without ants."""
     return share_of(snapshot.ant_carries)

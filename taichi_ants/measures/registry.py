@@ -42,6 +42,7 @@ _built_in(
     of="activity",
 )
 _built_in(ants.living, "ants", "number of living ants")
+_built_in(ants.waiting_births, "ants", "births that wait for a free cell or slot")
 _built_in(ants.carriers, "", "share of the ants that carry food")
 _built_in(ants.foraging, "", "share of the ants that forage, which are not idle")
 _built_in(ants.distance, "steps", "mean distance of the ants to the nearest queen")

@@ -19,8 +19,8 @@ def entropy(snapshot: Snapshot) -> dict[str, float]:
     It is -(sum of p log p) / log N. N is the number of cells that are not obstacles, and p is the
     level of each of them, divided by the sum of their levels. This is Shannon's entropy [1]_
     divided by its largest value, which is called Pielou's evenness [2]_. All of the pheromone in
-    one cell gives 0, equal levels in all cells give 1. A field without pheromone, and a world with
-    one cell, give 0.
+    one cell gives 0, equal levels in all cells give 1. The value is nan for a field without
+    pheromone, and in a world with one cell.
 
     .. [1] C. E. Shannon (1948), A mathematical theory of communication, Bell System Technical
        Journal 27, 379-423.
@@ -33,11 +33,11 @@ def entropy(snapshot: Snapshot) -> dict[str, float]:
 
 
 def evenness(levels: np.ndarray, cells: int) -> float:
-    """Return the entropy of levels (n,), at least 0, divided by the logarithm of `cells`."""
+    """Return the entropy of levels (n,) divided by the logarithm of `cells`; nan if all are 0."""
     # Few levels differ, and exact sums do not depend on the order of cells.
     different, times = np.unique(levels[levels > 0].astype(float), return_counts=True)
     if cells < 2 or not len(different):
-        return 0.0
+        return math.nan
     pairs = list(zip(different.tolist(), times.tolist(), strict=True))
     total = math.fsum(n * level for level, n in pairs)
     shares = [(level / total, n) for level, n in pairs]

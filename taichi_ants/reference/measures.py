@@ -55,12 +55,12 @@ def path_ratio(colony: ReferenceColony) -> float:
 
 
 def entropy(colony: ReferenceColony) -> float:
-    """Return the entropy of the trail, divided by that of equal levels."""
+    """Return the entropy of the trail, divided by that of equal levels; nan without a trail."""
     cells = [cell for cell, ground in colony.world.ground.items() if ground != OBSTACLE]
     levels = Counter(float(colony.world.trail.level(cell)) for cell in cells)
     del levels[0.0]
     if len(cells) < 2 or not levels:
-        return 0.0
+        return NONE
     total = math.fsum(level * n for level, n in levels.items())
     terms = []
     for level, n in levels.items():
@@ -71,8 +71,8 @@ def entropy(colony: ReferenceColony) -> float:
 
 
 def blocked_share(colony: ReferenceColony) -> float:
-    """Return the share of moves that failed."""
-    return colony.record.blocked / colony.record.moves if colony.record.moves else 0.0
+    """Return the share of moves that failed; nan before the first move."""
+    return colony.record.blocked / colony.record.moves if colony.record.moves else NONE
 
 
 def activity(colony: ReferenceColony) -> float:
@@ -120,6 +120,7 @@ MEASURES: dict[str, Callable[[ReferenceColony], float]] = {
     "path_length": path_length,
     "path_ratio": path_ratio,
     "entropy.trail": entropy,
+    "waiting_births": lambda colony: sum(colony.stores),
     "blocked_share": blocked_share,
     "activity": activity,
     "living": lambda colony: len(colony.ants),

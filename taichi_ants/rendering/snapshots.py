@@ -135,8 +135,8 @@ class Episode:
 
 def colony_of_rollout(made: Made) -> Colony:
     """Return a colony of one ant that repeats a `rollout`: it has the same random numbers."""
-    steady = TrainingConfig("q_learning", 1.0, 0.0, made.epsilon, 1.0, min_epsilon=0.0)
     frozen: dict[str, Any] = {"sharing": "frozen", "q_values": made.q_values}
+    steady = TrainingConfig.frozen(made.epsilon)
     colony = Colony(made.world, made.task, steady, made.seed, **frozen)
     colony.begin_episode()
     colony.streams[0, 0] = stream_state(made.seed, STREAM_ROLLOUT, made.number)

@@ -1,416 +1,300 @@
 """ODD descriptions (Overview, Design concepts, Details) of the model of a study.
 
-The protocol is that of Grimm et al. (2006, 2010, 2020). The template `odd.md` has the sentences,
-and `odd_rules.toml` has the text of each rule. This module gives them the values of the settings,
-which it reads from the manifest and the inputs of finished results. No code of plugins runs.
+They have the headings of the protocol (Grimm et al. 2020), and tables of what the manifest of
+results and the declarations of settings say. The author writes the text. No code of plugins runs.
 """
 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
-from taichi_ants import files, learners, measures, worlds
+from taichi_ants import files, learners
 from taichi_ants.analysis.colony.study import OF_STUDY
 from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
-from taichi_ants.analysis.tables import sentence
-from taichi_ants.errors import count
-from taichi_ants.interventions import INTERVENTIONS
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.registry import BUILT_IN as LEARNERS
-from taichi_ants.protocol import EVENTS
-from taichi_ants.report.page import text_of
-from taichi_ants.settings import Setting, all_of, declared, flat, named_groups
+from taichi_ants.analysis.tables import Block, Table, markdown
+from taichi_ants.errors import AntsError
+from taichi_ants.settings import Setting, declared, flat
 from taichi_ants.studies.design import axes_of
-from taichi_ants.studies.points import ColonyPoint, RunPoint
-from taichi_ants.studies.sweep_file import MEASURES
-from taichi_ants.task import Task, observations
-from taichi_ants.worlds.registry import BUILT_IN as WORLDS
+from taichi_ants.studies.sweep_file import declaration_of, measure_of
+from taichi_ants.task import observations
 
-RULES: dict[str, dict[str, str]] = files.tomllib.loads(text_of("odd_rules.toml"))
+Row = tuple[str, ...]
 
-_MOST = 6  # values of a setting that a sentence lists, and worlds of the table
-_OWN = re.compile(r"\{([\w.]+)\}")  # the value of a setting in a text
-_LISTS = ("measures", "protocol")  # settings whose value is a list
-# Built-in worlds with the kinds of world of the colony study that are drawn from them.
-_PRESETS = {
-    "paper": {"paper"},
-    "open": {"open", "rocks", "slow", "small", "wide", "large"},
-    "far_piles": {"piles", "one_pile", "moving"},
+_MOST = 6  # values of a setting in a cell, and worlds in the table
+_AUTHOR = "*[Text of the author]*"
+_CONCEPTS = (
+    *("Basic principles", "Emergence", "Adaptation", "Objectives", "Learning", "Prediction"),
+    *("Sensing", "Interaction", "Stochasticity", "Collectives", "Observation"),
+)
+_OF_POINTS = {  # settings of points: unit and meaning
+    "world.preset": ("", "name of the world, or its map"),
+    "world.seed": ("", "seed from which the world is drawn"),
+    "world.per_seed": ("", "whether each seed has a world of its own"),
+    "world_kinds": ("", "kinds of world of the study of colonies"),
+    "episodes": ("episodes", "training, before the evaluation"),
+    "rollouts": ("episodes", "evaluation"),
+    "ticks": ("ticks", "length of an episode"),
+    "max_steps": ("ticks", "largest length of an episode, which ends at a delivery"),
+    "ants": ("ants", "number at the start"),
+    "capacity": ("ants", "largest number of living ants"),
+    "start": ("", "start cells of ants that the world does not list"),
+    "sharing": ("", "whether ants learn into one table or into their own"),
+    "evaluation_epsilon": ("", "exploration rate of the evaluation"),
+    "policy.name": ("", "policy that ants follow"),
+    "policy.sha256": ("", "checksum of its action values"),
+    "measure_every": ("ticks", "time between two rows of series of measures"),
+    "during": ("", "episodes in which the events happen"),
 }
-# The settings of points that do not belong to a group.
-_OF_POINTS = {
-    "episodes": "episodes of training",
-    "max_steps": "step limit of an episode",
-    "rollouts": "episodes of evaluation",
-    "ants": "ants at the start",
-    "sharing": "whether ants learn into one table or into their own",
-    "start": "where ants start that the world does not list",
-    "capacity": "largest number of living ants",
-    "ticks": "length of an episode (ticks)",
-    "measures": "measures that are read during the evaluation",
-    "measure_every": "ticks between two rows of the series of measures",
-    "protocol": "events, see section 6",
-    "during": "episodes in which the events happen",
-}
+# Groups of settings that have no effect on a lone ant, whose episode ends at its delivery.
+_OF_COLONIES = ("task.traffic.", "task.life.", "task.labour.", "task.reward", "task.turns_at_queen")
+_OF_LEARNING = re.compile(
+    r"training\..*|sharing|task\.(delivery|evaporation_in_training)"
+    r"|task\.castes\.\w+\.(learning_rate|discount)"
+)
+_EVENT = re.compile(r"`?((at|every|when)\.\d+\.)")
 
 
 class Model:
-    """The model of a study: the values of its settings, over all of its points.
+    """The settings of a study, over all of its points.
 
     Args:
         settings: The `settings` of a manifest.
-        asked: The `asked` of the manifest.
-        sweep: The contents of the sweep file, if there is one.
+        sweep: The contents of the sweep file; empty if there is none.
     """
 
-    def __init__(
-        self, settings: Mapping[str, Any], asked: Mapping[str, Any], sweep: Mapping[str, Any]
-    ) -> None:
-        self.sweep, self.search = sweep, sweep.get("search", {})
-        self.searched = dict(axes_of(self.search.get("vary", {})))
-        own = {name: _tried(settings.get(name), one) for name, one in self.searched.items()}
-        self.settings = {**settings, **own}
-        self.options, self.command = asked["options"], asked["command"]
-        self.of_colony = "ants" in settings
-        self.seeds = settings["seeds"]
+    def __init__(self, settings: Mapping[str, Any], sweep: Mapping[str, Any]) -> None:
+        self.settings, self.sweep, self.of_colony = settings, sweep, "ants" in settings
+        self.searched = dict(axes_of(sweep.get("search", {}).get("vary", {})))
+        self.rows = [more for row in self._points() for more in self._with_searched(row)]
         self.places = [one for place in settings["worlds"] for one in _list_of(place)]
-        self.nests = max(len(one.get("queens", [0])) for one in self.places)
+        self.world = flat({"world": sweep.get("world", {})})
 
-    def values(self, name: str) -> list[Any]:
-        """Return the values of a setting over all points, each once."""
-        value: Any = self.settings.get(name)
-        is_shared = not isinstance(value, list) or (
-            name in _LISTS and not any(one is None or isinstance(one, list) for one in value)
-        )
-        found: list[Any] = []
-        for one in [value] if is_shared else value:
-            if one not in found:
-                found.append(one)
+    def _points(self) -> Iterator[dict[str, Any]]:
+        """Yield the settings of each point, with those of its events and of its evaluation."""
+        own = {
+            name: value
+            for name, value in self.settings.items()
+            if name.startswith(("task.", "training.")) or name in (*_OF_POINTS, "protocol")
+        }
+        varies = {name for name, value in own.items() if isinstance(value, list)}
+        if not any(one is None or isinstance(one, list) for one in own.get("protocol") or ()):
+            varies -= {"protocol"}
+        for n in range(max([1, *(len(own[name]) for name in varies)])):
+            row = {name: one[n] if name in varies else one for name, one in own.items()}
+            kinds = [kind for event in row.get("protocol") or () for kind in event]
+            for number, event in enumerate(row.pop("protocol", None) or ()):
+                ((kind, facts),) = event.items()
+                row |= flat(facts, f"{kind}.{kinds[: number + 1].count(kind)}")
+            if self.of_colony and row.get("evaluation_epsilon") is None:
+                least = min(row["training.epsilon"], row["training.min_epsilon"])
+                row["evaluation_epsilon"] = 0.0 if row.get("policy.name") else least
+            yield row
+
+    def _with_searched(self, row: dict[str, Any]) -> Iterator[dict[str, Any]]:
+        """Yield a row, and for each setting that a search chooses more rows with its values."""
+        yield row
+        for name, axis in self.searched.items():
+            is_range = isinstance(axis, Mapping)
+            for value in [f"{axis['from']} to {axis['to']}"] if is_range else axis:
+                yield {**row, name: value}
+
+    def declaration(self, name: str, row: Mapping[str, Any]) -> Setting | None:
+        """Return the declaration of a setting; None for settings of points and of plugins."""
+        *group, own = name.split(".")
+        if group != ["training", "hyperparameters"]:
+            return declaration_of(name, self.world)
+        learner = row["training.learner"]
+        several = learner in learners.names() and declared(learners.get(learner).hyperparameters)
+        return next((one for one in several or () if one.name == own), None)
+
+    def uses(self, row: Mapping[str, Any], name: str, one: Setting | None) -> bool:
+        """Return whether a setting has an effect at a point, as far as declarations tell."""
+        group, _, own = name.rpartition(".")
+        if name in self.searched or _EVENT.match(name):
+            return True
+        if group == "training.hyperparameters" and row[name] is None:
+            return False
+        if _OF_LEARNING.fullmatch(name) and not row["episodes"]:
+            return False
+        if not self.of_colony and name.startswith(_OF_COLONIES):
+            return name.startswith("task.rewards.")
+        if own == "view":  # of a pheromone that is a cue
+            field = "trail" if group == "task.pheromone" else group.split(".")[-1]
+            return any(value == field for other, value in row.items() if other.endswith("_cue"))
+        if name in ("task.rewards.pick_up", "task.rewards.deliver"):  # kinds of food have their own
+            return not any(other.startswith("task.foods.") for other in row)
+        if own == "distribution" and row["task.labour.rule"] == "none":
+            return False
+        if name == "evaluation_epsilon":
+            return row["task.choice.rule"] != "deneubourg"
+        if one is None or one.rule.only is None:
+            return True
+        other, *needed = one.rule.only
+        return row.get(f"{group}.{other}") in needed
+
+    def parameters(self) -> list[Row]:
+        """Return the names, values, units and meanings of all settings that have an effect."""
+        varied = [{k: v for k, v in row.items() if k.startswith("world")} for row in self._vary()]
+        rows = [self.world, *varied, *self.rows]
+        found: list[Row] = []
+        for name in dict.fromkeys(name for row in rows for name in row):
+            event = _EVENT.match(name)
+            some = [one for one in rows if name in one or (event and _has(one, event[1]))]
+            one = self.declaration(name, some[0])
+            usual = one.default if one else None  # facts of events leave out defaults
+            values = [row.get(name, usual) for row in some if self.uses(row, name, one)]
+            if name in self.searched:
+                values = [value for value in values if value is not None]
+            if any(value is not None for value in values):
+                unit, words = _OF_POINTS.get(name, ("", "of a plugin"))
+                unit, words = (one.rule.unit, one.rule.help) if one else (unit, words)
+                found.append((f"`{name}`", _several(values), unit, words))
         return found
 
-    def has(self, name: str, *values: Any) -> bool:
-        """Return whether any point has one of these values, by default any but None and off."""
-        found = self.values(name)
-        return any(one in values for one in found) if values else any(found)
-
-    def text(self, name: str, unit: str = "") -> str:
-        """Return the values of a setting in words."""
-        return _several([one for one in self.values(name) if one is not None] or [None], unit)
-
-    def choices(self, name: str, table: str) -> Iterator[str]:
-        """Yield the text of each rule that a setting selects, from a table of `odd_rules.toml`."""
-        values = [one for one in self.values(name) if one is not None]
-        group = name[: name.rfind(".") + 1]
-        for value in values:
-            unknown = f"The rule `{value}` is defined by the plugin of this study, see its source."
-            words = self._filled(RULES[table].get(value, unknown), group)
-            yield f'With `{name}` "{value}": {words}' if len(values) > 1 else words
-
-    def _filled(self, text: str, group: str) -> str:
-        """Return a text of a rule with the values of the settings of its group."""
-        return _OWN.sub(lambda one: self.text(f"{group}{one[1]}"), text)
-
-    def unit(self, group: str) -> str:
-        """Return the unit of the levels of a pheromone: what evaporation does to them."""
-        texts = (RULES["units"].get(one) for one in self.values(f"{group}.evaporation"))
-        words = " or ".join(self._filled(one, f"{group}.") for one in texts if one)
-        return f"level; {words}" if words else "level"
+    def _vary(self) -> Sequence[Mapping[str, Any]]:
+        return self.settings.get("vary") or [{"world_kinds": self.settings.get("world_kinds")}]
 
     def entries(self, group: str) -> list[str]:
-        """Return the names of the entries in a named group of the task, such as its fields."""
-        parts = [name.split(".") for name in self.settings]
+        """Return the names of the entries of a named group of the task, such as its fields."""
+        parts = [name.split(".") for name in self.rows[0]]
         return list(dict.fromkeys(one[2] for one in parts if one[:2] == ["task", group]))
 
-    @property
-    def learns(self) -> bool:
-        """Whether ants learn in this study."""
-        return self.has("episodes")
-
-    @property
-    def lives(self) -> bool:
-        """Whether ants are born or die, or food grows back."""
-        values = (self.values(name) for name in self.settings if name.startswith("task.life."))
-        used = [one for found in values for one in found if one is not None and one is not False]
-        return bool(used or self.entries("foods"))
-
-    @property
-    def diffuses(self) -> bool:
-        """Whether a pheromone spreads to other cells."""
-        groups = ("pheromone", *(f"fields.{name}" for name in self.entries("fields")))
-        return any(self.has(f"task.{group}.diffusion") for group in groups)
-
-    def varied(self) -> list[str]:
-        """Return the names of the settings that differ between points."""
-        if self.searched:
-            return _quoted(self.searched)
-        if rows := self.settings.get("vary"):
-            names = dict.fromkeys(name for row in rows for name in row)
-            return [f"`{n}`" for n in names if len({str(row.get(n)) for row in rows}) > 1]
-        if "world_kinds" in self.settings:
-            return ["the kind of world", "the rules", "the number of ants in training"]
-        return _quoted(name for name in self.settings if "." in name and self.values(name)[1:])
-
-    def measures(self) -> dict[str, str]:
-        """Return the measures in words, by name."""
-        if self.command == "compare":
-            return {name: one.words for name, one in OF_RUNS.items()}
-        if "measures" not in self.settings:
-            return dict(OF_STUDY)
-        kind = "colony" if self.of_colony else "runs"
-        known = {name: one.words for name, one in MEASURES[kind].items()}
-        for name in measures.names():
-            one = measures.get(name)
-            known.setdefault(name, f"{one.summary}{f' ({one.unit})' if one.unit else ''}")
-        wanted = _list_of(self.sweep.get("measures", self.settings["measures"]))
-        unknown = "a measure of the plugin of this study"
-        return {n: known.get(n, known.get(n.partition(".")[0], unknown)) for n in wanted}
-
-    def observations(self) -> Iterator[tuple[str, str, int | None]]:
-        """Yield the name, text and number of states of each observation; None if unknown."""
-        for name in self.values("task.observation"):
-            if name in observations.names():
-                one = observations.get(name)
-                yield name, one.summary, one.n_states
-            else:
-                yield name, "defined by the plugin", None
-
-    def states(self) -> str:
-        """Return the number of states that ants distinguish."""
-        several = [n_states for *_, n_states in self.observations() if n_states]
-        return _several(several) if several else "a number that the plugin defines of"
-
-    def sizes(self) -> str:
-        """Return the ranges and the numbers of cells of all worlds."""
-        ranges = list(dict.fromkeys(tuple(one["ranges"]) for one in self.places))
-        cells = [x * y + y * z + z * x - x - y - z + 1 for x, y, z in ranges]
-        low, high = min(cells), max(cells)
-        return f"{_several(ranges)}, which is {low if low == high else f'{low} to {high}'}"
-
-    def learner_labels(self) -> list[str]:
-        """Return the names of learners as readers know them."""
-        return [learners.label(one) for one in self.values("training.learner") if one]
-
-    def _given_of_worlds(self) -> dict[str, list[Any]]:
-        given = flat({"world": self.sweep.get("world", {})}) if self.sweep else self.options
-        found: dict[str, list[Any]] = {}
-        tried = {name: self.values(name) for name in self.searched}
-        for table in (given, *(self.settings.get("vary") or ()), tried):
-            for name, value in table.items():
-                if name == "world" or name.startswith("world."):
-                    own = found.setdefault("preset" if name == "world" else name[6:], [])
-                    several = value if table is tried else [value]
-                    own += [one for one in several if one not in own]
-        return found
-
-    def world_settings(self) -> dict[str, list[Any]]:
-        """Return the values of the settings of worlds, by their names without "world."."""
-        return {name: one for name, one in self._given_of_worlds().items() if name != "preset"}
-
-    def _presets(self) -> list[str]:
-        if kinds := self.settings.get("world_kinds"):
-            return [name for name, own in _PRESETS.items() if own & {*kinds}]
-        return self._given_of_worlds().get("preset", ["paper"])
-
-    def worlds(self) -> list[tuple[str, str]]:
-        """Return the names of worlds with their texts, those of the package first."""
-        unknown = "a text map or a world of the plugin, in the inputs of the results"
-        several = [(name, RULES["worlds"].get(name, unknown)) for name in self._presets()]
-        return sorted(several, key=lambda one: one[0] not in RULES["worlds"])
-
-    def worlds_are_drawn(self) -> bool:
-        """Return whether worlds are drawn from a seed."""
-        return "world_kinds" in self.settings or any(
-            one in ("open", "far_piles") for one in self._presets()
-        )
-
-    def seeds_in_words(self) -> str:
-        """Return the seeds, as a range if they follow each other."""
-        first, n = self.seeds[0], len(self.seeds)
-        if n > 2 and list(self.seeds) == list(range(first, first + n)):
-            return f"{first} to {self.seeds[-1]}"
-        return ", ".join(map(str, self.seeds))
-
-    def events(self) -> list[str]:
-        """Return a text for each event with interventions; its settings can vary over points."""
-        found: dict[tuple[str, int], list[dict[str, Any]]] = {}
-        for events in self.values("protocol"):
-            numbers: Counter[str] = Counter()
-            for kind, facts in (item for event in events or () for item in event.items()):
-                numbers[kind] += 1
-                found.setdefault((kind, numbers[kind]), []).append(flat(facts))
-        lines = []
-        for (kind, number), variants in found.items():
-            own = f"{kind}.{number}."
-            tried = {k.removeprefix(own): v for k, v in self.searched.items() if k.startswith(own)}
-            lines.append(f"*{kind}*: {_varied(kind, variants, tried)}")
-        return lines
-
-    def traffic(self) -> dict[str, str]:
-        """Return the texts of the rules of traffic that a point has, by name."""
-        return {
-            n: one for n, one in RULES["traffic"].items() if self.has(f"task.traffic.{n}", True)
+    def entities(self) -> list[Row]:
+        """Return the kinds of entities with their numbers in a world."""
+        ranges = (one["ranges"] for one in self.places)
+        cells = {x * y + y * z + z * x - x - y - z + 1 for x, y, z in ranges}
+        several = {
+            "castes of ants": self.entries("castes"),
+            "kinds of food": self.entries("foods"),
+            "further pheromones": self.entries("fields"),
         }
-
-    def has_usual_traffic(self) -> bool:
-        """Return whether ants cannot enter the cells of others in some of the points."""
-        used = self.traffic()
-        return not {"swap", "follow"} <= {*used} or any(
-            self.has(f"task.traffic.{one}", False) for one in used
-        )
-
-    def differences_of(self, caste: str) -> str:
-        """Return the settings of a caste that differ from those of all ants."""
-        own = [one for one in self.settings if one.startswith(f"task.castes.{caste}.")]
-        given = [one for one in own if self.has(one) and not self.has(one, "none", "all")]
-        return "; ".join(f"{one.split('.', 3)[3]} {self.text(one)}" for one in given)
-
-    def changed(self) -> Iterator[tuple[str, str, str, str]]:
-        """Yield the settings that differ from their defaults: values, default and meaning."""
-        known = self._declarations()
-        kind = ColonyPoint if self.of_colony else RunPoint
-        of_points = {one.name: one.default for one in fields(kind) if one.name in _OF_POINTS}
-        for name in self.settings:
-            # Entries of named groups share declarations, which have NAME in place of the entry.
-            one = known.get(re.sub(r"^(task\.(?:fields|foods|castes))\.\w+\.", r"\1.NAME.", name))
-            values = self.values(name)
-            if name == "protocol" and any(values):
-                values = [count(len(self.events()), "event")]
-            usual = one.default if one else of_points.get(name, MISSING)
-            is_setting = one or name in of_points or name.split(".")[0] in ("task", "training")
-            if not is_setting or all(value == usual for value in values):
-                continue
-            if one and values == [None] and usual is MISSING:
-                continue
-            default = "required" if usual is MISSING else _value(usual)
-            unit = f" ({one.rule.unit})" if one and one.rule.unit else ""
-            words = f"{one.rule.help}{unit}" if one else _OF_POINTS.get(name, "of the plugin")
-            yield f"`{name}`", _several(values), default, sentence(words)
-        of_worlds = [one for kind in WORLDS for one in worlds.settings_of(kind)]
-        for name, found in self._given_of_worlds().items():
-            if (name, found) != ("preset", ["paper"]):
-                words = next(
-                    (one.rule.help for one in of_worlds if one.name == name),
-                    "world, or a setting of it",
-                )
-                yield f"`world.{name}`", _several(found), "that of the world", sentence(words)
-
-    def _declarations(self) -> dict[str, Setting]:
-        """Return the declarations of settings by their full names, of named groups with NAME."""
-        several = [
-            one
-            for group in (Task, *(each.entry for each in named_groups(Task)))
-            for one in all_of(group)
-            if not one.is_group
+        return [
+            ("cells", _several(sorted(cells))),
+            ("nests, each with a queen", _several(sorted({*map(_nests, self.places)}))),
+            ("ants at the start", _several([row.get("ants", 1) for row in self.rows])),
+            *((words, f"{len(n)}: {', '.join(n)}") for words, n in several.items() if n),
         ]
-        found = {one.path: one for one in (*several, *declared(TrainingConfig))}
-        for name in self.values("training.learner"):
-            if name in LEARNERS:
-                for one in declared(learners.get(name).hyperparameters):
-                    found[f"training.hyperparameters.{one.name}"] = one
-        return found
 
+    def state_variables(self) -> list[Row]:
+        """Return the state variables: entity, name, values and unit."""
+        text = {name.strip("`"): value for name, value, *_ in self.parameters()}
+        names = {row["task.observation"] for row in self.rows} & {*observations.names()}
+        states = sorted(observations.get(name).n_states for name in names)
+        number, foods, castes = "at least 0", self.entries("foods"), self.entries("castes")
+        divides, levels = "task.labour.demand" in text, ["trail", *self.entries("fields")]
+        ages = "yes" in text.get("task.life.births", "") or any("lifespan" in one for one in text)
+        rows = {
+            ("cell", "content", "empty, rock, food, queen", ""): True,
+            **{("cell", f"level of `{one}`", number, "level"): True for one in levels},
+            ("cell", "food", number, "loads"): foods,
+            ("nest", "food received", number, "items"): True,
+            ("nest", "stimulus", number, "units of stimulus"): divides,
+            ("ant", "cell", "", ""): True,
+            ("ant", "heading", "0 to 5, clockwise; 0 is up", "60 degrees"): True,
+            ("ant", "has food", "yes, no", ""): True,
+            ("ant", "observation", f"one of {_several(states)} states", ""): states,
+            ("ant", "caste", ", ".join(castes), ""): castes,
+            ("ant", "idle", "yes, no", ""): divides,
+            ("ant", "age", number, "ticks"): ages,
+            ("ant", "time since its load changed", number, "ticks"): any(
+                name.endswith(".slope") for name in text
+            ),
+            ("learner", "action values Q(s, a)", "", "reward"): "training.learner" in text,
+        }
+        return [row for row, is_used in rows.items() if is_used]
 
-def _tried(usual: Any, axis: Any) -> list[Any]:
-    """Return the values of a setting in a search: the default, and choices or a range in words."""
-    if isinstance(axis, Mapping):
-        low, high = axis["from"], axis["to"]
-        is_within = isinstance(usual, (int, float)) and low <= usual <= high
-        return [f"{low} to {high}", *([] if is_within or usual is None else [usual])]
-    return [*([] if usual is None or usual in axis else [usual]), *axis]
+    def measures(self) -> Iterator[Row]:
+        """Yield the names and meanings of the measures."""
+        if "measures" not in self.settings:
+            several = OF_STUDY if self.of_colony else {n: one.words for n, one in OF_RUNS.items()}
+            yield from ((f"`{name}`", words) for name, words in several.items())
+        for name in _list_of(self.settings.get("measures", [])):
+            try:
+                words = measure_of("colony" if self.of_colony else "runs", name).words
+            except AntsError:
+                words = "of a plugin"
+            yield f"`{name}`", words
 
 
 def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the ODD description of finished results, as Markdown."""
-    asked = manifest["asked"]
-    name = manifest["inputs"].get(str(asked["options"].get("file")))
+    inputs, sums = manifest["inputs"], manifest["files"]
+    name = inputs.get(str(manifest["asked"]["options"].get("file")))
     sweep = files.tomllib.loads(files.read_text(folder / name)) if name else {}
-    return described(Model(manifest["settings"], asked, sweep), manifest["command"])
+    sources = [(f"`{one}`", f"`{sums[one][:16]}`") for one in inputs.values()]
+    return described(Model(manifest["settings"], sweep), manifest["command"], sources)
 
 
-def described(model: Model, command: str) -> str:
-    """Return the ODD description of a model, as Markdown."""
-    from jinja2 import Environment, StrictUndefined
+def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
+    """Return the ODD description of a model; `sources` are input files and their checksums."""
+    rows, heads = model.parameters(), ("Parameter", "Value", "Unit", "Meaning")
+    sizes = ("ranges", "foods", "obstacles", "trails", "ants")
+    worlds = [
+        (*(str(one[size]) for size in sizes), str(_nests(one)), f"`{one['sha256'][:16]}`")
+        for one in model.places[:_MOST]
+    ]
+    of_worlds = ("Ranges", "Food items", "Rock", "Trail cells", "Listed ants", "Nests", "SHA-256")
+    own = [(f"`{k}`", _value(v)) for k, v in model.settings.items() if re.match("search.[^v]", k)]
+    more: dict[str, Block] = {
+        "Stochasticity": f"Seeds: {', '.join(map(str, model.settings['seeds']))}",
+        "Observation": _table(("Measure", "Meaning"), model.measures()),
+    }
+    blocks: list[Block] = [
+        "# ODD description of the model",
+        "The headings are those of the ODD protocol (Overview, Design concepts, Details) of "
+        "[Grimm et al. (2020)](https://www.jasss.org/23/2/7.html). The tables were generated from "
+        f"the settings of this study: `{command}`. They leave out settings that are off or have no "
+        "effect in it. The text is yours to write.",
+        *("## 1. Purpose and patterns", _AUTHOR),
+        *("## 2. Entities, state variables and scales", _AUTHOR),
+        _table(("Entity", "Number in a world"), model.entities()),
+        _table(("Entity", "State variable", "Values", "Unit"), model.state_variables()),
+        *("## 3. Process overview and scheduling", _AUTHOR, "## 4. Design concepts"),
+        *(
+            block
+            for number, concept in enumerate(_CONCEPTS, start=1)
+            for block in (f"### 4.{number} {concept}", _AUTHOR, more.get(concept, ""))
+        ),
+        *("## 5. Initialization", _AUTHOR, _table(of_worlds, worlds)),
+        f"{len(model.places)} worlds; the manifest has all." if model.places[_MOST:] else "",
+        *("## 6. Input data", _AUTHOR),
+        _table(("Event", *heads[1:]), [row for row in rows if _EVENT.match(row[0])]),
+        *("## 7. Submodels", _AUTHOR),
+        _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
+        *(_table(("Search", "Value"), own), _table(("File", "SHA-256 begins"), sources)),
+    ]
+    return markdown([one for one in blocks if (one if isinstance(one, str) else one.rows)])
 
-    how = Environment(
-        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=StrictUndefined
-    )
-    how.filters["joined"] = _joined
-    facts = {"learns": model.learns, "lives": model.lives, "diffuses": model.diffuses}
-    groups = {name: model.entries(name) for name in ("fields", "foods", "castes")}
-    functions = (model.has, model.text, model.values, model.choices, count)
-    return how.from_string(text_of("odd.md")).render(
-        command=command,
-        model=model,
-        settings=model.settings,
-        colony=model.of_colony,
-        most=_MOST,
-        texts=RULES,
-        several=_several,
-        quoted=_quoted,
-        listed=_listed,
-        **facts,
-        **groups,
-        **{one.__name__: one for one in functions},
-    )
+
+def _table(heads: Row, rows: Iterable[Row]) -> Table:
+    cells = [[cell.replace("|", "\\|") for cell in row] for row in rows]
+    return Table("", heads, cells, text_columns=len(heads))
 
 
-def _joined(text: str) -> str:
-    """Return paragraphs as single lines; items of lists and rows of tables keep their lines."""
-    blocks = [block.strip("\n") for block in re.split(r"\n\s*\n", text)]
-    return "\n\n".join(re.sub(r"\n(?!- |\| |\d+\. )", " ", one) for one in blocks if one) + "\n"
+def _has(row: Mapping[str, Any], start: str) -> bool:
+    return any(name.startswith(start) for name in row)
 
 
-def _varied(kind: str, variants: Sequence[Mapping[str, Any]], searched: Mapping[str, Any]) -> str:
-    """Return the settings of an event with their values in all variants, or those in a search."""
-    found = []
-    for name in dict.fromkeys([*(name for facts in variants for name in facts), *searched]):
-        group, _, own = name.rpartition(".")
-        of = declared(INTERVENTIONS[group] if group in INTERVENTIONS else EVENTS[kind])
-        usual = next((one.default for one in of if one.name == own), None)  # if it is left out
-        values: list[Any] = _tried(usual, searched[name]) if name in searched else []
-        for facts in variants if name not in searched else ():
-            value = facts.get(name, usual)
-            values += [value] if value not in values else []
-        found.append(f"{name} {_several(values)}")
-    return "; ".join(found)
+def _nests(world: Mapping[str, Any]) -> int:
+    return len(world.get("queens", "Q"))
 
 
 def _list_of(value: Any) -> list[Any]:
     return value if isinstance(value, list) else [value]
 
 
-def _quoted(names: Iterable[Any]) -> list[str]:
-    return [f"`{one}`" for one in names]
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Return names as "a, b and c"."""
-    *others, last = names or [""]
-    return f"{', '.join(others)} and {last}" if others else last
-
-
-def _several(values: Sequence[Any], unit: str = "") -> str:
-    """Return values as "a", "a, b or c", or as their range if they are many numbers."""
-    ending = f" {unit}" if unit and any(value is not None for value in values) else ""
-    numbers = [one for one in values if isinstance(one, (int, float)) and not isinstance(one, bool)]
-    if len(values) > _MOST and len(numbers) == len(values):
-        return f"{len(values)} values from {_value(min(numbers))} to {_value(max(numbers))}{ending}"
-    *others, last = (_value(one) for one in values)
-    return (f"{', '.join(others)} or {last}" if others else last) + ending
+def _several(values: Iterable[Any]) -> str:
+    """Return values, each once, or their range if they are many numbers."""
+    values = list({_value(one): one for one in values}.values())
+    if len(values) > _MOST and all(type(one) in (int, float) for one in values):
+        return f"{len(values)} values from {_value(min(values))} to {_value(max(values))}"
+    return ", ".join(map(_value, values))
 
 
 def _value(value: Any) -> str:
-    if value is None or value == ():
-        return "off" if value is None else "none"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.15g}"
-    if isinstance(value, list) and all(isinstance(one, str) for one in value):
-        return ", ".join(value)
-    return str(value).replace("|", "\\|") if not isinstance(value, (list, dict)) else f"`{value}`"
+    return "off" if value is None else f"{value:.15g}" if type(value) is float else str(value)

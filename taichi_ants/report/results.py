@@ -98,10 +98,12 @@ def do_comparison(
     with progress_bar("statistics and pictures") as progress:
         results = Results.of(comparison, baselines)
         write_tables(ready, results)
-        for number, wait in enumerate(waits, start=1):
-            progress(number / (len(waits) + 1))
-            wait()
-        return results, seen()
+        with style.all_or_none(ready / FIGURES):
+            for number, wait in enumerate(waits, start=1):
+                progress(number / (len(waits) + 1))
+                wait()
+            return results, seen()
+    return results, Seen()
 
 
 def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:

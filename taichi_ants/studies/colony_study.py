@@ -156,7 +156,7 @@ def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
 
 def greedy(point: ColonyPoint) -> ColonyPoint:
     """Return the point that evaluates the same ants without exploration."""
-    calm = replace(point, training=replace(point.training, min_epsilon=0.0))
+    calm = replace(point, evaluation_epsilon=0.0)
     return replace(calm, pool=None, episodes=0, after=point) if point.episodes else calm
 
 
@@ -259,7 +259,8 @@ def do_study(
     files.write_text(folder / REPORT, plain_text(tables.on_one_screen(*results), _WIDTH))
     _save_policies(conditions, asked, values, blocks, folder / POLICIES, **how)
     if draws:
-        style.save_all(draw_all(results.rows), folder / FIGURES)
+        with style.all_or_none(folder / FIGURES):
+            style.save_all(draw_all(results.rows), folder / FIGURES)
     return results
 
 

@@ -223,7 +223,8 @@ def _help_of_entries(group: Setting) -> str:
     """Return the help of options such as --task.fields.home.level, for any name."""
     names = ", ".join(one.name.replace("_", "-") for one in declared(group.entry))
     option = f"--{group.path.replace('_', '-')}.NAME.SETTING"
-    return f"{option}: {group.rule.help}; SETTING is one of {names}. "
+    settings = f"SETTING is one of {names}" if names else "each rule declares its own"
+    return f"{option}: {group.rule.help}; {settings}. "
 
 
 def _literal(text: str) -> Any:
@@ -253,6 +254,7 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     """Run a command, report an error or interruption in one sentence, and exit Python."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
+    os.environ["MPLBACKEND"] = "agg"  # figures are files, and the user's backend may be missing
     status = 0
     try:
         with stoppable(interrupted):

@@ -63,13 +63,13 @@ def run(
         folder = files.check_writable_folder(options.out)
         results = measure(list(range(options.seeds)))
         files.write_csv(folder / f"{name}.csv", results.numbers, list(results.numbers[0]))
+        print(table(results.summary))
         with style.styled():
             figure = style.new_figure(3.5)
             axes = figure.subplots()
             results.draw(axes)
             style.frame(figure, results.title, "", style.legend_entries([axes]))
         style.save(figure, folder / f"{name}.png")
-        print(table(results.summary))
         print(f"\nNumbers: {folder / name}.csv. Figure: {folder / name}.png.")
 
     run_command(main)
@@ -97,7 +97,7 @@ def _interval(values: Sequence[float]) -> str:
 
 def band(axes: Axes, x: np.ndarray, values: np.ndarray, label: str) -> None:
     """Draw the mean of values (seeds, x) as a line, with its 95 % interval as a band."""
-    (line,) = axes.plot(x, values.mean(axis=0), label=label)
+    (line,) = axes.plot(x, values.mean(axis=0), label=style.label(label))
     if len(values) > 1:
         low, high = bootstrap_interval(values.T)
         axes.fill_between(x, low, high, color=line.get_color(), alpha=0.2, linewidth=0)

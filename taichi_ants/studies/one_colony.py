@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from taichi_ants import files
 from taichi_ants.analysis import style
+from taichi_ants.checks import checked_capacity
 from taichi_ants.errors import AntsError, count
 
 if TYPE_CHECKING:
@@ -186,7 +187,10 @@ def _pieces(
 
 
 def summary(colony: Colony, ticks: int, seconds: float) -> str:
-    """Return a summary of two lines for a run of `ticks` ticks that took `seconds`."""
+    """Return a summary of two lines for a run of `ticks` ticks that took `seconds`.
+
+    A third one reports births that wait.
+    """
     outcome = {name: int(array.sum()) for name, array in colony.outcome().counts().items()}
     blocked = 100 * outcome["blocked"] / max(1, outcome["moves"])
     changes = [count(outcome[f"{one}s"], one) for one in ("birth", "death") if outcome[f"{one}s"]]
@@ -194,8 +198,20 @@ def summary(colony: Colony, ticks: int, seconds: float) -> str:
     return (
         f"{_who(outcome['living'], colony)}, {count(ticks, 'tick')} in {seconds:.1f} s.\n"
         f"{count(outcome['deliveries'], 'delivery')} by tick {colony.ticks}, "
-        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}."
+        f"{', '.join([f'{blocked:.1f} % of the moves blocked', *changes])}.{_waiting(colony)}"
     )
+
+
+def _waiting(colony: Colony) -> str:
+    """Return a line on the births that wait, with the reason; "" if there are none."""
+    outcome = colony.outcome()
+    waiting, is_full = outcome.waiting_births, outcome.living >= colony.capacity
+    full, others = int(waiting[is_full].sum()), int(waiting[~is_full].sum())
+    usual = colony.capacity == checked_capacity(colony.task, colony.ants, None, "nest", False)
+    which = f"the {'default ' * usual}--capacity is {colony.capacity}"
+    reasons = {f"{full} until an ant dies ({which})": full, f"{others} for a free cell": others}
+    said = ", ".join(words for words, n in reasons.items() if n)
+    return f"\nBirths that wait: {said}." if said else ""
 
 
 def _who(ants: int, colony: Colony) -> str:

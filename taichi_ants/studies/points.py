@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
@@ -44,7 +44,7 @@ _COLONY_ARRAYS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 DURING = ("evaluation", "training", "both")
 SERIES = "series_"  # begins the names of the series of measures in outcomes
 # Settings that only the points that use them name, so that the blocks of others stay valid.
-_LATER = ("policy", "measures", "measure_every")
+_LATER = ("policy", "measures", "measure_every", "evaluation_epsilon")
 
 Progress = Callable[[float], None]
 
@@ -170,7 +170,7 @@ def _check_policy(policy: FixedPolicy | None, episodes: int) -> None:
 
 @dataclass(frozen=True)
 class ColonyPoint:
-    """A colony that learns, and is then evaluated without learning, with its lowest epsilon.
+    """A colony that learns, and is then evaluated without learning.
 
     Outcome: `deliveries`, `first_delivery`, `moves`, `blocked` and `returns` of the evaluation,
     integer (seeds, rollouts), as in `ColonyEpisodes`; `q_values`, float32 (seeds, n_states, 5), if
@@ -189,6 +189,8 @@ class ColonyPoint:
         after: The point from whose shared table learning starts; None means the initial values.
         policy: The policy that ants follow if there is no training. A task whose ants choose
             without action values has neither.
+        evaluation_epsilon: The exploration rate of the evaluation. None: the lowest one of the
+            training, or 0 with `policy`.
         measures, measure_every: The arguments `measures` and `every` of `Colony.run` for the
             evaluation, without `Measure` objects.
         protocol: Events with interventions, see `taichi_ants.protocol`.
@@ -211,6 +213,7 @@ class ColonyPoint:
     rollouts: int = 4
     after: ColonyPoint | None = None
     policy: FixedPolicy | None = None
+    evaluation_epsilon: float | None = None
     measures: tuple[str, ...] = ()
     measure_every: int | None = None
     protocol: tuple[Event, ...] = ()
@@ -231,6 +234,13 @@ class ColonyPoint:
                 f"`task.choice.rule` is {rule.rule!r}, which needs no action values, but {given}; "
                 "set episodes = 0 and leave out policy."
             )
+        if self.evaluation_epsilon is not None:
+            checks.checked_share("evaluation_epsilon", self.evaluation_epsilon)
+            if not rule.needs_table:
+                raise AntsError(
+                    f"evaluation_epsilon is {self.evaluation_epsilon}, but `task.choice.rule` is "
+                    f"{rule.rule!r}, with which ants do not explore; leave it out."
+                )
         without_training = self.after or self.policy or not rule.needs_table
         more = "" if without_training else "; 0 requires a policy"
         checked_whole("episodes", self.episodes, 0 if without_training else 1, otherwise=more)
@@ -313,6 +323,13 @@ class ColonyPoint:
         numbers = 8 * (len(_COLONY_ARRAYS) + rows) * self.rollouts
         return numbers + 4 * self.task.n_states * N_ACTIONS
 
+    @property
+    def exploration(self) -> float:
+        """The exploration rate of the evaluation."""
+        if self.evaluation_epsilon is not None:
+            return self.evaluation_epsilon
+        return 0.0 if self.policy else self.training.least_epsilon
+
     def events(self, learns: bool) -> tuple[Event, ...]:
         """Return the events of episodes of training or, if not `learns`, of the evaluation."""
         return self.protocol if self.during in ("both", DURING[learns]) else ()
@@ -335,14 +352,11 @@ class ColonyPoint:
         from taichi_ants.engines.colony.colony import Colony
 
         training: TrainingConfig | None = self.training
-        if not self.task.choice.needs_table:
-            training = None
-        elif not learns:
-            training = replace(
-                self.training, epsilon=self.training.least_epsilon, epsilon_decay=1.0
-            )
         if not learns:
             seeds = [seed + EVALUATION_SEEDS for seed in seeds]
+            training = TrainingConfig.frozen(self.exploration)
+        if not self.task.choice.needs_table:
+            training = None
         sharing = self.sharing if learns else "frozen"
         options |= {"ants": self.ants, "capacity": self.capacity, "start": self.start}
         options |= {"sharing": sharing, "q_values": q_values}
@@ -442,7 +456,7 @@ def facts_of(point: Point, number_of: Callable[[str, Any], Any]) -> dict[str, An
     protocol, during = found.pop("protocol", ()), found.pop("during", "")
     if protocol:
         found |= {"protocol": [event.facts() for event in protocol], "during": during}
-    found = {name: value for name, value in found.items() if value or name not in _LATER}
+    found = {k: v for k, v in found.items() if k not in _LATER or v not in (None, ())}
     if policy := found.get("policy"):
         found["policy"] = {"name": policy.name, "sha256": policy.sha256}
     return flat({**found, "task": point.task.as_dict(), "training": point.training.as_dict()})

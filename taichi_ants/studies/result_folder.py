@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from taichi_ants import files
+from taichi_ants.analysis import style
 from taichi_ants.files.results import (
     FAILED,
     INPUTS,
@@ -88,12 +89,14 @@ def work_or_show(
                 return
             report = files.read_text(ready / REPORT)
             seconds = folder.seconds_before + time.perf_counter() - began
-            made = provenance(sys.argv) | {"seconds": seconds, "figures": not settings.no_figures}
+            figures = not settings.no_figures and any(ready.rglob("*.png"))
+            made = provenance(sys.argv) | {"seconds": seconds, "figures": figures}
             if as_parquet and settings.parquet:
                 as_parquet(ready, ready)
             made |= {"asked": _again(settings), "inputs": _copied(given, ready)}
             if page:
-                files.write_text(ready / PAGE, page(ready, results, made))
+                with style.all_or_none(ready / PAGE):
+                    files.write_text(ready / PAGE, page(ready, results, made))
             folder.publish(ready, made)
         print(f"{report}\n{seconds:.1f} s; all results are in {settings.out}/")
     if page:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from taichi_ants import checks, files
-from taichi_ants.analysis import searches, sweeps
+from taichi_ants.analysis import searches, style, sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, shown
 from taichi_ants.files.results import REPORT, ROWS
@@ -30,7 +30,14 @@ from taichi_ants.studies.design import Axis, Range
 from taichi_ants.studies.points import ColonyPoint, Progress
 from taichi_ants.studies.runner import VALUE, Study
 from taichi_ants.studies.sweep import Sweep
-from taichi_ants.studies.sweep_file import Base, Settings, axes_of, contents, measure_of
+from taichi_ants.studies.sweep_file import (
+    Base,
+    Settings,
+    axes_of,
+    check_training,
+    contents,
+    measure_of,
+)
 
 if TYPE_CHECKING:
     import optuna
@@ -121,6 +128,8 @@ class Search:
     def _check_trials(self) -> None:
         """Raise AntsError if the default is not allowed, or none of the first trials."""
         self._studies({})
+        if "episodes" not in self.axes:
+            check_training([*self.base.fixed, *self.axes], [self.base.point({}, {})])
         study, errors = self._study(), list[AntsError]()
         for number in range(min(self.trials, _TRIED)):
             trial, row = self._asked(study, number)
@@ -337,7 +346,8 @@ class Search:
             names, logs = list(design.varying(self.axes)), design.logarithmic(self.axes)
             path = folder / sweep.FIGURES / "search.png"
             files.check_writable_folder(path.parent)
-            searches.draw(path, rows, names, logs, (self.measure, words), self.maximises)
+            with style.all_or_none(path.parent):
+                searches.draw(path, rows, names, logs, (self.measure, words), self.maximises)
 
     def best_file(self, found: Found) -> str:
         """Return a sweep file (TOML) that runs the best settings with the held-out seeds."""

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.analysis import designs, sensitivity, sweeps
+from taichi_ants.analysis import designs, sensitivity, style, sweeps
 from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.paper import measures as of_runs
+from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.files import parquet
 from taichi_ants.files.results import REPORT, ROWS
@@ -34,6 +35,7 @@ from taichi_ants.studies.sweep_file import (
     as_list,
     axes_of,
     check_entries,
+    check_training,
     contents,
     measure_of,
 )
@@ -233,9 +235,11 @@ class Sweep:
             pairs = [(p, rows.index(other)) for p, other in enumerate(others) if other in rows]
             pairs = [(p, other) for p, other in pairs if p != other]
             several = [Contrast("", own[p] - own[other], above(self.margin)) for p, other in pairs]
-            for (p, _), one in zip(pairs, judge(several), strict=True):
+            for (p, other), one in zip(pairs, judge(several), strict=True):
                 said = _WORDS.get(one.verdict.value, "undecided")
                 numbers = {"difference": one.effect, "low": one.low, "high": one.high}
+                if np.isnan(values).any():
+                    numbers["left_out"] = int(np.isnan(own[p] - own[other]).sum())
                 found[some.start + p] = {**rows[p], "finding": said, **numbers}
         return found
 
@@ -245,14 +249,15 @@ class Sweep:
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
         with_iqm = [name for name in values if measure_of(self.kind, name).uses_iqm]
+        gaps = [name for name, array in values.items() if np.isnan(array).any()]
         rows = [
-            {**one, "seeds": len(self.study.seeds), **sweeps.centre_columns(centres)}
+            {**one, "seeds": len(self.study.seeds), **sweeps.centre_columns(centres, gaps)}
             for one, centres in zip(self.settings, sweeps.centres_of(values, with_iqm), strict=True)
         ]
         files.write_csv(folder / SUMMARY, rows, sweeps.columns_of(rows))
         found = self.findings(values[first])
         if self.against:
-            more = ("finding", "difference", "low", "high")
+            more = ["finding", "difference", "low", "high", *["left_out"] * (first in gaps)]
             files.write_csv(folder / FINDINGS, found.values(), [*columns, *more])
         notes = [found.get(p, {}).get("finding", "") for p in range(len(self.settings))]
         if self.design.kind == GRID:
@@ -262,11 +267,17 @@ class Sweep:
         indices = self.indices(values)
         if indices:
             report = f"{report}\n{sensitivity.report(indices, len(self.study.seeds))}"
-            of_all = [one._asdict() for several in indices.values() for one in several]
-            files.write_csv(folder / SENSITIVITY, of_all, sensitivity.Index._fields)
+            fields = [name for name in sensitivity.Index._fields if name != "left_out" or gaps]
+            of_all = [
+                {name: getattr(one, name) for name in fields}
+                for several in indices.values()
+                for one in several
+            ]
+            files.write_csv(folder / SENSITIVITY, of_all, fields)
         files.write_text(folder / REPORT, report)
         if draws:
-            self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
+            with style.all_or_none(folder / FIGURES):
+                self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
 
     def indices(self, values: dict[str, np.ndarray]) -> dict[str, list[sensitivity.Index]]:
         """Return the sensitivity indices by measure, from values that `measured` returned.
@@ -324,6 +335,11 @@ def sweep_of(file: Settings, progress: Progress = lambda share: None) -> Sweep:
         points.append(base.point(row, built))
         if number % _SHOW_EVERY == 0:
             progress(number / len(rows))
+    ends = list(itertools.accumulate(map(len, grids), initial=0))
+    parts = tuple(map(slice, ends, ends[1:]))
+    check_training(base.fixed, points)
+    for names, part in zip(axes, parts, strict=True):
+        check_training(names, points[part])
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
@@ -341,8 +357,7 @@ def sweep_of(file: Settings, progress: Progress = lambda share: None) -> Sweep:
         (against,) = pairs
     elif "margin" in file:
         raise AntsError("margin requires against; add against, or leave margin out.")
-    ends = list(itertools.accumulate(map(len, grids), initial=0))
-    parts, every = tuple(map(slice, ends, ends[1:])), base.reading.get("measure_every")
+    every = base.reading.get("measure_every")
     study: Study[Any] = Study(tuple(points), base.seeds)
     return Sweep(
         *(base.kind, study, rows, parts, base.measures, every, against, margin, drawn, axes)
@@ -381,9 +396,5 @@ def _ends(outcome: Outcome, name: str) -> Outcome:
     for key, array in outcome.items():
         column = key.removeprefix(SERIES)
         if key != column and (column == name or column.startswith(f"{name}.")):
-            last = array[..., -1]
-            known = ~np.isnan(last)
-            n = known.sum(axis=1)
-            sums = np.where(known, last, 0.0).sum(axis=1)
-            found[column] = np.divide(sums, n, out=np.full(len(n), math.nan), where=n > 0)
+            found[column] = known_means(array[..., -1])
     return found

@@ -37,12 +37,11 @@ _OF_FILE = (  # keys that are not settings of points
 )
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
+# Measures of reward, and the deliveries that sweeps report beside them: ants can collect rewards
+# without delivering.
+_BESIDE = {"reward": "deliveries", "greedy_return": "greedy_deliveries"}
+_BESIDE |= {f"return_{of}": f"deliveries_{of}" for of in ("first50", "second50", "last50", "all")}
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
-# Ants that follow a policy do not learn or explore, unless the file says so.
-_WITHOUT_LEARNING = {
-    **{"learner": "q_learning", "learning_rate": 1.0, "discount": 1.0},
-    **{"epsilon": 0.0, "epsilon_decay": 1.0},
-}
 
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
 
@@ -74,7 +73,7 @@ def measure_of(kind: str, name: str) -> Measure:
         AntsError: There is no such measure; the message lists all names.
     """
     known = MEASURES[kind]
-    if name in known:
+    if isinstance(name, str) and name in known:
         return known[name]
     if not isinstance(name, str) or name.partition(".")[0] not in _registered(kind):
         raise AntsError(f"measures is {shown(name)}; it must be one of {_names_of(kind)}.")
@@ -141,6 +140,8 @@ class Base(NamedTuple):
         for name in wanted:
             measure_of(kind, name)
         _check_once("measures", wanted)
+        beside = [_BESIDE[name] for name in wanted if name in _BESIDE]
+        wanted = list(dict.fromkeys([*wanted, *beside]))
         for name in protocol.EVENTS:
             if isinstance(file.get(name), dict):
                 raise AntsError(f"[{name}] is one table; write [[{name}]] in double brackets.")
@@ -235,7 +236,7 @@ def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
                 )
         if name in _OF_FILE:
             raise AntsError(f"{name} cannot vary; move it from [vary] to the top of the file.")
-        declaration = _declaration(name, fixed)
+        declaration = declaration_of(name, fixed)
         if isinstance(values, dict):
             whole = name in ("world.seed", *_whole_numbers(kind))
             whole = declaration.kind is int if declaration else whole
@@ -270,7 +271,7 @@ def _check_amounts(name: str, values: Sequence[Any]) -> None:
         )
 
 
-def _declaration(name: str, fixed: Settings) -> Setting | None:
+def declaration_of(name: str, fixed: Settings) -> Setting | None:
     """Return the declaration of a setting; None if the task, training, world and events lack it.
 
     Also None for the short form of an intervention.
@@ -320,6 +321,18 @@ def check_entries(file: Settings, varied: Iterable[str]) -> None:
                 )
 
 
+def check_training(names: Iterable[str], points: Sequence[Point]) -> None:
+    """Raise AntsError if one of the settings is of the training, but no point has training."""
+    name = next((one for one in names if one.split(".")[0] == "training"), None)
+    if name is None or any(one.episodes for one in points):
+        return
+    explores = isinstance(points[0], ColonyPoint) and points[0].task.choice.needs_table
+    more = ", or set evaluation_epsilon to let them explore" if explores else ""
+    raise AntsError(
+        f"{name} has no effect, because ants do not learn if episodes is 0; leave it out{more}."
+    )
+
+
 def _point(
     kind: str,
     settings: Settings,
@@ -349,7 +362,7 @@ def _point(
             built[key] = FixedPolicy.named(tree["policy"], chosen)
         tree["policy"] = built[key]
     if "policy" in tree or (kind == "colony" and not chosen.choice.needs_table):
-        training = {**_WITHOUT_LEARNING, **training}
+        training = TrainingConfig.frozen().as_dict()  # `check_training` refuses others
     for name in _OF_LEARNERS[:5]:  # the others have defaults
         if name not in training:
             raise AntsError(f"training.{name} is missing; add it to [training] or [vary].")

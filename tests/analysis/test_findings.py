@@ -234,3 +234,13 @@ def test_an_interval_ends_where_the_estimate_cannot_go() -> None:
     )
     assert free.high > cut.high == 1.0
     assert free.low == cut.low
+
+
+def test_seeds_without_a_value_are_left_out_of_a_contrast() -> None:
+    values = np.random.default_rng(4).normal(1, 1, 30)
+    (whole,) = judge([Contrast("", values, above())])
+    (found,) = judge([Contrast("", np.insert(values, [3, 9], np.nan), above())])
+    assert found.contrast.seeds == 30
+    assert (found.effect, found.low, found.high) == (whole.effect, whole.low, whole.high)
+    (none,) = judge([Contrast("", np.full(5, np.nan), above())])
+    assert (none.verdict, none.contrast.seeds) == (Verdict.NOT_TESTED, 5)

@@ -61,7 +61,7 @@ def test_without_measures_the_rows_are_the_counts():
     result = run()
     rows = {(row["measure"], row["episode"], row["seed"]): row["value"] for row in result.rows()}
     assert rows["moves", 1, 3] == result.moves[1, 3]
-    assert len(rows) == 11 * 2 * 5
+    assert len(rows) == 12 * 2 * 5
 
 
 def test_rows_of_lone_ants(trained):
@@ -181,7 +181,7 @@ def test_figures_are_drawn(series, trained, tmp_path):
         "Deliveries,\nfood items", "Entropy (trail)"
     ]  # fmt: skip
     assert figure.axes[-1].get_xlabel() == "Tick"
-    assert [len(axes.lines) for axes in trained.plot().axes] == [2, 2]
+    assert [len(axes.lines) for axes in trained.plot().axes] == [2, 2, 2]
 
 
 def test_several_results_are_drawn_together(series, trained):

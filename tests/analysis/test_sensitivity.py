@@ -31,7 +31,8 @@ def test_indices_of_ishigami(ishigami):
         assert one.total_low < total < one.total_high
         assert one.first_order_high - one.first_order_low < 0.25
     again = indices("y", NAMES, ishigami[:, None])  # the same bootstrap
-    assert [one[:-1] for one in found] == [one[:-1] for one in again]
+    assert [one[:-2] for one in found] == [one[:-2] for one in again]
+    assert {one.left_out for one in found} == {0}
 
 
 @pytest.mark.parametrize("variance", [0.0, 5.0, 200.0])
@@ -54,12 +55,26 @@ def test_the_share_of_one_seed_is_unknown(ishigami):
     assert "make -" in sensitivity.report({"y": indices("y", NAMES, ishigami[:, None])}, 1)
 
 
+def test_groups_with_a_point_without_a_value_are_left_out(ishigami):
+    values = np.stack([ishigami, ishigami + 1], axis=1)
+    kept = np.delete(values, np.s_[5:10], axis=0)  # the second group of 3 + 2 points
+    values[7] = np.nan
+    found, wanted = indices("y", NAMES, values), indices("y", NAMES, kept)
+    assert [one[:8] for one in found] == [one[:8] for one in wanted]
+    assert {one.left_out for one in found} == {5}
+    assert "5 points are left out, because" in sensitivity.report({"y": found}, 2)
+    values[7] = kept[2, 0], np.nan  # one of two seeds has a value
+    assert {one.left_out for one in indices("y", NAMES, values)} == {0}
+
+
 def test_constant_and_missing_values_have_no_indices(ishigami):
     values = ishigami[:, None].copy()
-    values[7] = np.nan
+    values[7:-10:5] = np.nan  # leaves the first and the last two groups
+    assert indices("gaps", NAMES, values)[0].left_out == len(values) - 3 * 5
+    values[7::5] = np.nan
     found = {
         "gaps": indices("gaps", NAMES, values),
-        "flat": indices("flat", NAMES, 0 * values[8:13]),
+        "flat": indices("flat", NAMES, 0 * ishigami[:15, None]),
     }
     assert found == {"gaps": [], "flat": []}
     text = sensitivity.report(found, 1)

@@ -21,6 +21,7 @@ from taichi_ants.analysis.statistics import (
     interquartile_mean,
     interquartile_values,
     jackknife_values,
+    known_means,
     resampling_counts,
     student_interval,
     without_noise,
@@ -181,7 +182,7 @@ def test_columns_of_a_table_are_free_of_rounding_noise() -> None:
     assert (first.mean, second.mean) == (0.0, 3.5)
     assert first.iqm == without_noise(interquartile_mean(values), values)[0]
     assert second.iqm == 3.5
-    fields = ("mean", "ci_low", "ci_high", "iqm", "iqm_ci_low", "iqm_ci_high")
+    fields = ("mean", "ci_low", "ci_high", "iqm", "iqm_ci_low", "iqm_ci_high", "left_out")
     assert first._fields == fields
     assert [one[:4] for one in estimates(values, uses_iqm=False)] == [
         (*first[:3], None),
@@ -369,3 +370,19 @@ def test_the_interval_of_jackknife_values_covers_the_statistic() -> None:
 
 def test_jackknife_values_of_one_seed_are_nan() -> None:
     assert np.isnan(jackknife_values(variance, np.ones((8, 1)))).all()
+
+
+def test_estimates_leave_out_seeds_without_a_value() -> None:
+    values = np.random.default_rng(3).normal(size=(4, 12))
+    whole = estimates(values)
+    gaps = np.insert(values, [2, 5], np.nan, axis=1)
+    gaps[1] = np.nan
+    gaps[2, [2, 6]] = 7.5, -1.5
+    found = estimates(gaps)
+    assert [one.left_out for one in found] == [2, 14, 0, 2]
+    for row in (0, 3):
+        assert found[row][:6] == pytest.approx(whole[row][:6], rel=1e-12)
+    assert np.isnan([found[1].mean, found[1].ci_low, found[1].iqm]).all()
+    assert found[2][:6] == pytest.approx(estimates(gaps[2:3])[0][:6], rel=1e-12)
+    assert estimates(gaps, uses_iqm=False)[0].iqm is None
+    assert known_means(gaps).tolist() == pytest.approx([one.mean for one in found], nan_ok=True)

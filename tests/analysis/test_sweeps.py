@@ -54,3 +54,23 @@ def test_axes_are_logarithmic_where_numbers_lie_far_apart(factor, scale):
 def test_intervals_of_few_seeds_are_warned_of(seeds, few):
     report = sweeps.report([{"a.x": 1}], {"deliveries": VALUES[:1, :seeds]})
     assert ("too few" in " ".join(report.split())) == few
+
+
+@pytest.mark.parametrize("zero", [0, 1, 2])
+def test_zeros_are_not_on_a_logarithmic_axis(zero):
+    high = {"line": [(1, 5, 4, 6), (2, 500, 400, 600)]}
+    low = {"line": [(1, *(0 if n == zero else 7 for n in range(3)))]}
+    for lines, shared in ((high, [high, low]), ({**high, "other": low["line"]}, [])):
+        axes = Figure().subplots()
+        sweeps.draw_lines(axes, lines, shared)
+        assert axes.get_yscale() == "linear"
+
+
+def test_points_without_a_value_do_not_change_the_scale():
+    axes = Figure().subplots()
+    nothing = (1, np.nan, np.nan, np.nan)
+    sweeps.draw_lines(axes, {"line": [(1, 5, 4, 6), (2, 500, 400, 600)], "other": [nothing]})
+    assert axes.get_yscale() == "log"
+    axes = Figure().subplots()
+    sweeps.draw_lines(axes, {"other": [nothing]})
+    assert axes.get_yscale() == "linear"

@@ -366,9 +366,9 @@ def test_a_search_is_archived_and_reproduced(tmp_path, capsys, monkeypatch):
     assert "equal      optuna.journal (except the time and the machine of the run)" in out
     with bundles.reading(Path("done.zip")) as bundle:
         odd = bundle.read("ODD.md").decode()
-    assert "chose 3 combinations, one after the other, to maximise the mean of `deliveries`" in odd
-    assert "where the half-life h is 10 to 1000." in odd
-    assert '"strongest"' in odd
+    assert "| `search.trials` | 3 |" in odd
+    assert "| `task.pheromone.half_life` | 20, 10 to 1000 | ticks |" in odd
+    assert "strongest" in odd
     folder = ResultFolder(Path("done"), read_manifest(Path("done"))["settings"])
     trials = Path("done/optuna.journal").read_text()
     folder.add("optuna.journal", trials.replace('"value":', '"value":1', 1))

@@ -30,10 +30,11 @@ from taichi_ants import (
     train,
     worlds,
 )
+from taichi_ants.analysis import sweeps
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies.points import EVALUATION_SEEDS, RunPoint
-from taichi_ants.studies.sweep import read_sweep
+from taichi_ants.studies.sweep import read_sweep, sweep_of
 from taichi_ants.task import foraging, observations, paper
 from taichi_ants.worlds import registry
 
@@ -107,6 +108,10 @@ def read_csv(path):
         return list(csv.DictReader(file))
 
 
+# Deliveries are reported beside returns.
+MEASURES = ["return_last50", "greedy_deliveries", "deliveries_last50"]
+
+
 def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
     status, out, err = sweep(RUNS)
     assert (status, err) == (0, "")
@@ -117,7 +122,7 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
     }
     rows = read_csv(folder / "runs.csv")
     names = ["training.learning_rate", "training.epsilon", "task.rewards.shaping"]
-    assert list(rows[0]) == [*names, "seed", "return_last50", "greedy_deliveries"]
+    assert list(rows[0]) == [*names, "seed", *MEASURES]
     assert len(rows) == 2 * 3 * 2 * 3
     for row in rows[::5]:
         rate, epsilon = (float(row[name]) for name in names[:2])
@@ -125,6 +130,7 @@ def test_a_row_is_a_point_and_a_seed_as_the_library_has_it(sweep):
         task = Task(delivery="truncates", rewards=Rewards(shaping=int(row[names[2]])))
         trained = train(worlds.paper(), config, int(row["seed"]), 50, 60, task)
         assert float(row["return_last50"]) == trained.returns.mean()
+        assert float(row["deliveries_last50"]) == trained.deliveries.mean()
     summary = read_csv(folder / "summary.csv")
     assert len(summary) == 12
     for number, line in enumerate(summary):
@@ -653,3 +659,82 @@ def test_mistakes_in_events_end_in_one_sentence(name, sweep):
     assert_one_sentence(err)
     for word in words:
         assert word in err
+
+
+def test_settings_of_a_training_that_does_not_happen_are_refused():
+    file = {"episodes": 0, "policy": "trail_follower"}
+    colony = {**file, "kind": "colony", "measures": ["deliveries"], "vary": {"ants": [2, 3]}}
+    runs = {**file, "kind": "runs", "measures": ["greedy_return"], "vary": {"max_steps": [9, 20]}}
+    more = r", or set evaluation_epsilon to let them explore\.$"
+    for one, training, end in (
+        (colony, {"training": {"epsilon": 0.3}}, more),
+        (colony, {"vary": {"training.epsilon": [0.0, 0.1]}}, more),
+        (runs, {"training": {"epsilon": 0.3}}, r"\.$"),
+    ):
+        with pytest.raises(AntsError, match=f"^training.epsilon .* is 0; leave it out{end}"):
+            sweep_of({**one, **training})
+
+
+def test_a_training_is_allowed_if_a_part_of_the_sweep_learns():
+    both = [{"policy": ["random"], "episodes": 0}, {"episodes": 3}]
+    file = {"kind": "colony", "measures": ["deliveries"], "ticks": 20, "vary": both}
+    training = {"learner": "sarsa", "learning_rate": 0.1, "discount": 0.9, "epsilon_decay": 0.9}
+    follows, learns = sweep_of({**file, "training": {**training, "epsilon": 0.3}}).study.points
+    assert (follows.exploration, learns.exploration) == (0.0, 0.01)
+    varied = [{**both[0], "training.epsilon": [0.1, 0.2]}, {**both[1], "training.epsilon": 0.1}]
+    with pytest.raises(AntsError, match=r"^training\.epsilon has no effect"):
+        sweep_of({**file, "training": training, "vary": varied})
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"evaluation_epsilon": 1.5}, "epsilon is 1.5; it must be a number between 0 and 1"),
+        ({"task": {"choice": "deneubourg"}, "evaluation_epsilon": 0.1}, "ants do not explore"),
+        ({"kind": "runs", "evaluation_epsilon": 0.1}, "of kind 'runs', but of 'colony'"),
+    ],
+)
+def test_the_exploration_of_an_evaluation_is_checked(more, message):
+    file = {"kind": "colony", "measures": ["deliveries"], "episodes": 0, "vary": {"rollouts": [1]}}
+    file |= {} if "task" in more else {"policy": "random"}
+    file |= {"measures": ["greedy_return"]} if more.get("kind") == "runs" else {}
+    with pytest.raises(AntsError, match=message):
+        sweep_of({**file, **more})
+
+
+def test_a_figure_that_fails_does_not_cost_the_tables(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(RUNS)
+
+    def fails(*_):
+        raise RuntimeError("no font")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(sweeps, "draw", fails)
+        status, out, err = call("sweep", ["my.toml", "--out", "done"], capsys)
+    assert (status, "all results are in done/" in out) == (0, True)
+    assert err == "warning: there are no figures, because one failed with RuntimeError: no font.\n"
+    assert not Path("done/figures").exists()
+    before = Path("done/summary.csv").read_bytes()
+    assert call("sweep", ["my.toml", "--out", "done"], capsys)[0] == 0  # draws them
+    assert Path("done/figures/return_last50.png").exists()
+    assert Path("done/summary.csv").read_bytes() == before
+
+
+def test_the_backend_of_the_user_may_be_missing(tmp_path):
+    (tmp_path / "my.toml").write_text(RUNS)
+    command = [sys.executable, str(EXPERIMENTS / "sweep.py"), "my.toml", "--out", "done"]
+    more = environment(tmp_path, MPLBACKEND="nonsense")
+    done = subprocess.run(command, cwd=tmp_path, env=more, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "done/figures/return_last50.png").exists()
+
+
+@pytest.mark.parametrize("kind", ["runs", "colony"])
+@pytest.mark.parametrize("wrong", [["return_last50"], {"a": 1}, 3])
+def test_measures_that_are_not_names_are_refused(kind, wrong):
+    file = {"kind": kind, "measures": [wrong], "vary": {"rollouts": [1, 2]}}
+    with pytest.raises(AntsError) as error:
+        sweep_of(file)
+    assert_one_sentence(f"error: {error.value}\n")
+    assert str(error.value).startswith(f"measures is {wrong}; it must be one of")

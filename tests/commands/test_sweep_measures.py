@@ -9,11 +9,20 @@ import numpy as np
 import pytest
 from command_lines import assert_one_sentence, call
 
-from taichi_ants import AntsError, Colony, TrainingConfig, measures, rules, save_policy, worlds
+from taichi_ants import (
+    AntsError,
+    Colony,
+    TrainingConfig,
+    files,
+    measures,
+    rules,
+    save_policy,
+    worlds,
+)
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.measures import registry
 from taichi_ants.studies.points import EVALUATION_SEEDS
-from taichi_ants.studies.sweep import read_sweep
+from taichi_ants.studies.sweep import read_sweep, sweep_of
 from taichi_ants.task import Pheromone, Task
 
 FILE = """
@@ -257,3 +266,30 @@ at.2.tick = [1, 59]
     assert status != 0
     assert_one_sentence(error)
     assert "there is no region 'gte' in the world, whose regions are: all, gate; choose" in error
+
+
+def test_runs_without_a_value_are_left_out_and_counted(tmp_path):
+    file = {"kind": "colony", "measures": ["entropy"], "episodes": 0, "policy": "trail_follower"}
+    file |= {"seeds": 12, "against": {"ants": 2}, "vary": {"ants": [2, 3, 4]}}
+    sweep = sweep_of(file)
+    values = np.random.default_rng(0).uniform(size=(3, 12))
+    values[0, 3] = values[1, [4, 5]] = values[2] = np.nan
+    sweep.write({"entropy.trail": values}, tmp_path, draws=True)
+    rows = files.read_csv(tmp_path / "summary.csv")
+    assert [row["entropy.trail_left_out"] for row in rows] == [1, 2, 12]
+    assert [row["seeds"] for row in rows] == [12] * 3
+    assert float(rows[1]["entropy.trail_mean"]) == np.nanmean(values[1])
+    assert rows[2]["entropy.trail_mean"] is None
+    found = files.read_csv(tmp_path / "findings.csv")
+    assert [row["left_out"] for row in found] == [3, 12]
+    both = ~np.isnan(values[:2]).any(axis=0)
+    wanted = (values[1] - values[0])[both].mean()
+    assert float(found[0]["difference"]) == pytest.approx(wanted)
+    assert found[1]["finding"] == "undecided"
+    report = (tmp_path / "report.txt").read_text()
+    assert "runs without a value are left out" in report
+    assert "] (2 left out)" in report
+    assert "- (12 left out)" in report
+    sweep.write({"entropy.trail": np.nan_to_num(values)}, tmp_path, draws=False)
+    assert "left_out" not in (tmp_path / "summary.csv").read_text()
+    assert "left out" not in (tmp_path / "report.txt").read_text()

@@ -442,3 +442,11 @@ def test_no_permission_is_told_before_the_work(check, tmp_path: Path, below: str
     with without_privileges(), pytest.raises(AntsError, match="ermission denied"):
         check(locked / below)
     assert names(locked) == []
+
+
+def test_large_whole_numbers_of_a_table_stay_different(tmp_path):
+    numbers = [2**60 + 1, 2**60 + 2, -(2**60) - 1, 2**53, 7]
+    files.write_csv(tmp_path / "a.csv", [{"seed": one} for one in numbers], ["seed"])
+    read = [row["seed"] for row in files.read_csv(tmp_path / "a.csv")]
+    assert read == numbers
+    assert [type(one) for one in read] == [int, int, int, float, float]

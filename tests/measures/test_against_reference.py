@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from random_colonies import random_colony
 
-from taichi_ants import Colony, measures
+from taichi_ants import Colony, TrainingConfig, measures, worlds
+from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.measures import (
     MEASURES,
@@ -15,6 +16,7 @@ from taichi_ants.reference.measures import (
     occupancy,
     synchrony,
 )
+from taichi_ants.task import foraging
 
 EVERY, EPISODES, TICKS = 3, 2, 20
 READ = (*MEASURES, "regions.a", "regions.b")
@@ -81,7 +83,24 @@ def test_measures_equal_the_reference(schedule, threads, changes):
                 assert found == row["occupancy"]
                 for measure in READ:
                     happened[measure] += 0 < row[measure] < np.inf
+    del happened["waiting_births"]  # see the next test
     assert min(happened.values()) > 10, happened
+
+
+def test_births_that_wait_equal_the_reference():
+    task = foraging().but(life={"births": True, "regrowth": 0})
+    given = worlds.paper(), task, TrainingConfig.frozen(0.05)
+    rules = {"ants": 6, "capacity": 12, "sharing": "frozen", "q_values": trail_follower("ants")}
+    colony, plain = Colony(*given, 3, **rules), ReferenceColony(*given, 3, **rules)
+    series = colony.run(1, 300, measures=["waiting_births", "living"], every=10).series
+    plain.begin_episode()
+    for tick, waiting in zip(series.ticks, series.values["waiting_births"], strict=True):
+        while plain.record.ticks < tick:
+            plain.tick()
+        assert waiting == measured(plain, "waiting_births")
+    living = series.values["living"]
+    assert waiting > 10
+    assert living[-1] == 12
 
 
 @pytest.mark.parametrize("schedule", ["by_chunk", pytest.param("by_world", marks=pytest.mark.slow)])

@@ -72,7 +72,7 @@ def test_every_condition_is_evaluated_without_exploration_too(planned) -> None:
     for point in planned.values():
         calm = greedy(point)
         assert {point, calm} <= points
-        assert (calm.training.min_epsilon, calm.episodes) == (0, 0)
+        assert (calm.exploration, calm.episodes) == (0, 0)
         assert calm.after == (point.after or point)
         assert (calm.world, calm.task, calm.ants) == (point.world, point.task, point.ants)
 

@@ -91,13 +91,15 @@ def _lines(
         axes = figure.subplots(*shape, sharex="col", sharey="row", squeeze=False)
         for line_of_axes, measure in zip(axes, measures, strict=True):
             line_of_axes[0].set_ylabel(textwrap.fill(sentence(study.MEASURES[measure]), 30))
+            points: dict[str, dict[str, list[tuple[float, ...]]]] = {
+                world_kind: {one.words: [] for one in designs} for world_kind in world_kinds
+            }
+            for row in rows:
+                if row.condition.world_kind in points and row.design in designs:
+                    point = row.condition.ants, *row.estimates[measure][:3]
+                    points[row.condition.world_kind][row.design.words].append(point)
             for axis, world_kind in zip(line_of_axes, world_kinds, strict=True):
-                points: dict[str, list[tuple[float, ...]]] = {one.words: [] for one in designs}
-                for row in rows:
-                    if row.condition.world_kind == world_kind and row.design in designs:
-                        point = row.condition.ants, *row.estimates[measure][:3]
-                        points[row.design.words].append(point)
-                draw_lines(axis, points)
+                draw_lines(axis, points[world_kind], [*points.values()])
         for column, world_kind in zip(axes.T, world_kinds, strict=True):
             column[0].set_title(sentence(study.WORLD_KINDS[world_kind]), fontsize=9)
             column[-1].set_xlabel("Ants")

@@ -109,7 +109,7 @@ def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dic
 
     For `first_delivery`, an episode without a delivery counts with all its ticks. This restricted
     mean (of survival analysis) is at most the true one; `no_delivery_rate` is the share of such
-    episodes.
+    episodes. `blocked` is nan if no ant tried to move.
     """
     deliveries, rewards = (
         outcome[name].mean(axis=1, dtype=float) * 1000 / ticks for name in ("deliveries", "returns")
@@ -121,7 +121,7 @@ def measures_of(outcome: Mapping[str, np.ndarray], ants: int, ticks: int) -> dic
         "per_ant": deliveries / ants,
         "first_delivery": np.where(first < 0, ticks, first).mean(axis=1),
         "no_delivery_rate": (first < 0).mean(axis=1),
-        "blocked": outcome["blocked"].sum(axis=1) / np.maximum(moves, 1.0),
+        "blocked": outcome["blocked"].sum(axis=1) / np.where(moves > 0, moves, np.nan),
         "reward": rewards / ants,
     }
 

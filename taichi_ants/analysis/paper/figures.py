@@ -80,7 +80,8 @@ def learning_curves(comparison: Comparison, baselines: Sequence[Baseline] = ()) 
         axes = figure.subplots(*shape, sharex=True, sharey="row", squeeze=False)
         for place, (setting, variant) in enumerate(comparison.learners):
             point = comparison.rows[curve_row(comparison, setting, variant)].point
-            label = variant.label + ("" if point == FIGURE_1 else f", {setting}: {point.label}")
+            more = "" if point == FIGURE_1 else f", {setting}: {point.label}"
+            label = style.label(variant.label + more)
             for axis, name in zip(axes[:, settings.index(setting)], CURVES, strict=True):
                 middle, low, high = comparison.curves[name][place]
                 mark = "o" if len(at) == 1 else ""
@@ -137,7 +138,13 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
             for row, marker in zip(baselines, cycle("osD^vph")):
                 counts_here = setting == "terminates" or row.baseline != "optimal policy"
                 if row.return_mean is not None and counts_here:
-                    axis.plot(row.deliveries_mean, row.return_mean, marker, label=row.label, **look)
+                    axis.plot(
+                        row.deliveries_mean,
+                        row.return_mean,
+                        marker,
+                        label=row.label,
+                        **look,
+                    )
         axes[0].set_ylabel("Return (reward per episode, last 50)")
         style.frame(
             figure,

@@ -159,7 +159,7 @@ def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
             cells = [
                 *(line.label, line.delivery),
                 _spread(name, *estimator[:3], mark=f" {APART}" if estimator.apart else ""),
-                _spread(name, *estimator[3:]),
+                _spread(name, *estimator[3:6]),
                 _spread(name, *best[:3]),
                 number(line.of_paper(name), 2 if "deliver" in name else 1),
                 percent(best.paper_percentile / 100),

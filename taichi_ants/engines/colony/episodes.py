@@ -16,11 +16,13 @@ class ColonyEpisodes(Record, Tidy):
     """Results of episodes, arrays of shape (episodes, worlds).
 
     `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
-    with food of all delivered loads, `living` ants at the end. `deliveries_apart` has deliveries by
-    nest and kind of food, (episodes, worlds, nests, kinds), and `caste_deliveries` by caste,
-    (episodes, worlds, castes), with one column for all ants if there are no castes. Returns, moves,
-    blocked and carried are int64, all others int32. `seeds` has the seed of each world. `series`
-    has the values of the measures that you asked `Colony.run` for, else None.
+    with food of all delivered loads, `living` ants at the end. `waiting_births` is the food that is
+    not an ant yet at the end, because no cell next to its queen is free or `capacity` ants live.
+    `deliveries_apart` has deliveries by nest and kind of food, (episodes, worlds, nests, kinds),
+    and `caste_deliveries` by caste, (episodes, worlds, castes), with one column for all ants if
+    there are no castes. Returns, moves, blocked and carried are int64, all others int32. `seeds`
+    has the seed of each world. `series` has the values of the measures that you asked `Colony.run`
+    for, else None.
     """
 
     returns: np.ndarray
@@ -31,6 +33,7 @@ class ColonyEpisodes(Record, Tidy):
     blocked: np.ndarray
     carried: np.ndarray
     births: np.ndarray
+    waiting_births: np.ndarray
     deaths: np.ndarray
     regrown: np.ndarray
     living: np.ndarray

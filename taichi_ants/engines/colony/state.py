@@ -395,9 +395,11 @@ class ColonyState:
         return ColonyEpisodes(**counts, seeds=self.seeds)
 
     def _counts(self) -> Arrays:
-        """Return views of the counts of the episode (W,), by their names in `ColonyEpisodes`."""
+        """Return the counts of the episode (W,), by their names in `ColonyEpisodes`."""
         totals, worlds = self.arrays["totals"], self.arrays["worlds"]
         counts = {row.name.lower(): totals[row] for row in TOTALS}
+        stores = self.arrays["nests"][NestRow.STORE].reshape(len(self.seeds), -1)
+        counts["waiting_births"] = stores.sum(axis=1, dtype=np.int32)
         return counts | {row.name.lower(): worlds[row] for row in WorldRow if row >= WorldRow.TICKS}
 
     def snapshot(self, world: int = 0) -> Snapshot:

@@ -269,7 +269,7 @@ def _measured(
         of_group=configurations,
         seeds=seeds,
         groups=groups,
-        usual=("returns", "steps"),
+        usual=("returns", "deliveries", "steps"),
         units={"steps": "ticks", "first_delivery": "ticks", "efficiency": "per ant and tick"},
     )
 

@@ -90,6 +90,18 @@ def test_deliveries_against_the_number_of_ants(rows) -> None:
             assert line.get_xydata().tolist() == [*map(list, zip(SIZES, expected, strict=True))]
 
 
+def test_a_row_of_panels_with_a_zero_has_no_logarithmic_axis() -> None:
+    def mean(rules: str, regime: str, ants: int) -> float:
+        return 0.0 if rules == PAPER and ants == 1 else 20.0 * ants**2
+
+    study = build(mean, seeds=6, noise=0, world_kinds=WORLD_KINDS)
+    opened = {key: one for key, one in study.items() if key.world_kind == "open"}
+    full = build(lambda *given: 20.0 * given[2] ** 2, seeds=6, noise=0, world_kinds=("paper",))
+    for several, scale in (({**full, **opened}, "linear"), (full, "log")):
+        axes = figures.FIGURES["scaling"](condition_rows(several)).axes
+        assert {axis.get_yscale() for axis in axes[: len(axes) // 2]} == {scale}
+
+
 @pytest.mark.long
 def test_files_are_wide_enough_to_read_and_little_data_can_be_drawn(rows, tmp_path: Path) -> None:
     save_all(figures.draw_all(rows), tmp_path / "new")

@@ -52,8 +52,8 @@ ADDS, _, MORE, *_ = QUESTIONS
         # Episodes without a delivery count with all their ticks.
         ("first_delivery", [200, 500]),
         ("no_delivery_rate", [1 / 3, 1]),
-        # Of all moves, not the mean of shares; no move, none blocked.
-        ("blocked", [0.1, 0]),
+        # Of all moves, not the mean of shares; without a move there is none.
+        ("blocked", [0.1, np.nan]),
         ("reward", [200, -20]),
     ],
 )
