@@ -133,8 +133,7 @@ class LoneAnts(Ants):
 
 def _text_of(now: Snapshot) -> str:
     """Return a text map, see `worlds.text_map`; the heading of the ant marks its cell."""
-    ground = np.where(now.grid.exists, now.ground, -1)
-    where = [(ground == kind, mark) for kind, mark in _GROUNDS.items()]
+    where = [(now.grid.exists & (now.ground == kind), mark) for kind, mark in _GROUNDS.items()]
     where.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
     marks = [(now.grid.cells(np.flatnonzero(cells)), mark) for cells, mark in where]
     on_trail = now.trail[now.ant_cells[0]] > 0

@@ -1,10 +1,9 @@
 """The kernels of a colony: the phases of a tick, in order, and the sharing of work among threads.
 
 If worlds are many and small, each world is one part of the work. If they are few and large, all
-threads share each phase by chunks, which are ranges of the ants or cells of one world. Then threads
-on the CPU wait for each other at a barrier; on a GPU each group of phases is a parallel loop. All
-variants do the same phases in the same order and give the same numbers. The order is that of
-`taichi_ants.reference.ReferenceColony.tick`.
+threads share each phase by chunks, which are ranges of the ants or cells of one world, and wait for
+each other at a barrier. Both do the same phases in the same order and give the same numbers. The
+order is that of `taichi_ants.reference.ReferenceColony.tick`.
 """
 
 from collections.abc import Callable, Iterator
@@ -420,5 +419,7 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
                             at = share(group, c, part, parts, at)
                 for group in ti.static(last):
                     at = share(group, c, part, parts, at)
+            if (part == 0) & (at >= 0):
+                c.orders[Order.PASSED] += c.orders[Order.TICKS]
 
     return advance_colony
