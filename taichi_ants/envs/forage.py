@@ -100,6 +100,10 @@ class LoneAnts(Ants):
         np.not_equal(into.events & TRUNCATED, 0, out=into.truncated)
         np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
 
+    def over(self) -> np.ndarray:
+        arrays = self.batched.arrays
+        return (arrays["terminations"] | arrays["truncations"]) != 0
+
     def states(self) -> np.ndarray:
         return self.batched.arrays["states"]
 
@@ -198,7 +202,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         self._ants = LoneAnts(1, task, delivery, given)
         self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
-        self._over, self._begun = True, False
+        self._begun = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -211,7 +215,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         if seed is None and not self._begun:
             seed = int(self.np_random.integers(2**63))
         self._ants.begin(np.ones(1, bool), [seed])
-        self._over, self._begun = False, True
+        self._begun = True
         return self._seen()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -231,9 +235,12 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         self._ants.batched.step(action)
         arrays = self._arrays
         terminated, truncated = bool(arrays["terminations"][0]), bool(arrays["truncations"][0])
-        self._over = terminated or truncated
         observation, info = self._seen()
         return observation, float(arrays["rewards_of"][0]), terminated, truncated, info
+
+    @property
+    def _over(self) -> bool:
+        return not self._begun or bool(self._ants.over()[0])
 
     def _seen(self) -> tuple[Any, dict[str, Any]]:
         arrays = self._arrays
