@@ -178,24 +178,20 @@ def quiet() -> Iterator[None]:
     marked, Context.get_pos_info = Context.get_pos_info, _line_of
     reads = kernel_impl.getsourcelines, kernel_impl.textwrap
     kernel_impl.getsourcelines, kernel_impl.textwrap = _source_lines, _Textwrap
-    types = [(one, one.default_fp, one.default_ip) for one in _defaults_of(ti)]
+    running, config = ti.lang.impl.get_runtime(), ti.lang.impl.current_cfg()
+    types = running.default_fp, running.default_ip  # those of `config` would be references
     try:
-        for one, *_ in types:
+        for one in (running, config):
             one.default_fp, one.default_ip = ti.f32, ti.i32
         with Flushing(), warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)
             yield
     finally:
-        for one, real, whole in types:
-            one.default_fp, one.default_ip = real, whole
+        for one in (running, config):
+            one.default_fp, one.default_ip = types
         Context.get_pos_info = marked
         kernel_impl.getsourcelines, kernel_impl.textwrap = reads
         core.set_logging_level(before)
-
-
-def _defaults_of(ti: ModuleType) -> tuple[Any, Any]:
-    """Return the objects with the default types: one of Taichi's Python, one of its compiler."""
-    return ti.lang.impl.get_runtime(), ti.lang.impl.current_cfg()
 
 
 class _Textwrap:
