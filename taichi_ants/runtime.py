@@ -266,13 +266,11 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
 
 def _in_utf8(folder: str) -> str:
     """Return the folder; AntsError if Taichi cannot read its name."""
-    try:
-        folder.encode()
-    except UnicodeEncodeError:
+    if os.fsencode(folder).decode(errors="replace") != folder:
         raise AntsError(
             f"the folder {folder!r} for kernels has a name that is not UTF-8, which Taichi cannot "
             "read; set XDG_CACHE_HOME or TI_OFFLINE_CACHE_FILE_PATH to another folder."
-        ) from None
+        )
     return folder
 
 

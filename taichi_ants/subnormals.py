@@ -4,41 +4,25 @@ On x86-64, Taichi sets the processor's flag for this in the thread that starts i
 threads. Kernels also compute in the calling thread, so the flag is set there while they run.
 """
 
-from __future__ import annotations
-
 import ctypes
 import platform
 from typing import Any
 
-_FLUSHES = 5, 0x80  # a byte of `femode_t` and the bit in it: "flush to zero" of MXCSR
-
-
-def _modes() -> tuple[Any, Any]:
-    """Return the functions that read and set the modes of this thread's floats, if it has any."""
-    try:
-        if platform.machine() != "x86_64":
-            raise OSError
-        library = ctypes.PyDLL("libm.so.6")
-        several = library.fegetmode, library.fesetmode
-    except (OSError, AttributeError):  # no such flag, or another C library
-        return (lambda modes: None,) * 2
-    for one in several:
-        one.argtypes = (ctypes.c_void_p,)
-    return several
-
-
-_read, _set = _modes()
+_Modes = ctypes.c_uint32 * 4  # C's `femode_t`; the second number is MXCSR
+_FLUSH_TO_ZERO = 1 << 15
+_read: Any = lambda modes: None  # noqa: E731
+_set: Any = _read
+if platform.machine() == "x86_64" and platform.libc_ver()[0] == "glibc":
+    _read, _set = (getattr(ctypes.PyDLL("libm.so.6"), f"fe{does}mode") for does in ("get", "set"))
 
 
 class Flushing:
     """A context in which this thread flushes subnormal numbers to zero, as those of Taichi do."""
 
     def __init__(self) -> None:
-        self._buffers = kept, flushing = (ctypes.c_ubyte * 16)(), (ctypes.c_ubyte * 16)()
-        self._kept, self._flushing = map(ctypes.addressof, self._buffers)
-        _read(self._kept)
-        flushing[:] = kept[:]
-        flushing[_FLUSHES[0]] |= _FLUSHES[1]
+        self._kept, self._flushing = _Modes(), _Modes()
+        _read(self._flushing)
+        self._flushing[1] |= _FLUSH_TO_ZERO
 
     def __enter__(self) -> None:
         _read(self._kept)

@@ -25,6 +25,7 @@ def interrupted_after_launch(number: int = 1) -> Iterator[None]:
         if len(done) == number:
             raise KeyboardInterrupt
 
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Launch, "__call__", launch)
-        yield
+        with pytest.raises(KeyboardInterrupt):
+            yield

@@ -93,7 +93,7 @@ class Colony(ColonyState):
         """Reset some worlds, and let their ants observe."""
         self.ready[which] = False
         self.begin(which)
-        self._stepper.launch(self, "begin_phases")
+        self._stepper.launch(self, "begin")
         self.ready[which] = True
 
     def begin_some(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
@@ -138,7 +138,7 @@ class Colony(ColonyState):
         if worlds is not None:
             row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
         try:
-            self._stepper.launch(self, "intervention_phases")
+            self._stepper.launch(self, "see_interventions")
         finally:
             row[:] = running
 

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
 Cells = np.ndarray | str  # flat indices (n,), or the name of a region
+Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
 
 
@@ -168,13 +169,7 @@ class Interventions:
     def lay_trail(self, cells: Cells, level: int, field: str = TRAIL) -> None:
         """Set the trail, or a further field, of cells other than rocks."""
         number = [TRAIL, *self.colony.fields].index(field)
-
-        def lay(one: _World) -> Iterator[None]:
-            places = one.index(cells)
-            yield
-            one.lay(places[one.view("walls")[places] == 0], level, number)
-
-        self._change(lay)
+        self._change(lambda one: one.lay_in(one.index(cells), level, number))
 
     def add_ants(self, cells: Cells, heading: int | None = None, nest: int | None = None) -> None:
         """Put newborn ants on those of the cells that are empty, with random headings by default.
@@ -184,7 +179,7 @@ class Interventions:
         """
         self._check_nest(nest)
 
-        def add(one: _World) -> Iterator[None]:
+        def add(one: _World) -> Change:
             places = one.index(cells)
             nests = one.nearest_nests(places) if nest is None else np.full(len(places), nest)
             return one.add(places, nests, heading)
@@ -209,14 +204,7 @@ class Interventions:
     def remove_ants(self, cells: Cells, nest: int | None = None) -> None:
         """Remove the ants on these cells, or those of a nest, with the food that they carry."""
         self._check_nest(nest)
-
-        def remove(one: _World) -> Iterator[None]:
-            places = one.index(cells)
-            yield
-            slots = one.living_slots(nest)
-            one.remove(slots[np.isin(one.cells[slots], places)])
-
-        self._change(remove)
+        self._change(lambda one: one.remove_on(one.index(cells), nest))
 
     def remove_some(self, number: int | None, share: float | None, nest: int | None = None) -> None:
         """Remove a number of random ants, or a share; all ants if there are fewer.
@@ -362,11 +350,8 @@ class Interventions:
         if nest is not None:
             checked_whole("nest", nest, least=0, most=self.colony.n_nests - 1)
 
-    def _change(self, change: Callable[[_World], Iterator[None]]) -> None:
-        """Make a change that yields between its checks and its effects: first all checks.
-
-        Then the ants of these worlds observe again.
-        """
+    def _change(self, change: Callable[[_World], Change]) -> None:
+        """Make a change in all worlds, after its checks in all; then their ants observe again."""
         colony, worlds = self.colony, list(self.worlds)
         colony.check_begun()
         several = [change(one) for one in self._each()]
@@ -386,10 +371,7 @@ class Interventions:
 
 
 class _World:
-    """One world of a colony with interventions; its slots, cells and arrays are of this world.
-
-    Methods that return an iterator are changes, see `Interventions._change`.
-    """
+    """One world of a colony with interventions; its slots, cells and arrays are of this world."""
 
     def __init__(self, interventions: Interventions, w: int) -> None:
         self.all, self.w, self.colony = interventions, w, interventions.colony
@@ -447,7 +429,7 @@ class _World:
         queens = [tuple(cell) for cell in grid.cells(self.queen_cells).tolist()]
         return np.argmin([grid.distances(queen)[cells] for queen in queens], axis=0)
 
-    def put(self, cells: np.ndarray, what: int, kind: int = 0) -> Iterator[None]:
+    def put(self, cells: np.ndarray, what: int, kind: int = 0) -> Change:
         """Make cells EMPTY, OBSTACLE or FOOD; see `Interventions.put`."""
         held = self.view("ground")[cells]
         ants, to = self._aside(cells) if what != EMPTY else (cells[:0], cells[:0])
@@ -510,7 +492,7 @@ class _World:
         ground[to] = ground[at]
         ground[at] = EMPTY
 
-    def move(self, cell: int, to: int) -> Iterator[None]:
+    def move(self, cell: int, to: int) -> Change:
         """Move the content of a cell; see `Interventions.move`."""
         what = int(self.view("ground")[cell])
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
@@ -519,7 +501,7 @@ class _World:
             return self.move_queen(to, int(np.argmax(self.queen_cells == cell)))
         return self._move(cell, to, what)
 
-    def _move(self, cell: int, to: int, what: int) -> Iterator[None]:
+    def _move(self, cell: int, to: int, what: int) -> Change:
         """Move rock or food."""
         food, task = what == FOOD, self.colony.task
         kind = int(self.view("kind_of")[cell]) if food and self.colony.n_kinds > 1 else 0
@@ -538,7 +520,7 @@ class _World:
         slots, _ = self._aside(np.array([cell]))
         return bool(self.view("ground")[cell] == EMPTY) or len(slots) > 0
 
-    def move_queen(self, cell: int, nest: int) -> Iterator[None]:
+    def move_queen(self, cell: int, nest: int) -> Change:
         """Move a queen; see `Interventions.move_queen`."""
         grid, ground = self.colony.grid, self.view("ground")
         if not self._can_be_free(cell):
@@ -560,14 +542,17 @@ class _World:
         self.colony.changed[self.w] = True
         self._change_food_sources(np.array([cell]), QUEEN)
 
+    def lay_in(self, cells: np.ndarray, level: int, number: int) -> Change:
+        """Set the levels of a pheromone in cells other than rocks."""
+        yield
+        self.lay(cells[self.view("walls")[cells] == 0], level, number)
+
     def lay(self, cells: np.ndarray, level: int, number: int = 0) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
         stored = self.stored(number)
         stored[cells] = level + self.clock(number) if level else 0
 
-    def add(
-        self, cells: np.ndarray, nests: np.ndarray, heading: int | None = None
-    ) -> Iterator[None]:
+    def add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None = None) -> Change:
         """Put newborn ants of some nests on cells; see `Interventions.add_ants`."""
         colony, ground, rows = self.colony, self.view("ground"), self.rows
         free = ground[cells] == EMPTY
@@ -608,9 +593,7 @@ class _World:
         rows[WorldRow.NEXT_NUMBER] += n
         self._count_ants()
 
-    def add_some(
-        self, n: int, heading: int | None = None, nest: int | None = None
-    ) -> Iterator[None]:
+    def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> Change:
         """Put newborn ants on free cells in the order in which ants would start there."""
         colony, grid = self.colony, self.colony.grid
         free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
@@ -629,12 +612,18 @@ class _World:
         nests = np.resize(wanted, n)
         return self.add(_in_turn(orders, n), nests, heading)
 
-    def remove_some(self, n: int, nest: int | None = None) -> Iterator[None]:
+    def remove_some(self, n: int, nest: int | None = None) -> Change:
         """Remove n random ants."""
         yield
         slots = self.living_slots(nest)
         words = self.all.stream(self.w).bits(len(slots))
         self.remove(slots[np.argsort(words, kind="stable")[:n]])
+
+    def remove_on(self, cells: np.ndarray, nest: int | None) -> Change:
+        """Remove the ants on cells, or those of a nest."""
+        yield
+        slots = self.living_slots(nest)
+        self.remove(slots[np.isin(self.cells[slots], cells)])
 
     def remove(self, slots: np.ndarray) -> None:
         """Remove the ants in some slots."""
@@ -662,16 +651,13 @@ class _World:
         if n > room:
             raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
 
-    def set_ants(self, n: int) -> Iterator[None]:
+    def set_ants(self, n: int) -> Change:
         """Set the number of ants; see `Interventions.set_ants`."""
         self.check_room(n)
         more = n - len(self.living_slots())
-        return self.add_some(more) if more >= 0 else self._remove_last(-more)
-
-    def _remove_last(self, n: int) -> Iterator[None]:
-        """Remove the n ants with the highest numbers."""
-        yield
-        self.remove(self.living_slots()[-n:])
+        if more >= 0:
+            return self.add_some(more)
+        return self.remove_on(self.cells[self.living_slots()[more:]], None)
 
     def _change_food_sources(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
         """Add food sources for FOOD on cells, or remove the sources of cells with anything else.

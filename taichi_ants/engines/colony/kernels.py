@@ -189,16 +189,6 @@ class Variant:
 variant = cache(Variant)
 
 
-def begin_phases(v: Variant) -> Iterator[Phase]:
-    """Yield the phases at the start of an episode."""
-    yield Phase(ANTS, learning.begin)
-
-
-def intervention_phases(v: Variant) -> Iterator[Phase]:
-    """Yield the phases after an intervention, between two ticks."""
-    yield Phase(ANTS, learning.see_interventions)
-
-
 def tick_phases(v: Variant) -> Iterator[Phase]:
     """Yield the phases of a tick before rounds of `planning_phases` and the `last_phases`."""
     yield Phase(ANTS, steps.want)
@@ -287,21 +277,15 @@ def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
 
 
 @cache
-def loops(
-    v: Variant, phases_of: Callable[[Variant], Iterator[Phase]], arguments: Any
-) -> Callable[..., None]:
-    """Return a kernel of some phases, with a parallel loop over chunks or worlds for each group."""
-    groups = shared_out(phases_of(v))
+def once(v: Variant, what: Callable[..., None], arguments: Any) -> Callable[..., None]:
+    """Return a kernel of what all ants do between two ticks."""
+    phase = Phase(ANTS, what)
 
     @ti.kernel
     def advance_colony(c: arguments):
-        for loop in ti.static(groups):
-            ti.loop_config(block_dim=1)
-            for chunk in range(
-                c.n_worlds if ti.static(loop[0].of == WORLD) else c.n_worlds * c.n_chunks
-            ):
-                for phase in ti.static(loop):
-                    do(phase, c, v, chunk)
+        ti.loop_config(block_dim=1)
+        for chunk in range(c.n_worlds * c.n_chunks):
+            do(phase, c, v, chunk)
 
     return advance_colony
 

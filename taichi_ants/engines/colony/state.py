@@ -103,7 +103,7 @@ class ColonyState:
         fields: The further pheromones of the task by name, with or without evaporation.
         stored: The names of the arrays in a file.
         length: Length of the episode in ticks; 0 if unknown.
-        ready: bool (W,), whether an episode began in each world, and each change of it was completed.
+        ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
     """
@@ -215,7 +215,7 @@ class ColonyState:
 
     @property
     def ticks(self) -> int:
-        """The number of ticks since an episode started in all worlds, also after Ctrl-C."""
+        """The number of ticks since an episode started in all worlds."""
         return int(self.arrays["orders"][Order.PASSED])
 
     @ticks.setter

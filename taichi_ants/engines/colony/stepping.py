@@ -86,7 +86,7 @@ class Stepper:
             self._share_ticks(state, min(end - state.ticks, interval - state.ticks % interval))
 
     def launch(self, state: ColonyState, name: str) -> None:
-        """Launch a kernel by name: "ticks", or a group of phases in `kernels`."""
+        """Launch a kernel by name: "ticks", or what ants do once, a function of `learning`."""
         # The caller may have reset Taichi, or forked the process.
         runtime.check_on_cpu(runtime.start(), "colonies run")
         if name not in self._launches:
@@ -118,12 +118,12 @@ class Stepper:
     def _prepared(state: ColonyState, name: str) -> Any:
         """Return a kernel for repeated launches."""
         from taichi_ants.engines.arguments import Launch
-        from taichi_ants.engines.colony import kernels
+        from taichi_ants.engines.colony import kernels, learning
 
         variant = kernels.variant(features_of(state))
         if name == "ticks":
             return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))
-        return Launch(partial(kernels.loops, variant, getattr(kernels, name)))
+        return Launch(partial(kernels.once, variant, getattr(learning, name)))
 
 
 def features_of(state: ColonyState) -> Features:
