@@ -162,10 +162,9 @@ def quiet() -> Iterator[None]:
     """Return a context in which Taichi compiles and launches our kernels.
 
     It warns neither of numbers that kernels narrow on purpose, nor of long loops that are unrolled.
-    Numbers have 32 bits unless a kernel says otherwise, whatever the user's default types are.
-    Errors show their line without a mark of the place,
-    because marks for all expressions take half of the time in which Taichi loads a cached kernel.
-    Taichi reads the source of a function at each call of it in a kernel; here, once.
+    The default types are f32 and i32, not the user's. Errors show their line without a mark of the
+    place, because marks for all expressions take half of the time in which Taichi loads a cached
+    kernel. Taichi reads the source of a function at each call of it in a kernel; here, once.
     """
     import taichi as ti
     from taichi._lib import core

@@ -430,7 +430,7 @@ class _World:
         return np.argmin([grid.distances(queen)[cells] for queen in queens], axis=0)
 
     def put(self, cells: np.ndarray, what: int, kind: int = 0) -> Change:
-        """Make cells EMPTY, OBSTACLE or FOOD; see `Interventions.put`."""
+        """Return the change that makes cells EMPTY, OBSTACLE or FOOD; see `Interventions.put`."""
         held = self.view("ground")[cells]
         ants, to = self._aside(cells) if what != EMPTY else (cells[:0], cells[:0])
         at = self.cells[ants]
@@ -493,7 +493,7 @@ class _World:
         ground[at] = EMPTY
 
     def move(self, cell: int, to: int) -> Change:
-        """Move the content of a cell; see `Interventions.move`."""
+        """Return the change that moves the content of a cell; see `Interventions.move`."""
         what = int(self.view("ground")[cell])
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
             return iter([None])
@@ -502,7 +502,7 @@ class _World:
         return self._move(cell, to, what)
 
     def _move(self, cell: int, to: int, what: int) -> Change:
-        """Move rock or food."""
+        """Return the change that moves rock or food."""
         food, task = what == FOOD, self.colony.task
         kind = int(self.view("kind_of")[cell]) if food and self.colony.n_kinds > 1 else 0
         loads = int(self.view("loads")[cell]) if food and task.has_loads else None
@@ -521,7 +521,7 @@ class _World:
         return bool(self.view("ground")[cell] == EMPTY) or len(slots) > 0
 
     def move_queen(self, cell: int, nest: int) -> Change:
-        """Move a queen; see `Interventions.move_queen`."""
+        """Return the change that moves a queen; see `Interventions.move_queen`."""
         grid, ground = self.colony.grid, self.view("ground")
         if not self._can_be_free(cell):
             raise AntsError(
@@ -543,7 +543,7 @@ class _World:
         self._change_food_sources(np.array([cell]), QUEEN)
 
     def lay_in(self, cells: np.ndarray, level: int, number: int) -> Change:
-        """Set the levels of a pheromone in cells other than rocks."""
+        """Return the change that sets the levels of a pheromone in cells other than rocks."""
         yield
         self.lay(cells[self.view("walls")[cells] == 0], level, number)
 
@@ -553,7 +553,7 @@ class _World:
         stored[cells] = level + self.clock(number) if level else 0
 
     def add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None = None) -> Change:
-        """Put newborn ants of some nests on cells; see `Interventions.add_ants`."""
+        """Return the change that puts newborn ants of some nests on cells; see `add_ants`."""
         colony, ground, rows = self.colony, self.view("ground"), self.rows
         free = ground[cells] == EMPTY
         cells, nests = cells[free], nests[free]
@@ -594,7 +594,7 @@ class _World:
         self._count_ants()
 
     def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> Change:
-        """Put newborn ants on free cells in the order in which ants would start there."""
+        """Return the change that puts newborn ants on free cells, in the order of start cells."""
         colony, grid = self.colony, self.colony.grid
         free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
         if n > len(free):
@@ -613,14 +613,14 @@ class _World:
         return self.add(_in_turn(orders, n), nests, heading)
 
     def remove_some(self, n: int, nest: int | None = None) -> Change:
-        """Remove n random ants."""
+        """Return the change that removes n random ants."""
         yield
         slots = self.living_slots(nest)
         words = self.all.stream(self.w).bits(len(slots))
         self.remove(slots[np.argsort(words, kind="stable")[:n]])
 
     def remove_on(self, cells: np.ndarray, nest: int | None) -> Change:
-        """Remove the ants on cells, or those of a nest."""
+        """Return the change that removes the ants on cells, or those of a nest."""
         yield
         slots = self.living_slots(nest)
         self.remove(slots[np.isin(self.cells[slots], cells)])
@@ -652,7 +652,7 @@ class _World:
             raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
 
     def set_ants(self, n: int) -> Change:
-        """Set the number of ants; see `Interventions.set_ants`."""
+        """Return the change that sets the number of ants; see `Interventions.set_ants`."""
         self.check_room(n)
         more = n - len(self.living_slots())
         if more >= 0:
