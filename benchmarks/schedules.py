@@ -17,15 +17,14 @@ from taichi_ants.engines.colony import stepping
 from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
 
 SIZES = ((64, 1), (1000, 1), (10_000, 1), (100_000, 1), (64, 256), (1000, 64), (20_000, 8))
-# By way: the schedule; threads that share a tick, 0 for all; whether they use a barrier. Threads
-# take worlds that are far apart in memory, except in the second way.
+# By way: the schedule; threads that share a tick, 0 for all. Threads take worlds that are far apart
+# in memory, except in the second way.
 NEIGHBOURS = "by world, neighbours"
 WAYS = {
-    "by world": ("by_world", 0, True),
-    NEIGHBOURS: ("by_world", 0, True),
-    "by chunk, one thread": ("by_chunk", 1, True),
-    "by chunk, barrier": ("by_chunk", 0, True),
-    "by chunk, loops": ("by_chunk", 0, False),
+    "by world": ("by_world", 0),
+    NEIGHBOURS: ("by_world", 0),
+    "by chunk, one thread": ("by_chunk", 1),
+    "by chunk, barrier": ("by_chunk", 0),
 }
 lanes_for = stepping.lanes_for
 _STEPS = 2_000_000  # of ants, in one measurement
@@ -43,12 +42,11 @@ def colony_of(ants: int, n_worlds: int, schedule: str) -> Colony:
 
 def pace(colony: Colony, way: str) -> float:
     """Return million steps of ants per second."""
-    _, threads, barrier = WAYS[way]
+    _, threads = WAYS[way]
     stepping.ThreadChoice.plan = lambda choice, ticks, most: (ticks, threads or most)
-    stepping._has_barrier = lambda running: barrier
     stepping.lanes_for = (lambda n_worlds: 1) if way == NEIGHBOURS else lanes_for
     steps = colony.ants * len(colony.seeds)
-    most = 100 if way.endswith(("barrier", "loops")) else 10_000  # threads can wait long
+    most = 100 if way.endswith("barrier") else 10_000  # threads can wait long
     ticks = max(2, min(most, _STEPS // steps))
     began = time.perf_counter()
     colony.tick(ticks)

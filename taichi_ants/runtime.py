@@ -23,6 +23,7 @@ from typing import Any
 
 from taichi_ants.environment import fallback_folder, is_writable_folder
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
+from taichi_ants.subnormals import Flushing
 
 ARCHITECTURES = ("cpu", "cuda")
 MAX_THREADS = 1024
@@ -107,6 +108,12 @@ def start(threads: int | None = None, arch: str | None = None) -> Runtime:
     return wanted
 
 
+def check_on_cpu(running: Runtime, what: str) -> None:
+    """Raise AntsError if Taichi runs on a GPU, for kernels with too many arguments for one."""
+    if running.arch != "cpu":
+        raise AntsError(f"arch is {running.arch!r}, but {what} only on the CPU; use arch='cpu'.")
+
+
 def refresh() -> None:
     """Save compiled kernels, and read those of other processes at the next start.
 
@@ -152,13 +159,14 @@ def holds_data() -> bool:
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Return a context in which Taichi compiles our kernels without warnings.
+    """Return a context in which Taichi compiles and launches our kernels.
 
-    Our kernels narrow numbers on purpose. Errors show their line without a mark of the place,
-    because marks for all expressions take half of the time in which Taichi loads a cached kernel.
-    Taichi reads the source of a function at each call of it in a kernel; here, once. It warns of
-    long loops that are unrolled.
+    It warns neither of numbers that kernels narrow on purpose, nor of long loops that are unrolled.
+    The default types are f32 and i32, not the user's. Errors show their line without a mark of the
+    place, because marks for all expressions take half of the time in which Taichi loads a cached
+    kernel. Taichi reads the source of a function at each call of it in a kernel; here, once.
     """
+    import taichi as ti
     from taichi._lib import core
     from taichi.lang import kernel_impl
     from taichi.lang.ast.ast_transformer_utils import ASTTransformerContext as Context
@@ -169,11 +177,17 @@ def quiet() -> Iterator[None]:
     marked, Context.get_pos_info = Context.get_pos_info, _line_of
     reads = kernel_impl.getsourcelines, kernel_impl.textwrap
     kernel_impl.getsourcelines, kernel_impl.textwrap = _source_lines, _Textwrap
+    running, config = ti.lang.impl.get_runtime(), ti.lang.impl.current_cfg()
+    types = running.default_fp, running.default_ip  # those of `config` would be references
     try:
-        with warnings.catch_warnings():
+        for one in (running, config):
+            one.default_fp, one.default_ip = ti.f32, ti.i32
+        with Flushing(), warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)
             yield
     finally:
+        for one in (running, config):
+            one.default_fp, one.default_ip = types
         Context.get_pos_info = marked
         kernel_impl.getsourcelines, kernel_impl.textwrap = reads
         core.set_logging_level(before)
@@ -228,14 +242,17 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
         "cpu_max_num_threads": wanted.threads,
         "make_cpu_multithreading_loop": False,  # distribute runs one by one, as they are uneven
         "cfg_optimization": False,  # takes half of the time to compile, and LLVM does it as well
-        "offline_cache_file_path": str(cache_folder()),
+        "default_fp": ti.f32,
+        "default_ip": ti.i32,
+        "offline_cache_file_path": _in_utf8(str(cache_folder())),
         **others,
     }
     arch = ti.cuda if wanted.arch == "cuda" else ti.cpu
     # These environment variables would change the settings, or make Taichi warn.
     names = [f"TI_{name.upper()}" for name in ("arch", "log_level", *settings)]
+    _in_utf8(os.environ.get("XDG_CACHE_HOME") or os.environ["HOME"])  # of Taichi's usual cache
     hidden = {name: os.environ.pop(name) for name in names if name in os.environ}
-    with contextlib.redirect_stdout(io.StringIO()):
+    with contextlib.redirect_stdout(io.StringIO()), Flushing():
         try:
             ti.init(arch=arch, log_level=ti.ERROR, **settings)
         finally:
@@ -244,6 +261,16 @@ def _init(ti: ModuleType, wanted: Runtime, **others: object) -> None:
     if wanted.arch == "cuda" and ti.lang.impl.current_cfg().arch != ti.cuda:
         ti.reset()
         raise AntsError("arch is 'cuda', but no CUDA device is usable here; choose 'cpu'.")
+
+
+def _in_utf8(folder: str) -> str:
+    """Return the folder; AntsError if Taichi cannot read its name."""
+    if os.fsencode(folder).decode(errors="replace") != folder:
+        raise AntsError(
+            f"the folder {folder!r} for kernels has a name that is not UTF-8, which Taichi cannot "
+            "read; set XDG_CACHE_HOME or TI_OFFLINE_CACHE_FILE_PATH to another folder."
+        )
+    return folder
 
 
 def cache_folder() -> Path:

@@ -457,6 +457,8 @@ def _read(cls: Any) -> Iterator[Setting]:
     hints = get_type_hints(cls, include_extras=True)
     for name, default in _defaults(cls):
         hint = hints.get(name)
+        if get_origin(hint) is Union:  # Python 3.10 makes arguments with the default None optional
+            hint = get_args(hint)[0]
         if get_origin(hint) is not Annotated:
             continue
         kind, *rules = get_args(hint)

@@ -92,6 +92,8 @@ assert dict(os.environ) == before
         TI_FAST_MATH="1",
         TI_LOG_LEVEL="debug",
         TI_CPU_MAX_NUM_THREADS="17",
+        TI_DEFAULT_FP="64",
+        TI_DEFAULT_IP="64",
         TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path / "chosen"),
         XDG_CACHE_HOME=str(tmp_path / "kernels"),
     )
@@ -153,8 +155,11 @@ refused("destroy all fields and arrays")
 ti.reset()
 assert same()
 
-init(default_fp=ti.f64)
-assert same()
+for types in ({"default_fp": ti.f64}, {"default_fp": ti.f16}, {"default_ip": ti.i64}):
+    init(offline_cache=False, **types)
+    assert same()
+    for now in (ti.lang.impl.current_cfg(), ti.lang.impl.get_runtime()):
+        assert all(getattr(now, name) == one for name, one in types.items())  # still the caller's
 """
     python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
 
@@ -494,3 +499,44 @@ assert "^" in complaint()
 """
     )
     python("import runpy; runpy.run_path('wrong.py')", tmp_path)
+
+
+def test_kernels_flush_subnormal_numbers_but_their_caller_does_not(tmp_path):
+    """Serial kernels, which the calling thread computes, and parallel ones."""
+    script = """
+import platform
+tiny = sys.float_info.min
+trained()
+
+import taichi as ti
+from taichi_ants.engines.arguments import Launch
+
+assert tiny / 2 > 0.0 and np.float64(tiny) / 2 > 0.0
+
+def halves(serial, arguments):
+    @ti.kernel
+    def halve(a: arguments):
+        ti.loop_config(serialize=serial)
+        for i in range(4):
+            a.numbers[i] = a.numbers[i] * 0.5
+    return halve
+
+for serial in (True, False):
+    numbers = np.full(4, tiny)
+    Launch(lambda arguments: halves(serial, arguments))({"numbers": numbers})
+    if platform.machine() == "x86_64":
+        assert not numbers.any()
+    assert tiny / 2 > 0.0
+"""
+    script_file = tmp_path / "halves.py"  # Taichi reads the source of kernels
+    script_file.write_text(BEGINNING + script, encoding="utf-8")
+    python(f"import runpy; runpy.run_path({str(script_file)!r})", tmp_path)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@pytest.mark.parametrize("name", ["XDG_CACHE_HOME", "TI_OFFLINE_CACHE_FILE_PATH"])
+def test_a_cache_folder_that_is_not_utf8_is_refused(tmp_path, name):
+    folder = os.fsencode(tmp_path) + b"/caf\xe9"
+    os.mkdir(folder)
+    script = BEGINNING + 'refused("not UTF-8, which Taichi cannot read; set XDG_CACHE_HOME or ")'
+    python(script, tmp_path, **{name: os.fsdecode(folder)})

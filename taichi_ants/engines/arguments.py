@@ -14,6 +14,7 @@ from taichi.lang.argpack import ArgPack
 from taichi.types import ndarray_type
 
 from taichi_ants import runtime
+from taichi_ants.subnormals import Flushing
 
 
 class Launch:
@@ -35,6 +36,7 @@ class Launch:
         self._context: Any
         self._pack: Any
         self._known: dict[str, Any] = {}  # the present values of the pack and the context
+        self._flushing = Flushing()
 
     def __call__(self, values: Mapping[str, Any]) -> None:
         """Launch with these values; names and types are always the same, arrays C-contiguous."""
@@ -47,7 +49,8 @@ class Launch:
         if self._compiled is None:
             self._kernel(self._pack)
         else:
-            ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
+            with self._flushing:
+                ti.lang.impl.get_runtime().prog.launch_kernel(self._compiled, self._context)
 
     def _prepare(self, values: Mapping[str, Any]) -> None:
         """Compile the kernel and make its pack, as Taichi does at a launch."""

@@ -81,17 +81,16 @@ class ColonyWorlds(Ants):
         self.events = np.where(which[:, None], Event.NONE, self.events)
 
     def step(self, actions: np.ndarray) -> None:
-        """Take the actions of all ants, integers 0 to 4; stopped worlds do not change."""
+        """Take the actions of all ants, integers 0 to 4; worlds at their end do not change."""
         colony = self.colony
+        colony.stop(self.over())
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
         events = np.where(self.acted, colony.events, Event.NONE)
         self.rewards = np.where(self.acted, colony.rewards, 0).astype(np.float64)
         self.events = events.astype(np.int64)
 
-    @property
-    def ended(self) -> np.ndarray:
-        """Whether the episode of each world has had its last step, bool (W,)."""
+    def over(self) -> np.ndarray:
         return self.colony.episode_ticks >= self.max_steps
 
     def advance(
@@ -108,17 +107,16 @@ class ColonyWorlds(Ants):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Take a step, and return its rewards, terminations and truncations, (n,)."""
         self.step(actions.reshape(self.acted.shape))
-        truncated = np.repeat(self.ended & ~waiting, self.colony.capacity)
+        truncated = np.repeat(self.over() & ~waiting, self.colony.capacity)
         terminated = (self.events.reshape(-1) == Event.DELIVERED) & (
             self.task.delivery == "terminates"
         )
         return self.rewards.reshape(-1), terminated, truncated
 
     def _renew(self, truncated: np.ndarray, mode: AutoresetMode, waiting: np.ndarray) -> None:
-        """Stop or begin worlds after a step, as the mode says."""
-        begins = ended = truncated.reshape(self.acted.shape)[:, 0]
+        """Begin worlds after a step, as the mode says."""
+        begins = truncated.reshape(self.acted.shape)[:, 0]
         if mode is not AutoresetMode.SAME_STEP:
-            self.colony.stop(ended)
             begins = waiting & (mode is AutoresetMode.NEXT_STEP)
         if begins.any():
             self.begin(begins)

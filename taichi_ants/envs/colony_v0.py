@@ -158,10 +158,8 @@ class HexColonyParallelEnv(ParallelEnv):
         given = np.zeros((1, worlds.colony.capacity), np.int64)
         given[0, slots] = [self._action(actions, name) for name in acting]
         worlds.step(given)
-        living, ended = worlds.colony.living[0], bool(worlds.ended[0])
-        if ended:
-            worlds.colony.stop(worlds.ended)
-        born = np.flatnonzero(living & ~worlds.acted[0] & (not ended)).tolist()
+        living, ended = worlds.colony.living[0], bool(worlds.over()[0])
+        born = np.setdiff1d(np.flatnonzero(living & (not ended)), slots).tolist()
         told, seen = acting + self._names(born), slots + born
         observations, infos = self._told(told, seen)
         rewards = dict(zip(told, worlds.rewards[0, seen].tolist(), strict=True))

@@ -100,6 +100,10 @@ class LoneAnts(Ants):
         np.not_equal(into.events & TRUNCATED, 0, out=into.truncated)
         np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
 
+    def over(self) -> np.ndarray:
+        arrays = self.batched.arrays
+        return (arrays["terminations"] | arrays["truncations"]) != 0
+
     def states(self) -> np.ndarray:
         return self.batched.arrays["states"]
 
@@ -133,8 +137,7 @@ class LoneAnts(Ants):
 
 def _text_of(now: Snapshot) -> str:
     """Return a text map, see `worlds.text_map`; the heading of the ant marks its cell."""
-    ground = np.where(now.grid.exists, now.ground, -1)
-    where = [(ground == kind, mark) for kind, mark in _GROUNDS.items()]
+    where = [(now.grid.exists & (now.ground == kind), mark) for kind, mark in _GROUNDS.items()]
     where.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
     marks = [(now.grid.cells(np.flatnonzero(cells)), mark) for cells, mark in where]
     on_trail = now.trail[now.ant_cells[0]] > 0
@@ -199,7 +202,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         self._ants = LoneAnts(1, task, delivery, given)
         self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
-        self._over, self._begun = True, False
+        self._begun = False
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -212,7 +215,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         if seed is None and not self._begun:
             seed = int(self.np_random.integers(2**63))
         self._ants.begin(np.ones(1, bool), [seed])
-        self._over, self._begun = False, True
+        self._begun = True
         return self._seen()
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -232,9 +235,12 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         self._ants.batched.step(action)
         arrays = self._arrays
         terminated, truncated = bool(arrays["terminations"][0]), bool(arrays["truncations"][0])
-        self._over = terminated or truncated
         observation, info = self._seen()
         return observation, float(arrays["rewards_of"][0]), terminated, truncated, info
+
+    @property
+    def _over(self) -> bool:
+        return not self._begun or bool(self._ants.over()[0])
 
     def _seen(self) -> tuple[Any, dict[str, Any]]:
         arrays = self._arrays

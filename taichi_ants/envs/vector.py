@@ -127,6 +127,10 @@ class Ants(ABC):
         """
 
     @abstractmethod
+    def over(self) -> np.ndarray:
+        """Return whether the last step ended the episode of each world, bool (W,)."""
+
+    @abstractmethod
     def states(self) -> np.ndarray:
         """Return the present state of each ant, integers (n,)."""
 
@@ -212,8 +216,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.single_action_space = Discrete(N_ACTIONS)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._over: np.ndarray | None = None  # worlds at an episode's end; None before any reset
-        self._all = np.ones(num_envs, bool)
+        self._begun, self._all = False, np.ones(num_envs, bool)
 
     def reset(
         self,
@@ -240,11 +243,11 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         which = mask.reshape(self._n_worlds, -1)[:, 0]
         super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
         seeds = seeds_of(seed, self._n_worlds)
-        if self._over is None:
+        if not self._begun:
             drawn = self.np_random.integers(2**63, size=self._n_worlds).tolist()
             seeds = [a if b is None else b for a, b in zip(drawn, seeds, strict=True)]
         self._ants.begin(which, seeds)
-        self._over = np.zeros_like(which) if self._over is None else self._over & ~which
+        self._begun = True
         facts = self._ants.facts()
         return self._ants.shown.show(facts["state"]), self._infos(facts, mask)
 
@@ -263,7 +266,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         by_world = mask.reshape(self._n_worlds, -1)
         if (by_world.any(axis=1) != by_world.all(axis=1)).any():
             raise ValueError("reset_mask has only some ants of a world; give all or none of them.")
-        if self._over is None and not mask.all():
+        if not self._begun and not mask.all():
             raise ResetNeeded("no episode has begun; call reset() without a reset_mask first.")
         return mask
 
@@ -284,9 +287,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         rewards, terminated, truncated = ants.advance(given, mode, waiting)
         over, final = terminated | truncated, {}
         facts = ants.facts()
-        if mode is not AutoresetMode.SAME_STEP:
-            self._over = over.reshape(self._n_worlds, -1)[:, 0]
-        elif over.any():
+        if mode is AutoresetMode.SAME_STEP and over.any():
             last = ants.facts(last=True)
             seen = np.full(self.num_envs, None, dtype=object)
             seen[over] = np.fromiter(ants.shown.show(last["state"][over]), dtype=object)
@@ -299,15 +300,23 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
 
     def _waiting(self, method: str) -> np.ndarray:
         """Return the worlds at an episode's end; ResetNeeded if the method needs a reset before."""
-        if self._over is None:
+        if not self._begun:
             raise ResetNeeded(f"no episode has begun; call reset() before {method}().")
-        if self.autoreset_mode is AutoresetMode.DISABLED and self._over.any():
-            number = self._over.argmax() * (self.num_envs // self._n_worlds)
+        over = self._over
+        if self.autoreset_mode is AutoresetMode.DISABLED and over.any():
+            number = over.argmax() * (self.num_envs // self._n_worlds)
             raise ResetNeeded(
                 f"the episode of environment {number} has ended; call reset() with "
                 f'options={{"reset_mask": ...}} before {method}().'
             )
-        return self._over
+        return over
+
+    @property
+    def _over(self) -> np.ndarray:
+        """Whether the episode of each world has ended, and the next one not begun, bool (W,)."""
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            return np.zeros(self._n_worlds, bool)
+        return self._ants.over()
 
     def rollout(
         self,
@@ -364,8 +373,6 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         over = into.terminated | into.truncated
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             return into._replace(final_observations=ants.shown.show(finals[over]))
-        rows = over.reshape(length, self._n_worlds, -1)[:, :, 0]
-        self._over = rows[-1] if self.autoreset_mode is AutoresetMode.NEXT_STEP else rows.any(0)
         return into._replace(final_observations=into.observations[1:][over])
 
     def _infos(self, facts: dict[str, np.ndarray], have: np.ndarray) -> dict[str, Any]:
@@ -380,7 +387,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         """Return a picture or a text map of each world, by `render_mode`, or None."""
         if self.render_mode is None:
             return None
-        if self._over is None:
+        if not self._begun:
             raise ResetNeeded("no episode has begun; call reset() before render().")
         return tuple(map(self._ants.draw, range(self._n_worlds)))
 

@@ -192,7 +192,7 @@ class ResultFolder:
         try:
             if replace:
                 self._clear()
-            elif not manifest_in(self._unfinished) and any(self._blocks.rglob("*.npz")):
+            elif not manifest_in(self._unfinished) and self._has_blocks():
                 shutil.rmtree(self._blocks)  # the settings of the blocks are unknown
             for folder in (self._blocks, self._ready):
                 files.check_writable_folder(folder, self.path)
@@ -217,7 +217,7 @@ class ResultFolder:
                     ) from error
         finally:
             # Another process can have begun the same work.
-            if not any(self._blocks.rglob("*.npz")) and not any(self._ready.glob("*")):
+            if not self._has_blocks() and not (self._ready.is_dir() and any(self._ready.iterdir())):
                 self._clear()
             for folder in new:
                 with suppress(OSError, ValueError):  # it is not empty, or was never created
@@ -264,6 +264,9 @@ class ResultFolder:
         """Remove the files that a process left if it was killed after it had finished the work."""
         if not manifest_in(self._unfinished):
             self._clear()
+
+    def _has_blocks(self) -> bool:
+        return self._blocks.is_dir() and any(self._blocks.rglob("*.npz"))
 
     def _clear(self) -> None:
         """Remove the files of this class in `unfinished`, and the folder if it is then empty."""

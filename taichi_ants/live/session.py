@@ -121,8 +121,6 @@ class Session:
 
     Attributes:
         colony: The colony; only the session may advance it.
-        ticks: The number of ticks in all episodes.
-        steps: The number of ticks, plus the number of episodes that began after one had ended.
         edits: (steps, edit) of each edit, in order.
         changes: The index in `edits` of the first edit of each change; a stroke is one change.
     """
@@ -131,10 +129,9 @@ class Session:
         expect("setup", setup, Setup)
         self.setup, self.colony = setup, setup.build_colony()
         self.interventions = Interventions(self.colony)
-        self.ticks = self.steps = 0
         self.edits: list[tuple[int, edits.Edit]] = []
         self.changes: list[int] = []
-        self._cells = 0  # cells in all edits
+        self._cells = self._episodes = 0  # in all edits: cells, and episodes that they begin
         self._snapshots: list[_Snapshot] = []
         self._spent = 0.0  # seconds of simulation so far
         self.interventions.length = self._length
@@ -150,6 +147,16 @@ class Session:
     @property
     def _length(self) -> int | None:
         return self.setup.ticks_per_episode or None
+
+    @property
+    def ticks(self) -> int:
+        """The number of ticks in all episodes."""
+        return self._recorder.progress.ticks
+
+    @property
+    def steps(self) -> int:
+        """The number of ticks, plus the number of episodes that began after one had ended."""
+        return self.ticks + self.colony.episode - self._episodes
 
     @property
     def ended(self) -> bool:
@@ -195,17 +202,14 @@ class Session:
         if self.ended:
             progress.note(ended=True)
             self.interventions.begin_episode()
-            self.steps += 1
             return None
         n = min(n, self._length - self.colony.ticks if self._length else n)
         if self.ticks + n > MOST_TICKS:
             raise AntsError(f"a session has at most {MOST_TICKS} ticks; begin another one.")
-        before, began = self.colony.ticks, time.perf_counter()
+        began = time.perf_counter()
         try:
             frame = tick(n)
         finally:  # also after an interrupt
-            self.ticks += self.colony.ticks - before
-            self.steps += self.colony.ticks - before
             self._spent += time.perf_counter() - began
         progress.note()
         return frame
@@ -230,11 +234,19 @@ class Session:
         began = time.perf_counter()
         if "episode" in plain:
             self._recorder.progress.note(ended=True)
-        one.apply(self.interventions)
+        known = len(self.edits), len(self.changes), self._cells, self._episodes
+        # Recorded first, because Ctrl-C during a launch raises an error after it.
         if begins:
             self.changes.append(len(self.edits))
         self.edits.append((self.steps, plain))
         self._cells += cells_of(plain)
+        self._episodes += "episode" in plain
+        try:
+            one.apply(self.interventions)
+        except AntsError:
+            del self.edits[known[0] :], self.changes[known[1] :]
+            self._cells, self._episodes = known[2:]
+            raise
         self._spent += time.perf_counter() - began
 
     def _take_snapshot(self) -> None:

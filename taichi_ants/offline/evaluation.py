@@ -95,9 +95,10 @@ def importance_sampling(
     sums = np.empty((3, len(times), longest + 1))
 
     def estimated(policy: np.ndarray) -> tuple[np.ndarray, float]:
-        weigh(weights, begins, policy[data.state, data.action] / data.behaviour_probability)
         sums[:] = 0.0
-        add_up(*sums, estimates, begins, data.reward, weights, times, int(weighted), discount)
+        with runtime.quiet():
+            weigh(weights, begins, policy[data.state, data.action] / data.behaviour_probability)
+            add_up(*sums, estimates, begins, data.reward, weights, times, int(weighted), discount)
         whole = weights[begins[1:] - 1]
         squares = np.square(whole).sum()
         return estimates, whole.sum() ** 2 / squares if squares > 0 else 0.0

@@ -53,7 +53,8 @@ def batch_q_learning(
 
     rows = (data.state, data.action, data.reward, data.next_state, data.terminated.view(np.uint8))
     for _ in range(sweeps):  # one launch per sweep, because a launch cannot be interrupted
-        replay(q.reshape(-1), groups, *rows, data.task.n_states, *rates)
+        with runtime.quiet():
+            replay(q.reshape(-1), groups, *rows, data.task.n_states, *rates)
     return q if by_run else q[0]
 
 
@@ -211,7 +212,8 @@ class EmpiricalModel:
         after = np.append(self.successors, np.int32(0)), np.append(self.probabilities, 0.0)
         numbers = self.n_states, discount, lowest, tolerance(self.largest, discount, initial_q)
         model = self.groups, self.pairs, rewards, self.begins, *after
-        iterate(*tables, int(policy is None), *model, *numbers)
+        with runtime.quiet():
+            iterate(*tables, int(policy is None), *model, *numbers)
         return q
 
 

@@ -239,7 +239,9 @@ class Rasteriser:
         frame = self._page.copy()
         if hexagon < _DOTS_BELOW:
             layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
-            kernels().draw_small_cells(frame, of_cells, *layout)
+            draw = kernels().draw_small_cells
+            with runtime.quiet():
+                draw(frame, of_cells, *layout)
             return frame
         # The lines between cells vanish in small cells, and are at most 3 pixels wide.
         line = min(max(0.09 * hexagon - 0.25, 0.0), 3.0)

@@ -112,7 +112,8 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("--plugin", metavar="FILE", help=PLUGIN)
     add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
-    arch = "processor of the simulation: cpu, or cuda for an NVIDIA GPU"
+    arch = "processor of the simulation: cpu, or cuda for an NVIDIA GPU (runs of lone ants only, "
+    arch += "with other last bits)"
     add("--arch", choices=("cpu", "cuda"), default="cpu", help=arch)
 
 

@@ -36,7 +36,8 @@ class Progress:
 
     def __init__(self, colony: Colony, world: int) -> None:
         self._colony, self._world, self._first = colony, world, colony.episode
-        self._before = 0  # ticks of the episodes that have ended
+        # The ticks of all episodes until the last end that was noted, and the number of that one.
+        self._before, self._ended = 0, -1
         # For points within the first episode, and at ends of episodes: the points, the interval at
         # which points are stored, and the number of points so far.
         self._kept: tuple[list[Point], list[Point]] = ([], [])
@@ -46,7 +47,8 @@ class Progress:
     @property
     def ticks(self) -> int:
         """The number of ticks in all episodes."""
-        return self._before + self._colony.ticks
+        present = self._colony.ticks * (self._colony.episode != self._ended)
+        return self._before + present
 
     def note(self, ended: bool = False) -> None:
         """Add a point for the present; call it with `ended` before another episode begins."""
@@ -65,7 +67,7 @@ class Progress:
             del kept[1::2]
             self._every[ended] *= 2
         if ended:
-            self._before = self.ticks
+            self._before, self._ended = numbers[1], colony.episode
 
     def news(self) -> list[Point]:
         """Return the points of the curves that were added since the last call."""

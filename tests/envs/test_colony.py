@@ -148,12 +148,12 @@ def test_worlds_that_are_stopped_stand_still_until_they_begin_again():
     worlds.step(actions)
     assert worlds.colony.snapshot(0) == before
     assert worlds.acted.tolist() == [[False] * 5, [True] * 5]
-    assert worlds.ended.tolist() == [False, False]
+    assert worlds.over().tolist() == [False, False]
     worlds.step(actions)
-    assert worlds.ended.tolist() == [False, True]
+    assert worlds.over().tolist() == [False, True]
     worlds.begin(np.array([True, False]))
     worlds.step(actions)
-    assert worlds.acted.all()
+    assert worlds.acted.tolist() == [[True] * 5, [False] * 5]  # the other one is at its end
 
 
 def test_evaporation_is_that_of_training_unless_it_is_given():

@@ -194,7 +194,7 @@ def test_an_array_that_is_larger_than_it_declares_is_refused(tmp_path: Path) -> 
     path = tmp_path / "a.npz"
     np.savez_compressed(path, x=np.zeros(10**6))
     content = path.read_bytes()
-    assert content.count((8_000_128).to_bytes(4, "little")) == 2
+    assert content.count((8_000_128).to_bytes(4, "little")) >= 2  # one more with Python 3.10
     path.write_bytes(content.replace((8_000_128).to_bytes(4, "little"), bytes([0, 2, 0, 0])))
     with pytest.raises(AntsError, match="damaged"):
         archives.read(path, foreign=True)

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from command_lines import ROOT, environment
+from interrupts import interrupted_after_launch
 from playback import played, unpack, unpacked
 from random_edits import random_edit
 
@@ -744,3 +745,25 @@ def test_a_long_progress_is_thinned(monkeypatch):
     ends = [point for point in session._recorder.progress.points() if point[-1]]
     assert 4 <= len(ends) <= 8
     assert len({b[0] - a[0] for a, b in pairwise(ends)}) == 1
+
+
+def test_a_session_that_was_interrupted_after_a_launch_replays():
+    """While it ticks, between two episodes, and in an edit, which it refuses to go on from."""
+    session = Session(replace(GATED, ticks_per_episode=20))
+    session.leap(3)
+    with interrupted_after_launch():
+        session.leap(5)
+    assert session.ticks == session.colony.ticks > 3
+    session.leap(20 - session.ticks)
+    assert session.ended
+    with interrupted_after_launch():
+        session.advance()
+    session.apply({"episode": {}})
+    session.apply({"epsilon": 0.5})
+    session.leap(4)
+    *_, same = Session.replay(session.log())
+    assert same.steps == session.steps
+    with interrupted_after_launch():
+        session.apply({"place": {"what": "food", "cells": [(1, 1, 0)]}})
+    with pytest.raises(AntsError, match="an intervention was interrupted"):
+        session.leap(1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from taichi_ants import checks
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import WorldRow
-from taichi_ants.engines.colony.state import ColonyState, checked_worlds
+from taichi_ants.engines.colony.state import ALL, ColonyState, Which, checked_worlds
 from taichi_ants.engines.colony.stepping import Stepper
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown
@@ -76,13 +77,24 @@ class Colony(ColonyState):
             AntsError: A world is not allowed.
         """
         others = None if world is None else checked_worlds(world, len(self.seeds), self.learns)
-        self.length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
+        length = 0 if length is None else checked_whole("length", length, most=MAX_STEPS)
         if others is not None:
-            self.delivered += self.deliveries
-            self.lay_out(others)
-        self.ticks = 0
-        self.begin()
-        self._stepper.launch(self, "begin_phases")
+            fresh = copy.copy(self)  # the worlds may have too little room
+            fresh.arrays = {**self.arrays}
+            fresh.lay_out(others)
+        self.ready[:] = False  # also after Ctrl-C before the end
+        if others is not None:
+            self.count_deliveries()
+            vars(self).update(vars(fresh))
+        self.length, self.ticks = length, 0
+        self._start()
+
+    def _start(self, which: Which = ALL) -> None:
+        """Reset some worlds, and let their ants observe."""
+        self.ready[which] = False
+        self.begin(which)
+        self._stepper.launch(self, "begin")
+        self.ready[which] = True
 
     def begin_some(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
         """Start the next episode of some worlds, bool (W,), while the others continue.
@@ -113,19 +125,22 @@ class Colony(ColonyState):
                     f"there are {count(len(checked), 'seed')} for {count(n, 'world')}; give "
                     f"{count(n, 'seed')}."
                 )
+            self.ready[which] = False
             self.reseed(which, checked)
-        self.begin(which)
-        self._stepper.launch(self, "begin_phases")
+        self._start(which)
 
     def observe(self, worlds: Sequence[int] | None = None) -> None:
         """Let the ants of some or all worlds observe again, after interventions in these worlds."""
-        self.check_begun()
+        if self.episode < 0:
+            self.check_begun()
         row = self.arrays["worlds"][WorldRow.RUNNING]
         running = row.copy()
         if worlds is not None:
             row[np.setdiff1d(np.arange(len(row)), worlds)] = 0  # ants that misread draw numbers
-        self._stepper.launch(self, "intervention_phases")
-        row[:] = running
+        try:
+            self._stepper.launch(self, "see_interventions")
+        finally:
+            row[:] = running
 
     def tick(self, n: int = 1) -> None:
         """Advance by n ticks, except worlds whose episode has ended."""
@@ -171,8 +186,9 @@ class Colony(ColonyState):
         """End the episode: save random streams for the next one, and decay epsilon and the rate."""
         self.check_finite()
         self.keep_streams()
-        self.epsilon = self.training.next_epsilon(self.epsilon)
-        self.learning_rate = self.training.next_learning_rate(self.learning_rate)
+        epsilon = self.training.next_epsilon(self.epsilon)
+        learning_rate = self.training.next_learning_rate(self.learning_rate)
+        self.epsilon, self.learning_rate = epsilon, learning_rate
 
     def run(
         self,

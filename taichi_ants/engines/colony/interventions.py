@@ -20,7 +20,7 @@ With a nest given, m counts the ants of that nest.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
 
 Cells = np.ndarray | str  # flat indices (n,), or the name of a region
+Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
 
 
@@ -77,7 +78,7 @@ class Interventions:
     Cells are flat indices, int (n,), without duplicates, or the name of a region, see `index`. A
     cell on which something
     cannot be placed, because an ant, a rock or the queen is on it, does not change. A method that
-    raises an error changes nothing, except worlds before the one with the error.
+    raises an error changes nothing in any world.
 
     Args:
         worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
@@ -148,9 +149,7 @@ class Interventions:
         all loads. Each new food item gets a food source: it grows back, and wanders with adjacent
         food. AntsError if later episodes would have no room for the ants, or no food to learn from.
         """
-        for one in self._each():
-            one.put(one.index(cells), what, kind)
-        self.colony.observe(self.worlds)
+        self._change(lambda one: one.put(one.index(cells), what, kind))
 
     def move_queen(self, cell: int, nest: int = 0) -> None:
         """Move the queen of a nest to a cell without rock or food; an ant there moves aside.
@@ -158,26 +157,19 @@ class Interventions:
         AntsError if the cell is not free, or there is no such nest.
         """
         self._check_nest(nest)
-        for one in self._each():
-            one.move_queen(cell, nest)
-        self.colony.observe(self.worlds)
+        self._change(lambda one: one.move_queen(cell, nest))
 
     def move(self, cell: int, to: int) -> None:
         """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
 
         Has no effect if the first cell has none of them, or the other one is not free.
         """
-        for one in self._each():
-            one.move(cell, to)
-        self.colony.observe(self.worlds)
+        self._change(lambda one: one.move(cell, to))
 
     def lay_trail(self, cells: Cells, level: int, field: str = TRAIL) -> None:
         """Set the trail, or a further field, of cells other than rocks."""
         number = [TRAIL, *self.colony.fields].index(field)
-        for one in self._each():
-            places = one.index(cells)
-            one.lay(places[one.view("walls")[places] == 0], level, number)
-        self.colony.observe(self.worlds)
+        self._change(lambda one: one.lay_in(one.index(cells), level, number))
 
     def add_ants(self, cells: Cells, heading: int | None = None, nest: int | None = None) -> None:
         """Put newborn ants on those of the cells that are empty, with random headings by default.
@@ -186,11 +178,13 @@ class Interventions:
         colony is too small, or there is no such nest.
         """
         self._check_nest(nest)
-        for one in self._each():
+
+        def add(one: _World) -> Change:
             places = one.index(cells)
             nests = one.nearest_nests(places) if nest is None else np.full(len(places), nest)
-            one.add(places, nests, heading)
-        self.colony.observe(self.worlds)
+            return one.add(places, nests, heading)
+
+        self._change(add)
 
     def add_some(
         self,
@@ -205,17 +199,12 @@ class Interventions:
         AntsError if there is too little room, or no such nest.
         """
         self._check_nest(nest)
-        for one in self._each():
-            one.add_some(one.amount(number, share, nest), heading, nest)
-        self.colony.observe(self.worlds)
+        self._change(lambda one: one.add_some(one.amount(number, share, nest), heading, nest))
 
     def remove_ants(self, cells: Cells, nest: int | None = None) -> None:
         """Remove the ants on these cells, or those of a nest, with the food that they carry."""
         self._check_nest(nest)
-        for one in self._each():
-            slots = one.living_slots(nest)
-            one.remove(slots[np.isin(one.cells[slots], one.index(cells))])
-        self.colony.observe(self.worlds)
+        self._change(lambda one: one.remove_on(one.index(cells), nest))
 
     def remove_some(self, number: int | None, share: float | None, nest: int | None = None) -> None:
         """Remove a number of random ants, or a share; all ants if there are fewer.
@@ -223,9 +212,7 @@ class Interventions:
         With a nest, remove only its ants.
         """
         self._check_nest(nest)
-        for one in self._each():
-            one.remove_some(one.amount(number, share, nest), nest)
-        self.colony.observe(self.worlds)
+        self._change(lambda one: one.remove_some(one.amount(number, share, nest), nest))
 
     def set_ants(self, n: int) -> None:
         """Set the number of ants, now and, if the changes are lasting, in later episodes.
@@ -235,14 +222,10 @@ class Interventions:
         """
         if self.lasting:
             self._check_all("the number of ants at the start")
-        for one in self._each():
-            one.check_room(n)
-        for one in self._each():
-            one.set_ants(n)
+        self._change(lambda one: one.set_ants(n))
         if self.lasting:
             self._changed |= n != self.ants
             self.ants = n
-        self.colony.observe(self.worlds)
 
     def set_task(self, task: Task) -> None:
         """Set a task that differs only in settings that kernels read as numbers."""
@@ -330,8 +313,8 @@ class Interventions:
         colony.begin_episode(self.length, worlds)
         self._changed = False
 
-    def begin_with(self, w: int, start: np.ndarray) -> None:
-        """Set the start of a world's later episodes, see `start`; AntsError if not allowed."""
+    def check_start(self, start: np.ndarray) -> None:
+        """Raise AntsError if later episodes cannot begin with this ground, see `start`."""
         if not self.lasting:
             return
         ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
@@ -345,7 +328,11 @@ class Interventions:
                 "this change would remove the last food item, but ants that learn need at least 1; "
                 "leave one."
             )
-        self._starts[w], self._changed = start, True
+
+    def begin_with(self, w: int, start: np.ndarray) -> None:
+        """Let later episodes of a world begin with this ground, after `check_start`."""
+        if self.lasting:
+            self._starts[w], self._changed = start, True
 
     def start(self, w: int) -> np.ndarray:
         """Return a copy of the ground at the start of a world's later episodes, see `_start_of`."""
@@ -362,6 +349,19 @@ class Interventions:
     def _check_nest(self, nest: int | None) -> None:
         if nest is not None:
             checked_whole("nest", nest, least=0, most=self.colony.n_nests - 1)
+
+    def _change(self, change: Callable[[_World], Change]) -> None:
+        """Make a change in all worlds, after its checks in all; then their ants observe again."""
+        colony, worlds = self.colony, list(self.worlds)
+        colony.check_begun()
+        several = [change(one) for one in self._each()]
+        for one in several:
+            next(one)
+        colony.ready[worlds] = False  # also after Ctrl-C before the end
+        for one in several:
+            next(one, None)
+        colony.observe(worlds)
+        colony.ready[worlds] = True
 
     def _each(self) -> Iterator[_World]:
         return (_World(self, w) for w in self.worlds)
@@ -429,18 +429,23 @@ class _World:
         queens = [tuple(cell) for cell in grid.cells(self.queen_cells).tolist()]
         return np.argmin([grid.distances(queen)[cells] for queen in queens], axis=0)
 
-    def put(self, cells: np.ndarray, what: int, kind: int = 0, loads: int | None = None) -> None:
-        """Make cells EMPTY, OBSTACLE or FOOD; see `Interventions.put`."""
-        ground = self.view("ground")
-        held = ground[cells]
+    def put(self, cells: np.ndarray, what: int, kind: int = 0) -> Change:
+        """Return the change that makes cells EMPTY, OBSTACLE or FOOD; see `Interventions.put`."""
+        held = self.view("ground")[cells]
         ants, to = self._aside(cells) if what != EMPTY else (cells[:0], cells[:0])
         at = self.cells[ants]
         cells = cells[((held >> 4 == 0) | np.isin(cells, at)) & (held != QUEEN)]  # see `layout`
         start = self.all.start(self.w)
         start[cells] = what | kind << _NUMBER
+        self.all.check_start(start)
+        yield
         self.all.begin_with(self.w, start)
         self._step_aside(ants, to)
-        ground[cells] = what
+        self._put(cells, what, kind)
+
+    def _put(self, cells: np.ndarray, what: int, kind: int, loads: int | None = None) -> None:
+        """Make cells without ants and queens EMPTY, OBSTACLE or FOOD."""
+        self.view("ground")[cells] = what
         self.view("walls")[cells] = what == OBSTACLE
         self.colony.changed[self.w] = True
         if what == OBSTACLE:
@@ -487,28 +492,36 @@ class _World:
         ground[to] = ground[at]
         ground[at] = EMPTY
 
-    def move(self, cell: int, to: int) -> None:
-        """Move the content of a cell; see `Interventions.move`."""
+    def move(self, cell: int, to: int) -> Change:
+        """Return the change that moves the content of a cell; see `Interventions.move`."""
         what = int(self.view("ground")[cell])
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
-            return
+            return iter([None])
         if what == QUEEN:
-            self.move_queen(to, int(np.argmax(self.queen_cells == cell)))
-            return
+            return self.move_queen(to, int(np.argmax(self.queen_cells == cell)))
+        return self._move(cell, to, what)
+
+    def _move(self, cell: int, to: int, what: int) -> Change:
+        """Return the change that moves rock or food."""
         food, task = what == FOOD, self.colony.task
         kind = int(self.view("kind_of")[cell]) if food and self.colony.n_kinds > 1 else 0
         loads = int(self.view("loads")[cell]) if food and task.has_loads else None
+        start = self.all.start(self.w)
+        start[cell], start[to] = EMPTY, what | kind << _NUMBER
+        self.all.check_start(start)
+        yield
+        self.all.begin_with(self.w, start)
         self._step_aside(*self._aside(np.array([to])))
-        self.put(np.array([cell]), EMPTY)
-        self.put(np.array([to]), what, kind, loads)
+        self._put(np.array([cell]), EMPTY, 0)
+        self._put(np.array([to]), what, kind, loads)
 
     def _can_be_free(self, cell: int) -> bool:
         """Return whether a cell is empty, except for an ant that can move aside."""
         slots, _ = self._aside(np.array([cell]))
         return bool(self.view("ground")[cell] == EMPTY) or len(slots) > 0
 
-    def move_queen(self, cell: int, nest: int) -> None:
-        """Move a queen; see `Interventions.move_queen`."""
+    def move_queen(self, cell: int, nest: int) -> Change:
+        """Return the change that moves a queen; see `Interventions.move_queen`."""
         grid, ground = self.colony.grid, self.view("ground")
         if not self._can_be_free(cell):
             raise AntsError(
@@ -518,6 +531,8 @@ class _World:
         old = int(self.queen_cells[nest])
         start = self.all.start(self.w)
         start[old], start[cell] = EMPTY, QUEEN | nest << _NUMBER
+        self.all.check_start(start)
+        yield
         self.all.begin_with(self.w, start)
         self._step_aside(*self._aside(np.array([cell])))
         ground[old], ground[cell] = EMPTY, QUEEN
@@ -527,13 +542,18 @@ class _World:
         self.colony.changed[self.w] = True
         self._change_food_sources(np.array([cell]), QUEEN)
 
+    def lay_in(self, cells: np.ndarray, level: int, number: int) -> Change:
+        """Return the change that sets the levels of a pheromone in cells other than rocks."""
+        yield
+        self.lay(cells[self.view("walls")[cells] == 0], level, number)
+
     def lay(self, cells: np.ndarray, level: int, number: int = 0) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
         stored = self.stored(number)
         stored[cells] = level + self.clock(number) if level else 0
 
-    def add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None = None) -> None:
-        """Put newborn ants of some nests on cells; see `Interventions.add_ants`."""
+    def add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None = None) -> Change:
+        """Return the change that puts newborn ants of some nests on cells; see `add_ants`."""
         colony, ground, rows = self.colony, self.view("ground"), self.rows
         free = ground[cells] == EMPTY
         cells, nests = cells[free], nests[free]
@@ -543,6 +563,7 @@ class _World:
                 f"{count(n, 'ant')} cannot join {count(living, 'ant')}, because the capacity of "
                 f"this colony is {colony.capacity}; remove ants, or start with a larger capacity."
             )
+        yield
         slots = np.flatnonzero(self.view("stage") == Stage.VACANT)[:n]
         numbers = rows[WorldRow.NEXT_NUMBER] + np.arange(n)
         words = self.all.stream(self.w).bits(n) if heading is None else np.zeros(0, np.uint64)
@@ -572,8 +593,8 @@ class _World:
         rows[WorldRow.NEXT_NUMBER] += n
         self._count_ants()
 
-    def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
-        """Put newborn ants on free cells in the order in which ants would start there."""
+    def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> Change:
+        """Return the change that puts newborn ants on free cells, in the order of start cells."""
         colony, grid = self.colony, self.colony.grid
         free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
         if n > len(free):
@@ -589,13 +610,20 @@ class _World:
             free[np.lexsort((words, grid.distances(queens[one])[free] * near))] for one in wanted
         ]
         nests = np.resize(wanted, n)
-        self.add(_in_turn(orders, n), nests, heading)
+        return self.add(_in_turn(orders, n), nests, heading)
 
-    def remove_some(self, n: int, nest: int | None = None) -> None:
-        """Remove n random ants."""
+    def remove_some(self, n: int, nest: int | None = None) -> Change:
+        """Return the change that removes n random ants."""
+        yield
         slots = self.living_slots(nest)
         words = self.all.stream(self.w).bits(len(slots))
         self.remove(slots[np.argsort(words, kind="stable")[:n]])
+
+    def remove_on(self, cells: np.ndarray, nest: int | None) -> Change:
+        """Return the change that removes the ants on cells, or those of a nest."""
+        yield
+        slots = self.living_slots(nest)
+        self.remove(slots[np.isin(self.cells[slots], cells)])
 
     def remove(self, slots: np.ndarray) -> None:
         """Remove the ants in some slots."""
@@ -623,13 +651,13 @@ class _World:
         if n > room:
             raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
 
-    def set_ants(self, n: int) -> None:
-        """Set the number of ants; see `Interventions.set_ants`."""
-        slots = self.living_slots()
-        if n > len(slots):
-            self.add_some(n - len(slots))
-        elif n < len(slots):
-            self.remove(slots[n:])
+    def set_ants(self, n: int) -> Change:
+        """Return the change that sets the number of ants; see `Interventions.set_ants`."""
+        self.check_room(n)
+        more = n - len(self.living_slots())
+        if more >= 0:
+            return self.add_some(more)
+        return self.remove_on(self.cells[self.living_slots()[more:]], None)
 
     def _change_food_sources(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
         """Add food sources for FOOD on cells, or remove the sources of cells with anything else.

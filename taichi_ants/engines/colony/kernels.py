@@ -1,10 +1,9 @@
 """The kernels of a colony: the phases of a tick, in order, and the sharing of work among threads.
 
 If worlds are many and small, each world is one part of the work. If they are few and large, all
-threads share each phase by chunks, which are ranges of the ants or cells of one world. Then threads
-on the CPU wait for each other at a barrier; on a GPU each group of phases is a parallel loop. All
-variants do the same phases in the same order and give the same numbers. The order is that of
-`taichi_ants.reference.ReferenceColony.tick`.
+threads share each phase by chunks, which are ranges of the ants or cells of one world, and wait for
+each other at a barrier. Both do the same phases in the same order and give the same numbers. The
+order is that of `taichi_ants.reference.ReferenceColony.tick`.
 """
 
 from collections.abc import Callable, Iterator
@@ -190,16 +189,6 @@ class Variant:
 variant = cache(Variant)
 
 
-def begin_phases(v: Variant) -> Iterator[Phase]:
-    """Yield the phases at the start of an episode."""
-    yield Phase(ANTS, learning.begin)
-
-
-def intervention_phases(v: Variant) -> Iterator[Phase]:
-    """Yield the phases after an intervention, between two ticks."""
-    yield Phase(ANTS, learning.see_interventions)
-
-
 def tick_phases(v: Variant) -> Iterator[Phase]:
     """Yield the phases of a tick before rounds of `planning_phases` and the `last_phases`."""
     yield Phase(ANTS, steps.want)
@@ -288,21 +277,15 @@ def shared_out(phases: Iterator[Phase]) -> list[tuple[Phase, ...]]:
 
 
 @cache
-def loops(
-    v: Variant, phases_of: Callable[[Variant], Iterator[Phase]], arguments: Any
-) -> Callable[..., None]:
-    """Return a kernel of some phases, with a parallel loop over chunks or worlds for each group."""
-    groups = shared_out(phases_of(v))
+def once(v: Variant, what: Callable[..., None], arguments: Any) -> Callable[..., None]:
+    """Return a kernel of what all ants do between two ticks."""
+    phase = Phase(ANTS, what)
 
     @ti.kernel
     def advance_colony(c: arguments):
-        for loop in ti.static(groups):
-            ti.loop_config(block_dim=1)
-            for chunk in range(
-                c.n_worlds if ti.static(loop[0].of == WORLD) else c.n_worlds * c.n_chunks
-            ):
-                for phase in ti.static(loop):
-                    do(phase, c, v, chunk)
+        ti.loop_config(block_dim=1)
+        for chunk in range(c.n_worlds * c.n_chunks):
+            do(phase, c, v, chunk)
 
     return advance_colony
 
@@ -420,5 +403,7 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
                             at = share(group, c, part, parts, at)
                 for group in ti.static(last):
                     at = share(group, c, part, parts, at)
+            if (part == 0) & (at >= 0):
+                c.orders[Order.PASSED] += c.orders[Order.TICKS]
 
     return advance_colony

@@ -98,6 +98,7 @@ class Order(IntEnum):
     LANES = auto()  # the number of threads among which independent worlds are dealt, see `ticks`
     FIRST = auto()  # the first group of phases that is not done yet
     SPINS = auto()  # the number of checks for the other parts before the first part gives up
+    PASSED = auto()  # not a parameter: the ticks since `ColonyState.ticks` was 0, which it counts
 
 
 class Barrier(IntEnum):

@@ -103,7 +103,7 @@ class ColonyState:
         fields: The further pheromones of the task by name, with or without evaporation.
         stored: The names of the arrays in a file.
         length: Length of the episode in ticks; 0 if unknown.
-        ticks: Number of ticks since an episode started in all worlds.
+        ready: bool (W,), whether an episode has begun, and each change of it was completed.
         delivered: int64 (W,), food items delivered in previous episodes.
         changed: bool (W,), whether interventions changed rock, food or the queen in this episode.
     """
@@ -156,6 +156,7 @@ class ColonyState:
         table = None if q_values is None else checks.checked_q_values(q_values, self.task)
         self.seeds = checks.checked_seeds(seeds)
         running = runtime.start(threads, arch)
+        runtime.check_on_cpu(running, "colonies run")
         schedule = usual_schedule(len(self.seeds), self.capacity) if schedule is None else schedule
         check_one_of("schedule", schedule, ("by_world", "by_chunk"))
         self.schedule, self.chunks = schedule, chunks_of(schedule, running.threads)
@@ -181,7 +182,7 @@ class ColonyState:
         self.arrays |= (lasting := self._lasting(table))
         self.stored = (*self._changing, *lasting)
         self.epsilon, self.learning_rate = self.training.epsilon, self.training.learning_rate
-        self.length = self.ticks = 0
+        self.length, self.ready = 0, np.zeros(len(self.seeds), bool)
         self.delivered = np.zeros(len(self.seeds), np.int64)
 
     def take_task(self, task: Task) -> None:
@@ -211,6 +212,15 @@ class ColonyState:
     def episode(self) -> int:
         """The number of the current episode (the largest of all worlds), from 0; -1 before it."""
         return int(self.arrays["episodes"].max())
+
+    @property
+    def ticks(self) -> int:
+        """The number of ticks since an episode started in all worlds."""
+        return int(self.arrays["orders"][Order.PASSED])
+
+    @ticks.setter
+    def ticks(self, ticks: int) -> None:
+        self.arrays["orders"][Order.PASSED] = ticks
 
     @property
     def running(self) -> np.ndarray:
@@ -467,9 +477,12 @@ class ColonyState:
         return int(self.episode_ticks[world]) * falls
 
     def check_begun(self) -> None:
-        """Raise an AntsError if no episode has started."""
-        if self.episode < 0:
-            raise AntsError("no episode has begun; call begin_episode first.")
+        """Raise an AntsError unless all worlds are in an episode, whose changes are complete."""
+        if not self.ready.all():
+            why = "no episode has begun"
+            if self.episode >= 0:
+                why = "not all worlds have begun an episode, or an intervention was interrupted"
+            raise AntsError(f"{why}; call begin_episode first.")
 
     def check_finite(self) -> None:
         """Raise an AntsError if an action value is not finite."""
@@ -512,12 +525,19 @@ class ColonyState:
 
     def begin(self, which: Which = ALL) -> None:
         """Reset worlds to the start of an episode; tables, memories and random streams stay."""
-        self.delivered[which] += self.deliveries[which]
+        self.count_deliveries(which)
         self.set_learning_rate(self.learning_rate)
         self._set_to_start(self.arrays, which)
         self._undo_interventions(which)
         self._copy_worlds(self.arrays, {"streams": self.arrays["first_streams"]}, which)
         self.arrays["episodes"][which] += 1
+
+    def count_deliveries(self, which: Which = ALL) -> None:
+        """Add the deliveries of the episode to those of the previous ones."""
+        deliveries = self.deliveries
+        # No call is between the two statements, so Ctrl-C does not separate them.
+        self.delivered[which] += deliveries[which]
+        deliveries[which] = 0
 
     def _undo_interventions(self, which: Which) -> None:
         """Reset the constants of those of some worlds that interventions have changed."""
@@ -932,6 +952,8 @@ class ColonyState:
         """
         self.check_finite()
         checks.checked_seeds(self.seeds)
+        if self.episode >= 0:
+            self.check_begun()
         facts, arrays = self.contents()
         _KIND.write(path, facts, arrays, compress=False)
 
@@ -973,6 +995,7 @@ class ColonyState:
                 array, kept = colony.arrays[name], arrays[f"array_{name}"]
                 check_array(name, kept, array.dtype, array.shape)
                 array[:] = kept
+            colony.ready = colony.arrays["episodes"] >= 0
         return colony
 
     def __eq__(self, other: object) -> bool:

@@ -77,6 +77,7 @@ class Stepper:
             n_worlds = len(state.seeds)
             lanes = lanes_for(n_worlds)
             self._launch_ticks(state, n, parts=lanes * -(-n_worlds // lanes), lanes=lanes)
+            return
         usual = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
         interval = max(_FEWEST_TICKS, min(_MOST_TICKS, usual))
         while state.ticks < end:
@@ -85,22 +86,16 @@ class Stepper:
             self._share_ticks(state, min(end - state.ticks, interval - state.ticks % interval))
 
     def launch(self, state: ColonyState, name: str) -> None:
-        """Launch a kernel by name: "ticks", or a group of phases in `kernels`."""
-        runtime.start()  # the caller may have reset Taichi, or forked the process
+        """Launch a kernel by name: "ticks", or what ants do once, a function of `learning`."""
+        # The caller may have reset Taichi, or forked the process.
+        runtime.check_on_cpu(runtime.start(), "colonies run")
         if name not in self._launches:
             self._launches[name] = self._prepared(state, name)
         self._launches[name]({**kernel_numbers(state), **state.arrays})
 
     def _share_ticks(self, state: ColonyState, n: int) -> None:
         """Advance by up to n ticks, which threads share."""
-        running = runtime.start()
-        if not _has_barrier(running):
-            rounds = state.training.planning_steps if state.plans_together else 0
-            for phases in ("tick_phases", *["planning_phases"] * rounds, "last_phases"):
-                self.launch(state, phases)
-            state.ticks += 1
-            return
-        most = min(running.threads, runtime.available_threads(), state.chunks)
+        most = min(runtime.start().threads, runtime.available_threads(), state.chunks)
         n, threads = self.threads.plan(n, most)
         compiled, began = "ticks" in self._launches, time.perf_counter()
         self._launch_ticks(state, n, threads)
@@ -110,24 +105,25 @@ class Stepper:
     def _launch_ticks(self, state: ColonyState, n: int, parts: int, lanes: int = 1) -> None:
         """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""
         orders, barrier = state.arrays["orders"], state.arrays["barrier"]
-        orders[:], barrier[:] = (n, parts, lanes, 0, _SPINS), 0
-        self.launch(state, "ticks")
-        if (opened := int(barrier[Barrier.OPENED])) < 0:
-            orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
-            barrier[:] = 0
+        orders[: Order.PASSED], barrier[:] = (n, parts, lanes, 0, _SPINS), 0
+        try:
             self.launch(state, "ticks")
-        state.ticks += n
+        finally:  # Ctrl-C during a launch raises an error after it
+            if (opened := int(barrier[Barrier.OPENED])) < 0:
+                orders[[Order.PARTS, Order.FIRST]] = 1, opened - GAVE_UP + 1
+                barrier[:] = 0
+                self.launch(state, "ticks")
 
     @staticmethod
     def _prepared(state: ColonyState, name: str) -> Any:
         """Return a kernel for repeated launches."""
         from taichi_ants.engines.arguments import Launch
-        from taichi_ants.engines.colony import kernels
+        from taichi_ants.engines.colony import kernels, learning
 
         variant = kernels.variant(features_of(state))
         if name == "ticks":
             return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))
-        return Launch(partial(kernels.loops, variant, getattr(kernels, name)))
+        return Launch(partial(kernels.once, variant, getattr(learning, name)))
 
 
 def features_of(state: ColonyState) -> Features:
@@ -146,11 +142,6 @@ def features_of(state: ColonyState) -> Features:
 def lanes_for(n_worlds: int) -> int:
     """Return the number of threads among which independent worlds are dealt, see `Order.LANES`."""
     return min(runtime.start().threads, n_worlds)
-
-
-def _has_barrier(running: runtime.Runtime) -> bool:
-    """Return whether threads can wait for each other, which a GPU does not allow."""
-    return running.arch == "cpu"
 
 
 def _field_numbers(state: ColonyState) -> dict[str, Any]:

@@ -140,7 +140,7 @@ class BatchedEnvironments:
 
     def _rollout_launch(self, follows: bool, width: int) -> Callable[[Mapping[str, Any]], None]:
         if (follows, width) not in self._rollouts:
-            runtime.start()
+            runtime.check_on_cpu(runtime.start(), "a rollout of a vector environment runs")
             from taichi_ants.engines.arguments import Launch
             from taichi_ants.engines.runs.kernels import failures_of
             from taichi_ants.engines.runs.rollout_kernel import rollout_kernel, size_of_codes

@@ -128,6 +128,8 @@ def rollout_kernel(
             a.carried[i] = ant.carried
         a.percepts[i], a.states[i] = ti.cast(percept, ti.u8), state
         a.steps[i], a.commands[i] = steps, ti.cast(command, ti.u8)
+        ended = ti.cast(command != Command.STEP, ti.u8)  # for `LoneAnts.over`
+        a.terminations[i], a.truncations[i] = ended, ended
         if ti.static(follows):
             a.choices[i] = choices
 

@@ -1,4 +1,4 @@
-"""Functions of real numbers in kernels, with equal results on every machine.
+"""Functions of real numbers in kernels, with equal results on all CPUs.
 
 The compiler's own exp, log and power differ between processors in their last bits. These use only
 + - * / of f64, floor and the bits of an f64, each rounded once and in this order:

@@ -59,8 +59,6 @@ def test_threads_and_schedules_give_the_same(monkeypatch):
     # Another number of threads starts Taichi anew.
     for schedule in ("by_world", "by_chunk"):
         assert_same(expected, history(threads=2, schedule=schedule))
-    monkeypatch.setattr(stepping, "_has_barrier", lambda running: False)  # as on a GPU
-    assert_same(expected, history(threads=2, schedule="by_chunk"))
 
 
 @pytest.mark.parametrize(("n_worlds", "threads"), [(1, 2), (2, 2), (7, 2), (20, 3), (256, 16)])

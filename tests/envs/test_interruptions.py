@@ -1,0 +1,77 @@
+"""Ctrl-C in environments: whether an episode has ended is what the kernel did."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+from interrupts import interrupted_after_launch
+
+from taichi_ants import AntsError, Task, runtime
+from taichi_ants.envs.colony import HexColonyVectorEnv
+from taichi_ants.envs.colony_v0 import parallel_env
+from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
+
+
+def lone(mode: str) -> Any:
+    return HexForageVectorEnv(3, max_steps=4, observation_format="index", autoreset_mode=mode)
+
+
+def colony(mode: str) -> Any:
+    rules, form = Task(delivery="truncates"), {"max_steps": 4, "observation_format": "index"}
+    return HexColonyVectorEnv(6, task=rules, ants=3, autoreset_mode=mode, **form)
+
+
+@pytest.mark.parametrize("make", [lone, colony])
+@pytest.mark.parametrize("rolls", [False, True])
+@pytest.mark.parametrize("mode", ["NextStep", "Disabled"])
+def test_vector_environments_know_who_has_ended(make: Any, rolls: bool, mode: str) -> None:
+    ours, theirs = make(mode), make(mode)
+    actions = np.ones((4, ours.num_envs), int)
+    for env in (ours, theirs):
+        env.reset(seed=3)
+        env.rollout(actions[:3])
+    theirs.step(actions[0])
+    with interrupted_after_launch():
+        ours.rollout(actions[:1]) if rolls else ours.step(actions[0])
+    if mode == "Disabled":
+        with pytest.raises(ResetNeeded, match="has ended"):
+            ours.step(actions[0])
+        return
+    for _ in range(6):
+        one, two = ours.step(actions[0]), theirs.step(actions[0])
+        assert all(np.array_equal(one[k], two[k]) for k in range(4))
+
+
+def test_a_lone_ant_does_not_go_on_after_its_last_step() -> None:
+    env = HexForageEnv(max_steps=2)
+    env.reset(seed=1)
+    env.step(1)
+    with interrupted_after_launch():
+        env.step(1)
+    with pytest.raises(ResetNeeded):
+        env.step(1)
+    env.reset()
+    env.step(1)
+
+
+def test_the_last_step_of_a_colony_ends_it() -> None:
+    env = parallel_env(ants=4, max_steps=2)
+    env.reset(seed=1)
+    with interrupted_after_launch():
+        env.step(dict.fromkeys(env.agents, 1))
+    *_, truncated, _ = env.step(dict.fromkeys(env.agents, 1))
+    assert all(truncated.values())
+    assert env.agents == []
+    with interrupted_after_launch():
+        env.reset()
+
+
+def test_a_rollout_on_a_gpu_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    env = lone("NextStep")
+    env.reset(seed=1)
+    monkeypatch.setattr(runtime, "start", lambda *given: runtime.Runtime("cuda", 1))
+    with pytest.raises(AntsError, match=r"^arch is 'cuda', but a rollout of a vector environment"):
+        env.rollout("random", 3)

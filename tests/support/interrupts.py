@@ -1,0 +1,31 @@
+"""Ctrl-C at its likeliest moment: Python raises it right after the launch during which it came."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from taichi_ants import runtime
+
+
+@contextmanager
+def interrupted_after_launch(number: int = 1) -> Iterator[None]:
+    """A context in which launch `number` is done, and then interrupted."""
+    runtime.start()
+    from taichi_ants.engines.arguments import Launch
+
+    usual, done = Launch.__call__, []
+
+    def launch(self: Launch, values: Mapping[str, Any]) -> None:
+        usual(self, values)
+        done.append(self)
+        if len(done) == number:
+            raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Launch, "__call__", launch)
+        with pytest.raises(KeyboardInterrupt):
+            yield
