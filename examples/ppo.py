@@ -20,10 +20,11 @@ from torch.distributions import Categorical
 
 import taichi_ants
 import taichi_ants.envs  # registers the environments
+from taichi_ants import task, worlds
 
 N_ENVS, N_STEPS = 64, 32  # environments, and steps in each between two updates
 EPOCHS, MINIBATCHES = 5, 4
-LEARNING_RATE, DISCOUNT, GAE_LAMBDA = 1e-3, 0.9, 0.95
+LEARNING_RATE, DISCOUNT, GAE_LAMBDA = 1e-3, 0.99, 0.95
 CLIP, ENTROPY, VALUE, LARGEST_GRADIENT = 0.2, 0.1, 0.5, 0.5
 
 
@@ -138,16 +139,17 @@ if __name__ == "__main__":
     envs = gymnasium.make_vec(
         "taichi_ants/HexForage-v0",
         num_envs=N_ENVS,
+        task="fetching",
         observation_format="one_hot",
         autoreset_mode="SameStep",
     )
     for seed in args.seeds:
         logits = table(train(envs, seed, args.steps, entropy=args.entropy))
-        greedy = taichi_ants.evaluate(taichi_ants.worlds.paper(), logits, rollouts=100)
+        greedy = taichi_ants.evaluate(worlds.paper(), logits, rollouts=100, task=task.fetching())
         print(
             f"seed {seed}: {greedy.deliveries.sum()} of 100 rollouts deliver, "
             f"{greedy.returns.mean():.1f} in {greedy.steps.mean():.1f} steps"
         )
-    made_by = {"made by": "PPO", "seed": seed, "steps": args.steps}
+    made_by = {"made by": "PPO", "seed": seed, "task": task.fetching().as_dict()}
     taichi_ants.save_policy(args.out, logits, made_by)
     print(f"The policy of the last seed is in {args.out}.")
