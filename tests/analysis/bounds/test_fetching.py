@@ -87,7 +87,24 @@ def test_the_best_policies_of_far_piles_deliver(seed: int) -> None:
         assert bounds.optimal(discount, 600)[1] == bounds.shortest()
 
 
-def test_under_the_papers_rewards_the_best_policy_walks_the_trail_at_high_discounts() -> None:
+def outcomes(world: World) -> list[float]:
+    """The return and steps of the shortest delivery, and the best returns at 0.9 and 0.99."""
+    bounds = EpisodeBounds(world, Task())
+    shortest, near, far = bounds.shortest(), *(bounds.optimal(d, 600)[1] for d in (0.9, 0.99))
+    assert shortest is not None
+    assert [shortest.deliveries, near.deliveries, far.deliveries] == pytest.approx([1, 1, 0])
+    return [shortest.episode_return, shortest.steps, near.episode_return, far.episode_return]
+
+
+def test_under_the_papers_rewards_the_best_policy_delivers_only_at_low_discounts() -> None:
+    """The numbers on docs/environments.md."""
+    assert outcomes(worlds.paper()) == pytest.approx([45, 34, 45, 476])
     bounds = EpisodeBounds(worlds.paper(), Task())
-    assert bounds.optimal(0.9, 600)[1] == pytest.approx((45, 34, 1))
-    assert bounds.optimal(0.99, 600)[1] == pytest.approx((476, 600, 0))
+    best = [bounds.optimal(discount, 600)[1].deliveries for discount in (0.961, 0.962)]
+    assert best == pytest.approx([1, 0])
+
+
+@pytest.mark.slow
+def test_the_same_holds_in_larger_worlds() -> None:
+    assert outcomes(worlds.double_bridge()) == pytest.approx([41, 64, 41, 268])
+    assert outcomes(worlds.open_world(ranges=(12, 12, 12))) == pytest.approx([17, 10, 17, 285])
