@@ -21,3 +21,12 @@ def test_the_guides_examples_work(capsys):
     ]
     assert names["colony"].states.shape == (8, 64)
     assert names["env"].agents == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["offline", "examples"])
+def test_the_first_block_of_a_page_needs_nothing_else(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
+    code = text.split("```python\n")[1].split("```")[0]
+    exec(compile(code, f"{page}.md", "exec"), {})
