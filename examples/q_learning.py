@@ -1,6 +1,7 @@
 """Train an ant to fetch food by tabular Q-learning in NumPy, in two seconds per seed.
 
-Prints the mean return and steps of greedy rollouts for each seed; the best is 45 in 34 steps.
+A pick-up is rewarded with 3, a delivery with 10. Prints the deliveries, mean return and mean steps
+of 50 greedy rollouts for each seed; the best is a return of 13 in 34 steps.
 """
 
 import argparse
@@ -9,10 +10,11 @@ import gymnasium
 import numpy as np
 
 import taichi_ants.envs  # registers the environments
+from taichi_ants import task, worlds
 
 
-def learn(seed, steps, learning_rate=0.1, discount=0.9, epsilon=0.1):
-    env = gymnasium.make("taichi_ants/HexForage-v0", observation_format="index")
+def learn(seed, steps, learning_rate=0.1, discount=0.99, epsilon=0.1):
+    env = gymnasium.make("taichi_ants/HexForage-v0", task="fetching", observation_format="index")
     rng = np.random.default_rng(seed)
     # Optimistic initial values, with which the agent tries every action.
     q = np.full((env.observation_space.n, env.action_space.n), 10.0)
@@ -32,9 +34,7 @@ if __name__ == "__main__":
     parser.add_argument("--seeds", type=int, nargs="+", default=range(10), help="default: 0 to 9")
     parser.add_argument("--steps", type=int, default=30_000, help="per seed; default: %(default)s")
     args = parser.parse_args()
-    best = 0
     for seed in args.seeds:
-        rollouts = taichi_ants.evaluate(taichi_ants.worlds.paper(), learn(seed, args.steps))
-        best += (rollouts.returns == 45).all() and (rollouts.steps == 34).all()
-        print(f"seed {seed}: {rollouts.returns.mean():.1f} in {rollouts.steps.mean():.1f} steps")
-    print(f"{best} of {len(args.seeds)} seeds reach 45 in 34 steps")
+        runs = taichi_ants.evaluate(worlds.paper(), learn(seed, args.steps), task=task.fetching())
+        how = f"{runs.returns.mean():.1f} in {runs.steps.mean():.1f} steps"
+        print(f"seed {seed}: {runs.deliveries.sum()} of 50 rollouts deliver, {how}")

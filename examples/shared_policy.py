@@ -40,7 +40,8 @@ def environments() -> VectorEnv:
 
 def neural(seed: int, episodes: int) -> Agent:
     """Return a network that 64 ants in each of four worlds have trained together."""
-    return train(environments(), seed, episodes * TICKS * ANTS, n_steps=64, entropy=0.03)
+    steps = episodes * TICKS * ANTS
+    return train(environments(), seed, steps, n_steps=64, entropy=0.03, discount=0.9)
 
 
 def foods_by_chance(agent: Agent) -> float:

@@ -12,6 +12,7 @@ from taichi_ants.environment import prepare_for_taichi
 if TYPE_CHECKING:
     from taichi_ants import (
         analysis,
+        envs,
         learners,
         measures,
         offline,
@@ -59,22 +60,6 @@ _NAMES_IN = {
     "task": ("Field", "Life", "Observation", "Pheromone", "Rewards", "Task"),
     "worlds": ("World",),
 }
-_MODULES = (
-    *(
-        "analysis",
-        "learners",
-        "measures",
-        "offline",
-        "reference",
-        "rendering",
-        "rules",
-        "task",
-        "task.states",
-        "testing",
-        "worlds",
-    ),
-)
-
 __all__ = [
     "AntsError",
     "At",
@@ -99,6 +84,7 @@ __all__ = [
     "analysis",
     "compare",
     "continue_training",
+    "envs",
     "evaluate",
     "from_minari",
     "learners",
@@ -151,9 +137,8 @@ def __getattr__(name: str) -> object:
         if name in names:
             globals()[name] = getattr(import_module(f"taichi_ants.{module}"), name)
             return globals()[name]
-    for module in _MODULES:
-        if module.split(".")[-1] == name:
-            return import_module(f"taichi_ants.{module}")
+    if name in __all__:
+        return import_module(f"taichi_ants.{'task.states' if name == 'states' else name}")
     raise AttributeError(f"module 'taichi_ants' has no attribute {name!r}")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import reprlib
 from collections.abc import Iterable, Mapping, Sequence
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -36,6 +37,20 @@ def unusable(thing: Any, fault: object) -> AntsError:
     """Return the error for a learner or an observation that cannot be used."""
     kind, said = type(thing).__name__, str(fault).replace(".)", ")")
     return AntsError(f"{kind.lower()} {thing.name!r} cannot be used: {said}; see help({kind}).")
+
+
+def missing(who: str, module: str, extra: str) -> str:
+    """Return the message that `who` needs a module that an extra of this package installs."""
+    how = f'run pip install -e ".[{extra}]" in your clone'
+    return f"{who} needs {module}, which cannot be imported; {how}."
+
+
+def imported(who: str, module: str, extra: str) -> Any:
+    """Return a module that only `who` needs; AntsError if it cannot be imported."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise AntsError(missing(who, module, extra)) from error
 
 
 class _Short(reprlib.Repr):

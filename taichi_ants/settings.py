@@ -24,6 +24,7 @@ from __future__ import annotations
 import difflib
 import math
 import operator
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, fields, replace
 from functools import cache, partial, wraps
@@ -182,6 +183,7 @@ class Setting(NamedTuple):
         except (TypeError, OverflowError):  # integers can be too large for a float
             return None
         if self.kind is str:
+            value = os.fspath(value) if isinstance(value, os.PathLike) else value
             allowed = self.allowed_words
             fits = isinstance(value, str) and (not allowed or value in allowed)
             return value if fits else None

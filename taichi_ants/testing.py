@@ -22,6 +22,8 @@ from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds import World
 
 SEEDS, TICKS = 6, 60
+__all__ = ["RuleCheck", "check_observation", "check_rule"]
+__dir__ = __all__.copy  # completion lists only public names
 _LAID = ("with_food", "without_food", "always", "dead_end", "failed_pick_up")
 
 

@@ -8,6 +8,7 @@ from gymnasium.envs.registration import register
 from taichi_ants.task.events import Event, Reason
 
 __all__ = ["Event", "Reason"]
+__dir__ = __all__.copy  # completion lists only public names
 
 register(
     "taichi_ants/HexForage-v0",

@@ -7,15 +7,22 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 from taichi_ants import checks
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Choices, Rollout
-from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, Arguments, Worlds
+from taichi_ants.envs.vector import (
+    ACTION_MASKS,
+    Ants,
+    AntVectorEnv,
+    Arguments,
+    Rules,
+    Worlds,
+    task_of,
+)
 from taichi_ants.errors import AntsError, checked_whole
-from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, RIGHT
 from taichi_ants.task.events import Event
 
@@ -32,6 +39,7 @@ class ColonyWorlds(Ants):
         acted: Whether the slot had an ant that acted in the last step, bool.
         rewards: The rewards of these actions, float64.
         events: The results of these actions, `Event` as int64; NONE if no ant acted.
+        deliveries: The deliveries of the ant in this episode, int64.
     """
 
     colonies = True
@@ -39,13 +47,13 @@ class ColonyWorlds(Ants):
     def __init__(
         self,
         n_worlds: int,
-        task: Task | None,
+        task: Rules | None,
         given: Arguments,
         ants: int,
         start: str,
         capacity: int | None = None,
     ) -> None:
-        task = checks.checked_task(Task() if task is None else task)
+        task = task_of(task)
         checks.check_given_actions(task)
         super().__init__(n_worlds, task, given, METADATA["render_modes"])
         self.colony = Colony(
@@ -61,6 +69,7 @@ class ColonyWorlds(Ants):
         shape = n_worlds, self.colony.capacity
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
         self.events = np.full(shape, Event.NONE, np.int64)
+        self.deliveries = np.zeros(shape, np.int64)
         self._last: dict[str, np.ndarray] = {}
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
@@ -79,6 +88,7 @@ class ColonyWorlds(Ants):
         if (which & ~new).any():
             self.colony.begin_some(which & ~new)
         self.events = np.where(which[:, None], Event.NONE, self.events)
+        self.deliveries[which] = 0
 
     def step(self, actions: np.ndarray) -> None:
         """Take the actions of all ants, integers 0 to 4; worlds at their end do not change."""
@@ -89,6 +99,8 @@ class ColonyWorlds(Ants):
         events = np.where(self.acted, colony.events, Event.NONE)
         self.rewards = np.where(self.acted, colony.rewards, 0).astype(np.float64)
         self.events = events.astype(np.int64)
+        # A newborn ant starts at 0 in a slot that was free before.
+        self.deliveries = np.where(self.acted, self.deliveries + (events == Event.DELIVERED), 0)
 
     def over(self) -> np.ndarray:
         return self.colony.episode_ticks >= self.max_steps
@@ -106,6 +118,8 @@ class ColonyWorlds(Ants):
         self, actions: np.ndarray, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Take a step, and return its rewards, terminations and truncations, (n,)."""
+        if self.task.delivery == "terminates":  # the next episode of these ants has begun
+            self.deliveries[self.events == Event.DELIVERED] = 0
         self.step(actions.reshape(self.acted.shape))
         truncated = np.repeat(self.over() & ~waiting, self.colony.capacity)
         terminated = (self.events.reshape(-1) == Event.DELIVERED) & (
@@ -154,6 +168,7 @@ class ColonyWorlds(Ants):
             "state": self.colony.states.reshape(-1).astype(np.int64),
             "action_mask": self.action_masks().reshape(-1, N_ACTIONS),
             "event": self.events.reshape(-1),
+            "deliveries": self.deliveries.reshape(-1),
         }
 
     def action_masks(self) -> np.ndarray:
@@ -193,7 +208,7 @@ class ColonyWorlds(Ants):
         return self._scene.draw(snapshot, status)
 
 
-class HexColonyVectorEnv(AntVectorEnv):
+class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct bases
     """The ants of one or more worlds, each as an environment of a `gymnasium.vector.VectorEnv`.
 
     Environment number w * ants + i is ant number i of world number w. The ants of a world share its
@@ -213,13 +228,13 @@ class HexColonyVectorEnv(AntVectorEnv):
 
     ## Arguments
     - `num_envs`: The number of ants in all worlds together, a multiple of `ants`.
-    - `world`: A registered name, the path of a map, a `World`, or a list of n of these with the
-    same ranges, of which world number w is entry w modulo n.
-    - `task`: The rules, without births and lifespan; by default, the paper's.
+    - `world`: See `HexForageEnv`; or a list of n worlds with the same ranges, of which world number
+    w is entry w modulo n.
+    - `task`: See `HexForageEnv`; without births and lifespan.
     - `ants`: The number of ants in each world.
     - `start`, `max_steps`, `observation_format`, `evaporation`: See `HexColonyParallelEnv`.
     - `autoreset_mode`, `max_episode_steps`: See `HexForageVectorEnv`.
-    - `render_mode`: "rgb_array" for a picture of each world, or None.
+    - `render_mode`: "rgb_array" for a picture of each ant's world, or None.
     """
 
     metadata = METADATA
@@ -228,7 +243,7 @@ class HexColonyVectorEnv(AntVectorEnv):
         self,
         num_envs: int = 64,
         world: Worlds = "paper",
-        task: Task | None = None,
+        task: Rules | None = None,
         ants: int = 64,
         start: str = "nest",
         max_steps: int = MAX_STEPS,

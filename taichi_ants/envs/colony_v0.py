@@ -10,20 +10,17 @@ from gymnasium.utils import seeding
 
 from taichi_ants.envs.colony import MAX_STEPS, METADATA, ColonyWorlds
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.vector import Arguments
-from taichi_ants.errors import shown
+from taichi_ants.envs.vector import Arguments, Place, Rules, check_options
+from taichi_ants.errors import missing, shown
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task import Life, Task
+from taichi_ants.task import Life
 from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.worlds import World
 
 try:
     from pettingzoo import ParallelEnv
     from pettingzoo.utils.env_logger import EnvLogger
 except ImportError as error:
-    raise ImportError(
-        'colony_v0 needs PettingZoo; install it with: pip install "taichi_ants[pettingzoo]".'
-    ) from error
+    raise ImportError(missing("colony_v0", "pettingzoo", "pettingzoo")) from error
 
 
 class HexColonyParallelEnv(ParallelEnv):
@@ -45,8 +42,7 @@ class HexColonyParallelEnv(ParallelEnv):
     unless another ant comes first. `event` is also NONE in the step of an ant's birth.
 
     ## Arguments
-    - `world`: A registered name, the path of a map, or a `World`.
-    - `task`: The rules; by default, the paper's.
+    - `world`, `task`: See `HexForageEnv`.
     - `ants`: The number of ants at the start.
     - `start`: "nest" for cells near the queen, or "spread" for any cells.
     - `capacity`: The largest number of living ants; by default, `ants`, or 2 * `ants` + 64 if the
@@ -66,8 +62,8 @@ class HexColonyParallelEnv(ParallelEnv):
 
     def __init__(
         self,
-        world: str | World = "paper",
-        task: Task | None = None,
+        world: Place = "paper",
+        task: Rules | None = None,
         ants: int = 64,
         start: str = "nest",
         capacity: int | None = None,
@@ -106,11 +102,12 @@ class HexColonyParallelEnv(ParallelEnv):
         Args:
             seed: The seed of this and all further episodes, which then repeat exactly. None
                 continues the random numbers, or draws a seed in the first reset.
-            options: Not used.
+            options: There are none.
 
         Returns:
             Observations and infos by agent.
         """
+        check_options(options, "options")  # the key of PettingZoo's tests, without effect
         if seed is not None:
             seeding.np_random(seed)  # raises Gymnasium's error for invalid seeds
         elif not self._begun:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.spaces import Discrete
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 
 from taichi_ants import checks
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
@@ -17,11 +17,21 @@ from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Choices, Rollout
-from taichi_ants.envs.vector import ACTION_MASKS, Ants, AntVectorEnv, Arguments, StepLimit
+from taichi_ants.envs.vector import (
+    ACTION_MASKS,
+    Ants,
+    AntVectorEnv,
+    Arguments,
+    Place,
+    Rules,
+    StepLimit,
+    Worlds,
+    check_options,
+    task_of,
+)
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
-from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
-from taichi_ants.worlds import World, text_map
+from taichi_ants.worlds import text_map
 
 DELIVERIES = ("terminates", "truncates", "continues")
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "ansi"], "render_fps": 10}
@@ -46,11 +56,8 @@ _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64
 class LoneAnts(Ants):
     """Many ants, each alone in its world; a single launch steps all of them."""
 
-    def __init__(
-        self, n: int, task: Task | Mapping[str, Any] | None, delivery: str | None, given: Arguments
-    ) -> None:
-        task = Task.from_dict(task) if isinstance(task, Mapping) else task  # a spec read from JSON
-        task = checks.checked_runs_task(task)
+    def __init__(self, n: int, task: Rules | None, delivery: str | None, given: Arguments) -> None:
+        task = checks.checked_runs_task(task_of(task))
         checks.check_given_actions(task)
         super().__init__(n, task, given, METADATA["render_modes"])
         delivery = task.delivery if delivery is None else delivery
@@ -115,6 +122,7 @@ class LoneAnts(Ants):
             "action_mask": packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS],
             "event": arrays["events"].astype(np.int64),
             "reason": arrays["reasons"].astype(np.int64),
+            "deliveries": arrays[f"{when}deliveries"].astype(np.int64),
         }
 
     def draw(self, world: int) -> Any:
@@ -172,11 +180,14 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
       which turn the ant. `action_masks()` returns it as bool, for MaskablePPO of sb3-contrib.
     - `event`: int64, the result of the action, a `taichi_ants.envs.Event`; NONE after `reset`.
     - `reason`: int64, the reason why the action failed, a `taichi_ants.envs.Reason`, or NONE.
+    - `deliveries`: int64, the deliveries of this episode. Report them beside the return, because
+      under the paper's rewards walking a trail can pay more than delivering.
 
     ## Arguments
-    - `world`: The name of a registered world, the path or the text of a map, or a World.
-    - `task`: The rules, a `taichi_ants.Task` or its `as_dict()`; by default, the paper's. AntsError
-      if a rule is only for colonies.
+    - `world`: The name of a registered world, the path or the text of a map, or a World or its
+      `as_dict()`.
+    - `task`: The rules, a `taichi_ants.Task`, its `as_dict()` or its name; by default, the paper's.
+      AntsError if a rule is only for colonies.
     - `delivery`: "terminates", "truncates" or "continues" the episode; by default, the task's.
     - `evaporation`: Whether trails evaporate; by default, the task's `evaporation_in_training`.
     - `max_steps`: The number of steps after which an episode is truncated.
@@ -190,8 +201,8 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
 
     def __init__(
         self,
-        world: str | World = "paper",
-        task: Task | Mapping[str, Any] | None = None,
+        world: Place = "paper",
+        task: Rules | None = None,
         delivery: str | None = None,
         evaporation: bool | None = None,
         max_steps: int = EPISODE_STEPS,
@@ -209,8 +220,10 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
     ) -> tuple[Any, dict[str, Any]]:
         """Return the first observation and info of a new episode.
 
-        The seed determines all random numbers, so episodes with a seed repeat exactly.
+        The seed determines all random numbers, so episodes with a seed repeat exactly. There are no
+        options.
         """
+        check_options(options)
         super().reset(seed=seed)
         if seed is None and not self._begun:
             seed = int(self.np_random.integers(2**63))
@@ -229,7 +242,8 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
             InvalidAction: The action does not exist.
         """
         if self._over:
-            raise ResetNeeded("no episode has begun; call reset() before step().")
+            why = "the episode has ended" if self._begun else "no episode has begun"
+            raise ResetNeeded(f"{why}; call reset() before step().")
         if not self.action_space.contains(action):
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
         self._ants.batched.step(action)
@@ -249,6 +263,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
             "action_mask": ACTION_MASKS[arrays["percepts"][0]].copy(),
             "event": np.int64(arrays["events"][0]),
             "reason": np.int64(arrays["reasons"][0]),
+            "deliveries": np.int64(arrays["deliveries"][0]),
         }
 
     def action_masks(self) -> np.ndarray:
@@ -264,7 +279,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         return None if self.render_mode is None else self._ants.draw(0)
 
 
-class HexForageVectorEnv(AntVectorEnv):
+class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct bases
     """Many ants, each alone in its world; a single launch steps all of them.
 
     Environment i equals a `HexForageEnv` with seed `seed + i` in each step. Arrays have a leading
@@ -284,8 +299,8 @@ class HexForageVectorEnv(AntVectorEnv):
     def __init__(
         self,
         num_envs: int = 1,
-        world: str | World | Sequence[World] = "paper",
-        task: Task | Mapping[str, Any] | None = None,
+        world: Worlds = "paper",
+        task: Rules | None = None,
         delivery: str | None = None,
         evaporation: bool | None = None,
         max_steps: int = EPISODE_STEPS,

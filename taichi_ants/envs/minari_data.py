@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -21,12 +20,11 @@ from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 
 from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.errors import AntsError, expect, shown
+from taichi_ants.errors import AntsError, expect, imported, shown
 from taichi_ants.files import to_json
 from taichi_ants.offline.dataset import COLUMNS, Dataset
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.worlds.text_map import to_text
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
@@ -54,7 +52,7 @@ def to_minari(
             run, the ant, the tick, and the probability of the action.
     """
     expect("data", data, Dataset)
-    minari = _minari()
+    minari = imported("a data set of Minari", "minari", "minari")
     from minari.data_collector import EpisodeBuffer
 
     form = Shown(data.task.sees, observation_format)
@@ -103,7 +101,7 @@ def _spec(data: Dataset, observation_format: ObservationFormat) -> EnvSpec | Non
         return None
     task, learned = data.task, data.behaviour.get("policy") == "learner"
     settings = {
-        "world": to_text(data.world),
+        "world": data.world.as_dict(),
         "task": task.as_dict(),
         "evaporation": task.evaporation_in_training if learned else task.evaporation_in_evaluation,
         "observation_format": observation_format,
@@ -122,7 +120,7 @@ def from_minari(
         task: The rules of the ants if `to_minari` did not write the data set; by default, the
             paper's.
     """
-    minari = _minari()
+    minari = imported("a data set of Minari", "minari", "minari")
     try:
         path = Path(
             minari.storage.get_dataset_path(dataset)
@@ -195,13 +193,3 @@ def _rows(episode: Any, number: int, form: Shown) -> dict[str, np.ndarray]:
         "terminated": episode.terminations,
         "truncated": truncated,
     }
-
-
-def _minari() -> ModuleType:
-    try:
-        import minari
-    except ImportError as error:
-        raise AntsError(
-            "minari is not installed; install it with pip install 'taichi-ants[minari]'."
-        ) from error
-    return minari

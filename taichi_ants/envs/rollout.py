@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -143,7 +144,7 @@ def checked_plan(
     Raises:
         AntsError, InvalidAction: The policy or the number of steps is not allowed.
     """
-    if isinstance(policy, str):
+    if isinstance(policy, (str, os.PathLike)):
         table = frozen_policy(policy, task.observation)
     else:
         try:

@@ -7,15 +7,12 @@ from typing import Any
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, missing, shown
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise ImportError(
-        "taichi_ants.envs.sb3 needs Stable-Baselines3; install it with "
-        'pip install "taichi_ants[sb3]".'
-    ) from error
+    raise ImportError(missing("taichi_ants.envs.sb3", "stable_baselines3", "sb3")) from error
 
 
 class SB3VecEnv(VecEnv):
@@ -25,8 +22,9 @@ class SB3VecEnv(VecEnv):
         PPO("MlpPolicy", SB3VecEnv(envs)).learn(100_000)
 
     The info of an environment is empty unless its episode has ended. It then has the last
-    observation, `terminal_observation`, and `TimeLimit.truncated`, True if the step limit ended the
-    episode. For returns and lengths of episodes, use SB3's wrapper `VecMonitor`.
+    observation, `terminal_observation`, the `deliveries` of the episode, and `TimeLimit.truncated`,
+    True if the step limit ended it. For returns and lengths of episodes, use SB3's wrapper
+    `VecMonitor(envs, info_keywords=("deliveries",))`.
 
     All environments are one object, so they share the attributes of `envs`. The only method of
     single environments is `action_masks`, which MaskablePPO of sb3-contrib calls.
@@ -67,6 +65,7 @@ class SB3VecEnv(VecEnv):
             infos[number] = {
                 "terminal_observation": self.infos["final_obs"][number],
                 "TimeLimit.truncated": bool(truncated[number] and not terminated[number]),
+                "deliveries": int(self.infos["final_info"]["deliveries"][number]),
             }
         return seen, rewards.astype(np.float32), ended, infos
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -36,7 +37,9 @@ from taichi_ants.worlds import World, build, from_text
 if TYPE_CHECKING:
     from taichi_ants.rendering import Scene
 
-Worlds = str | World | Sequence[str | World]
+Place = str | os.PathLike[str] | Mapping[str, Any] | World
+Worlds = Place | Sequence[Place]
+Rules = Task | Mapping[str, Any] | str
 
 
 def _action_masks() -> np.ndarray:
@@ -147,30 +150,60 @@ class Ants(ABC):
 
 
 def _worlds_of(world: Any, most: int, colonies: bool) -> tuple[World, ...]:
-    given = [world] if isinstance(world, (str, World)) else world
+    single = isinstance(world, (str, os.PathLike, Mapping, World))
+    given = [world] if single else world
     if not isinstance(given, (list, tuple)) or not given:
         raise AntsError(
             f"world is {shown(world)}; give the name of a world, a World, or a list of them."
         )
     if len(given) > most:
         raise AntsError(f"world lists {count(len(given), 'world')}; it must list at most {most}.")
-    several = tuple(
-        checks.checked_world(
-            one if not isinstance(one, str) else from_text(one) if "\n" in one else build(one),
-            several=colonies,
-        )
-        for one in given
-    )
+    several = tuple(checks.checked_world(_world_of(one), several=colonies) for one in given)
     ranges = {one.ranges for one in several}
     if len(ranges) > 1:
         raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must be the same.")
     return several
 
 
-class StepLimit:
-    """Base of environments that set `spec.max_episode_steps` to their own step limit.
+def _world_of(given: Any) -> Any:
+    if isinstance(given, Mapping):
+        try:
+            return World.from_dict(given)
+        except (KeyError, TypeError) as error:
+            raise AntsError(
+                f"the world is {shown(given)}; give a World or its `as_dict()`."
+            ) from error
+    text = isinstance(given, str) and "\n" in given
+    return given if isinstance(given, World) else from_text(given) if text else build(given)
 
-    Gymnasium sets it only if it wraps an environment in a `TimeLimit`.
+
+def task_of(given: Rules | None) -> Task:
+    """Return the task that is given as one, as its `as_dict()` or by its name, or the paper's."""
+    if isinstance(given, Mapping):
+        return Task.from_dict(given)
+    if isinstance(given, str):
+        check_one_of("task", given, tuple(Task.named()))
+        return Task.named()[given]
+    return checks.checked_task(Task() if given is None else given)
+
+
+def check_options(options: Any, *allowed: str) -> dict[str, Any]:
+    """Return the options of a reset; AntsError for others, TypeError unless they are a dict."""
+    if not isinstance(options, (dict, type(None))):
+        raise TypeError(f"options is {shown(options)}; it must be a dict or None.")
+    for name in options or {}:
+        if name not in allowed:
+            raise AntsError(
+                f"options has the key {shown(name)}, but reset reads "
+                f"{' '.join(allowed) or 'none'}; leave it out, or create another environment."
+            )
+    return options or {}
+
+
+class StepLimit:
+    """Base of environments whose `spec` has their own step limit and can be written as JSON.
+
+    Gymnasium sets `max_episode_steps` only if it wraps an environment in a `TimeLimit`.
     """
 
     _ants: Ants
@@ -183,12 +216,26 @@ class StepLimit:
 
     @spec.setter
     def spec(self, given: EnvSpec | None) -> None:
-        self._spec = given and replace(given, max_episode_steps=self.max_steps)
+        if given is not None:
+            kwargs = {name: _as_json(value) for name, value in given.kwargs.items()}
+            given = replace(given, max_episode_steps=self.max_steps, kwargs=kwargs)
+        self._spec = given
 
     @property
     def max_steps(self) -> int:
         """The step limit of an episode."""
         return self._ants.max_steps
+
+
+def _as_json(value: Any) -> Any:
+    """Return an argument as JSON has it, in a form that the environments accept."""
+    if isinstance(value, (list, tuple)):
+        return [_as_json(one) for one in value]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, (World, Task)):
+        return value.as_dict()
+    return getattr(value, "value", value)  # of an AutoresetMode
 
 
 class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
@@ -252,9 +299,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         return self._ants.shown.show(facts["state"]), self._infos(facts, mask)
 
     def _mask(self, options: dict[str, Any] | None) -> np.ndarray:
-        if not isinstance(options, (dict, type(None))):
-            raise TypeError(f"options is {shown(options)}; it must be a dict or None.")
-        mask, n = (options or {}).get("reset_mask"), self.num_envs
+        mask, n = check_options(options, "reset_mask").get("reset_mask"), self.num_envs
         if mask is None:
             return self._all
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
@@ -293,8 +338,8 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             seen[over] = np.fromiter(ants.shown.show(last["state"][over]), dtype=object)
             final = {"final_obs": seen, "_final_obs": over}
             final |= {"final_info": self._infos(last, over), "_final_info": over.copy()}
-            results = {"event", "reason"} & facts.keys()
-            facts |= {name: np.where(over, 0, facts[name]) for name in results}  # NONE
+            results = {"event", "reason", "deliveries"} & facts.keys()
+            facts |= {name: np.where(over, 0, facts[name]) for name in results}  # 0 is NONE
         infos = self._infos(facts, self._all) | final
         return ants.shown.show(facts["state"]), rewards, terminated, truncated, infos
 
@@ -384,12 +429,16 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         return infos | {f"_{name}": have.copy() for name in facts}
 
     def render(self) -> tuple[Any, ...] | None:
-        """Return a picture or a text map of each world, by `render_mode`, or None."""
+        """Return the world of each environment, as a picture or a text map, or None.
+
+        Ants that share a world also share its picture.
+        """
         if self.render_mode is None:
             return None
         if not self._begun:
             raise ResetNeeded("no episode has begun; call reset() before render().")
-        return tuple(map(self._ants.draw, range(self._n_worlds)))
+        drawn = map(self._ants.draw, range(self._n_worlds))
+        return tuple(one for one in drawn for _ in range(self.num_envs // self._n_worlds))
 
 
 def seeds_of(seed: Any, n: int) -> Sequence[int | None]:

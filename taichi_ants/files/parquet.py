@@ -9,20 +9,14 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import imported
 
 Types = Mapping[str, str]  # names of Arrow's types, by column
 
 
 def check_installed() -> None:
     """Raise AntsError if pyarrow, which writes Parquet, is not installed."""
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise AntsError(
-            "--parquet needs pyarrow, which is not installed; run pip install "
-            "'taichi-ants[parquet]', or leave out --parquet."
-        ) from error
+    imported("Parquet", "pyarrow", "parquet")
 
 
 def types_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, str]:

@@ -18,3 +18,4 @@ __all__ = [
     "settle",
     "td_learner",
 ]
+__dir__ = __all__.copy  # completion lists only public names

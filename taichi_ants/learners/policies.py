@@ -6,6 +6,7 @@ An ant takes an action with the largest value; ties are broken at random with eq
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -163,13 +164,14 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
 WITHOUT_LEARNING = {"trail_follower": trail_follower, "random": random_policy}
 
 
-def frozen_policy(name_or_path: str, observation: str = "paper") -> ActionValues:
+def frozen_policy(name_or_path: PathLike, observation: str = "paper") -> ActionValues:
     """Return a policy without learning by its name, or the policy in a file (.npz).
 
     Raises:
         AntsError: There is no such policy for this observation, or the file cannot be used.
     """
-    expect("policy", name_or_path, str)
+    expect("policy", name_or_path, str, os.PathLike)
+    name_or_path = os.fspath(name_or_path)
     if name_or_path in WITHOUT_LEARNING:
         return WITHOUT_LEARNING[name_or_path](observation)
     if not name_or_path.endswith(".npz"):

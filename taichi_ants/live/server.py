@@ -28,7 +28,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, imported
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import LOAD, QUICK, SLOW, Making, Undoing, uploaded
 from taichi_ants.live.session import Log, Session
@@ -140,12 +140,7 @@ class Room:
         port: int = 0,
         prepare: Callable[[], None] | None = None,
     ) -> None:
-        try:
-            import websockets  # noqa: F401
-        except ImportError:
-            raise AntsError(
-                'the library websockets is not installed; run pip install "taichi_ants[watch]".'
-            ) from None
+        imported("the live page", "websockets", "watch")
         try:
             self._socket = socket.create_server((HOST, port))
         except OSError as error:

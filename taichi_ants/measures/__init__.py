@@ -22,3 +22,4 @@ __all__ = [
     "share_in",
     "shortest_path",
 ]
+__dir__ = __all__.copy  # completion lists only public names

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError
+from taichi_ants.errors import AntsError, imported
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -78,7 +78,7 @@ class Tidy:
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the tidy rows as a `pandas.DataFrame`; AntsError if pandas is not installed."""
-        table = _imported("pandas", "pandas")
+        table = imported("to_pandas", "pandas", "pandas")
         return table.DataFrame(self.columns()).astype({"measure": "category"})
 
     def to_csv(self, path: files.PathLike) -> None:
@@ -88,7 +88,8 @@ class Tidy:
 
     def to_parquet(self, path: files.PathLike) -> None:
         """Write the tidy rows to a Parquet file; AntsError if pyarrow is not installed."""
-        arrow, parquet = _imported("pyarrow", "parquet"), _imported("pyarrow.parquet", "parquet")
+        arrow = imported("Parquet", "pyarrow", "parquet")
+        parquet = imported("Parquet", "pyarrow.parquet", "parquet")
         columns: dict[str, Any] = self.columns()
         columns["measure"] = arrow.array(columns["measure"].tolist()).dictionary_encode()
         if columns["seed"].dtype == object:  # beyond 63 bits
@@ -157,13 +158,3 @@ def _presentation() -> Any:
     import taichi_ants  # here, because `analysis` builds on the results that use this module
 
     return import_module(".results", taichi_ants.analysis.__name__)
-
-
-def _imported(name: str, extra: str) -> Any:
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise AntsError(
-            f"{name.partition('.')[0]} is not installed; install it with pip install "
-            f"'taichi-ants[{extra}]'."
-        ) from error

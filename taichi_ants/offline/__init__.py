@@ -22,3 +22,4 @@ __all__ = [
     "record",
     "record_colony",
 ]
+__dir__ = __all__.copy  # completion lists only public names

@@ -17,3 +17,4 @@ from taichi_ants.reference.learners import LEARNERS
 from taichi_ants.reference.observations import OBSERVATIONS
 
 __all__ = ["LEARNERS", "OBSERVATIONS", "ReferenceColony", "beginner", "follower"]
+__dir__ = __all__.copy  # completion lists only public names

@@ -46,3 +46,4 @@ __all__ = [
     "save_picture",
     "typical_seed",
 ]
+__dir__ = __all__.copy  # completion lists only public names

@@ -11,13 +11,12 @@ from contextlib import suppress
 from itertools import chain, groupby
 from numbers import Real
 from pathlib import Path
-from types import ModuleType
 from typing import BinaryIO
 
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, expect, shown
+from taichi_ants.errors import AntsError, expect, imported, shown
 from taichi_ants.rendering import colours
 
 DEFAULT_FPS = 8.0
@@ -64,7 +63,7 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
         )
     _check_number("fps", fps, "number", 0.1, 50)  # viewers slow down faster GIFs
     if target.suffix.lower() == ".mp4":
-        _import_av()
+        imported("an MP4 file", "av", "video")
     if is_old_folder:
         files.check_writable_folder(target.absolute().parent)
         named = target.name not in ("", "..") and not target.is_symlink()
@@ -267,7 +266,7 @@ def _palette(first: np.ndarray) -> np.ndarray:
 
 def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
     """Write an MP4 (H.264), without the last column or row of an odd width or height."""
-    av = _import_av()
+    av = imported("an MP4 file", "av", "video")
     from fractions import Fraction
 
     height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
@@ -286,14 +285,3 @@ def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: f
             video = video.reformat(format="yuv420p", dst_colorspace="ITU709")
             container.mux(stream.encode(video))
         container.mux(stream.encode())
-
-
-def _import_av() -> ModuleType:
-    try:
-        import av
-    except ImportError as error:
-        raise AntsError(
-            f"MP4 needs PyAV, which cannot be imported ({error}); install it with "
-            "pip install 'taichi_ants[video]', or choose a .gif file."
-        ) from error
-    return av

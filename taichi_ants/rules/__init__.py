@@ -7,3 +7,4 @@ from taichi_ants.rules.functions import exp, log, power
 from taichi_ants.rules.registry import KINDS, Parameters, Rule, get, names, register
 
 __all__ = ["KINDS", "Parameters", "Rule", "exp", "get", "log", "names", "power", "register"]
+__dir__ = __all__.copy  # completion lists only public names

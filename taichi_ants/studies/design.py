@@ -11,13 +11,12 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, imported, shown
 from taichi_ants.files.results import UNFINISHED, manifest_in
 
 GRID, LATIN_HYPERCUBE, SOBOL, RANDOM = DESIGNS = ("grid", "latin_hypercube", "sobol", "random")
@@ -157,7 +156,7 @@ class Design:
                 f"samples is {samples}; with sensitivity it must be a power of 2, for example 64."
             )
         if sensitivity:
-            check_installed("SALib", "sensitivity", "sensitivity = true")
+            imported("sensitivity = true", "SALib", "sensitivity")
         return cls(kind, samples, seed, sensitivity)
 
     def facts(self) -> dict[str, Any]:
@@ -241,15 +240,6 @@ def varying(axes: Mapping[str, Axis]) -> dict[str, Axis]:
 def logarithmic(axes: Mapping[str, Axis]) -> set[str]:
     """Return the names of the axes that have a logarithmic scale."""
     return {name for name, one in axes.items() if isinstance(one, Range) and one.log}
-
-
-def check_installed(module: str, extra: str, what: str) -> None:
-    """Raise AntsError if the module that `what` requires is not installed."""
-    if find_spec(module) is None:
-        raise AntsError(
-            f"{what} requires {module}, which is not installed; install it with pip install "
-            f"'taichi-ants[{extra}]'."
-        )
 
 
 def _grid_values(name: str, axis: Axis) -> Sequence[Any]:

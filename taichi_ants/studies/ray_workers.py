@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from taichi_ants.errors import AntsError, count
+from taichi_ants.errors import AntsError, count, imported
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies import executors
 from taichi_ants.studies.executors import RESUME, LostWorkersError, check_versions
@@ -65,13 +65,7 @@ class RayWorkers:
             os.environ.setdefault("RAY_NUM_REDIS_GET_RETRIES", "1")
             if _has_token():  # `ray start` demands it then; clusters without tokens ignore it
                 os.environ.setdefault("RAY_AUTH_MODE", "token")
-        try:
-            import ray
-        except ImportError as error:
-            raise AntsError(
-                'Ray is not installed; run pip install "taichi_ants[ray]", or leave out --ray.'
-            ) from error
-        self._ray = ray
+        self._ray = ray = imported("a cluster", "ray", "ray")
         # With `log_to_driver=False`, Ray still prints the deaths of machines to standard output.
         if (private := sys.modules.get("ray._private.worker")) is not None:
             vars(private)["print_to_stdstream"] = lambda *given, **more: None

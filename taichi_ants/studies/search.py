@@ -21,7 +21,7 @@ import numpy as np
 from taichi_ants import checks, files
 from taichi_ants.analysis import searches, style, sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
-from taichi_ants.errors import AntsError, checked_flag, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_flag, checked_whole, imported, shown
 from taichi_ants.files.results import REPORT, ROWS
 from taichi_ants.settings import flat, nested, not_a_setting
 from taichi_ants.studies import design, sweep
@@ -121,7 +121,7 @@ class Search:
             file,
         )
         for module in ("optuna", "tomli_w"):
-            design.check_installed(module, "search", "[search]")
+            imported("[search]", module, "search")
         asked._check_trials()
         return asked
 

@@ -8,7 +8,7 @@ from taichi_ants.task.labour import Labour
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
-from taichi_ants.task.task import Life, Task, Traffic, foraging, paper, queueing
+from taichi_ants.task.task import Life, Task, Traffic, fetching, foraging, paper, queueing
 
 __all__ = [
     "Caste",
@@ -24,7 +24,9 @@ __all__ = [
     "Task",
     "Threshold",
     "Traffic",
+    "fetching",
     "foraging",
     "paper",
     "queueing",
 ]
+__dir__ = __all__.copy  # completion lists only public names

@@ -333,7 +333,7 @@ class Task(Settings, path="task"):
 
     @classmethod
     def named(cls) -> Mapping[str, Task]:
-        """Return the named tasks: "paper", "foraging" and "queueing"."""
+        """Return the named tasks: "paper", "fetching", "foraging" and "queueing"."""
         return _named()
 
     def _check_choice(self) -> None:
@@ -494,6 +494,15 @@ def queueing() -> Task:
     )
 
 
+def fetching() -> Task:
+    """Return the paper's task without its reward for moves onto a trail or nearer to the queen.
+
+    An episode of one ant rewards only one pick-up and one delivery. Therefore circling does not
+    pay, and the best policy delivers at every discount.
+    """
+    return Task(rewards=Rewards(shaping=0))
+
+
 def paper() -> Task:
     """Return the paper's task, which is the default everywhere."""
     return Task()
@@ -501,4 +510,5 @@ def paper() -> Task:
 
 @cache
 def _named() -> Mapping[str, Task]:
-    return MappingProxyType({"paper": paper(), "foraging": foraging(), "queueing": queueing()})
+    built = (paper, fetching, foraging, queueing)
+    return MappingProxyType({function.__name__: function() for function in built})

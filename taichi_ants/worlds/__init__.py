@@ -30,3 +30,4 @@ __all__ = [
     "settings_of",
     "to_text",
 ]
+__dir__ = __all__.copy  # completion lists only public names

@@ -108,7 +108,7 @@ def test_parquet_has_the_rows(series, tmp_path):
 
 def test_missing_extras_are_named(series, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(AntsError, match=r"pip install 'taichi-ants\[pandas\]'"):
+    with pytest.raises(AntsError, match=r'pip install -e "\.\[pandas\]"'):
         series.to_pandas()
 
 

@@ -311,7 +311,7 @@ def test_tables_are_written_as_parquet_too(sweep, capsys, monkeypatch):
         patch.setitem(sys.modules, "pyarrow", None)
         status, _, err = sweep(COLONY, "whole", "--parquet")
         assert status == 2
-        assert "pip install 'taichi-ants[parquet]'" in err
+        assert 'pip install -e ".[parquet]"' in err
     assert sweep(COLONY, "plain")[0] == 0
     before = contents(Path("plain"))
     real, seen = ColonyPoint.do, []

@@ -111,7 +111,7 @@ def test_a_browser_is_opened_on_a_private_file(monkeypatch: pytest.MonkeyPatch) 
 def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "websockets", None)
     session = Session(Choices({}).setup(load("watch").START))
-    with pytest.raises(AntsError, match=r'pip install "taichi_ants\[watch\]"\.$'):
+    with pytest.raises(AntsError, match=r'pip install -e "\.\[watch\]" in your clone\.$'):
         Room(session, Choices({}))
 
 

@@ -204,8 +204,8 @@ def test_a_missing_pettingzoo_is_named(tmp_path):
         [sys.executable, "-c", code], env=environment(tmp_path), capture_output=True, text=True
     )
     assert done.stderr.splitlines()[-1] == (
-        "ImportError: colony_v0 needs PettingZoo; install it with: pip install "
-        '"taichi_ants[pettingzoo]".'
+        "ImportError: colony_v0 needs pettingzoo, which cannot be imported; run pip install -e "
+        '".[pettingzoo]" in your clone.'
     )
 
 

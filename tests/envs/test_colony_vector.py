@@ -71,7 +71,7 @@ def test_each_world_is_the_parallel_environment_of_its_seed(form):
             for i in range(ANTS):
                 assert_same(seen[w * ANTS + i], np.asarray(observations[f"ant_{i}"]))
                 assert seen[w * ANTS + i] in many.single_observation_space
-                assert said[f"ant_{i}"].keys() == {"state", "action_mask", "event"}
+                assert said[f"ant_{i}"].keys() == {"state", "action_mask", "event", "deliveries"}
                 for name, value in said[f"ant_{i}"].items():
                     assert_same(infos[name][w * ANTS + i], value)
                     assert infos[f"_{name}"].all()
@@ -132,7 +132,7 @@ def test_the_autoreset_modes_differ_in_when_they_begin_alone():
             else:
                 assert_same(ours[0], theirs[0])
             assert ("final_obs" in ours[-1]) == (step in (19, 39))
-            for name in ("state", "action_mask", "event"):
+            for name in ("state", "action_mask", "event", "deliveries"):
                 assert_same(final[name], theirs[-1][name])
 
 
@@ -233,7 +233,7 @@ def test_what_users_register_and_wrap():
         *_, infos = listed.step(env.action_space.sample())
     assert len(infos) == 64
     assert set(infos[0]) == {
-        *("state", "action_mask", "event", "final_obs", "final_info", "episode")
+        *("state", "action_mask", "event", "deliveries", "final_obs", "final_info", "episode")
     }
     assert infos[0]["final_info"]["event"] in (
         Event.ENTERED_EMPTY,
@@ -260,7 +260,10 @@ def test_pictures_of_each_world():
     with pytest.raises(ResetNeeded):
         env.render()
     env.reset(seed=1)
-    first, second = env.render()
+    pictures = env.render()
+    assert len(pictures) == env.num_envs  # as Gymnasium's RecordVideo expects
+    first, second = pictures[0], pictures[ANTS]
+    assert first is pictures[ANTS - 1]
     assert first.dtype == np.uint8
     assert (first != second).any()  # the ants stand elsewhere
     assert ants_of().render() is None
@@ -304,7 +307,7 @@ def test_steps_in_the_wrong_order_and_wrong_actions():
             {"task": Task(), "autoreset_mode": NEXT},
             "autoreset_mode is 'NextStep', but the next episode of an ant",
         ),
-        ({"task": "paper"}, "task is 'paper'; it must be a Task"),
+        ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
         ({"world": "nowhere"}, "there is no world named 'nowhere'"),
         ({"world": []}, "world is .*; give the name of a world"),
         ({"world": 3}, "world is 3; give the name of a world"),

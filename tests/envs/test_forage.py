@@ -187,7 +187,8 @@ def test_infos_have_the_same_numbers_after_each_reset_and_step():
     """A corridor with the queen behind the ant: each event, with the reason where there is one."""
     world = World((5, 5, 1), (0, 0, 0), foods=[(3, 0, 0)], ants=[((1, 0, 0), 0)])
     env = gymnasium.make(ID, world=world)
-    kinds = {"state": np.int64, "action_mask": np.ndarray, "event": np.int64, "reason": np.int64}
+    kinds = dict.fromkeys(("state", "event", "reason", "deliveries"), np.int64)
+    kinds["action_mask"] = np.ndarray
     _, info = env.reset(seed=0)
     codes = [(info["event"], info["reason"])]
     for action in (3, 4, 1, 1, 3, 3, 4, 1, 1, 4):
@@ -437,7 +438,9 @@ def test_wrong_steps_raise_what_gymnasium_raises():
         ({"world": []}, "world is []"),
         ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "all must be the same"),
         ({"world": SMALL, "num_envs": 2}, "world lists 3 worlds; it must list at most 2"),
-        ({"task": "paper"}, "a Task"),
+        ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
+        ({"task": 3}, "a Task"),
+        ({"world": {"ranges": (3, 3, 3)}}, "give a World or its `as_dict()`"),
         ({"task": Task(life=Life(regrowth=0))}, "use a Colony"),
         ({"task": Task(pheromone=Pheromone(diffusion=0.5))}, "use a Colony"),
         ({"delivery": "never"}, "delivery is 'never'"),

@@ -52,7 +52,7 @@ class Page:
         self.holds |= {tuple(cell): ROCK for cell in world.obstacles.tolist()}
         self.trail = {tuple(cell): level for *cell, level in world.trails.tolist()}
         *cell, self.heading = world.ants[0].tolist()
-        self.cell, self.load, self.steps = tuple(cell), 0, 0
+        self.cell, self.load, self.steps, self.deliveries = tuple(cell), 0, 0, 0
         return self.info(0, 0)
 
     def content(self, cell: tuple[int, ...]) -> int:
@@ -98,6 +98,7 @@ class Page:
             reason = 7 if self.load else 6
         else:
             self.load, event, reward = 0, 5, 10
+            self.deliveries += 1
         if self.evaporates:
             self.trail = {cell: max(level - 1, 0) for cell, level in self.trail.items()}
         self.steps += 1
@@ -112,7 +113,8 @@ class Page:
         if not any(mask):
             mask[:3] = 1, 1, 1
         state = 64 * self.load + 16 * left + 4 * forward + right
-        return {"state": state, "action_mask": mask, "event": event, "reason": reason}
+        told = {"state": state, "action_mask": mask, "event": event, "reason": reason}
+        return {**told, "deliveries": self.deliveries}
 
 
 def garden(seed: int) -> World:
@@ -159,7 +161,7 @@ def compare(steps: int, seed: int) -> int:
             _, reward, *over, info = env.step(action)
             reward_told, *over_told, told = page.step(action)
             assert (reward, over) == (reward_told, over_told)
-            done, ended, deliveries = done + 1, any(over), deliveries + (told["event"] == 3)
+            done, ended, deliveries = done + 1, any(over), deliveries + (told["event"] == 5)
         assert {**info, "action_mask": info["action_mask"].tolist()} == told
     return deliveries
 

@@ -19,7 +19,7 @@ def test_without_stable_baselines3_a_sentence_names_the_extra(
 ) -> None:
     monkeypatch.setitem(sys.modules, "stable_baselines3.common.vec_env", None)
     monkeypatch.delitem(sys.modules, "taichi_ants.envs.sb3", raising=False)
-    with pytest.raises(ImportError, match=r'install it with pip install "taichi_ants\[sb3\]"\.$'):
+    with pytest.raises(ImportError, match=r'run pip install -e "\.\[sb3\]" in your clone\.$'):
         import taichi_ants.envs.sb3  # noqa: F401
 
 

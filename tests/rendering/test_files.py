@@ -238,7 +238,7 @@ def test_wrong_speeds(tmp_path, fps) -> None:
 
 def test_a_missing_pyav_is_named(tmp_path, monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(AntsError, match=r"pip install 'taichi_ants\[video\]'"):
+    with pytest.raises(AntsError, match=r'pip install -e "\.\[video\]"'):
         check_animation(tmp_path / "a.mp4", 8)
 
 

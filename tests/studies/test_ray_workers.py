@@ -114,7 +114,7 @@ def test_ray_is_an_extra(monkeypatch, sweep):
     status, _, err = sweep("--ray")
     assert status == 2
     assert_one_sentence(err)
-    assert 'Ray is not installed; run pip install "taichi_ants[ray]"' in err
+    assert 'needs ray, which cannot be imported; run pip install -e ".[ray]"' in err
 
 
 def test_a_token_of_this_machine_is_found(monkeypatch, tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 
 import numpy as np
 import optuna
@@ -12,7 +13,7 @@ from command_lines import call
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
-from taichi_ants.studies import design, search
+from taichi_ants.studies import search
 from taichi_ants.studies.search import Search
 from taichi_ants.studies.sweep import Sweep, sweep_of
 
@@ -379,6 +380,6 @@ def test_a_search_is_a_table():
 
 @pytest.mark.parametrize("missing", ["optuna", "tomli_w"])
 def test_a_missing_extra_is_named_with_the_command(missing, monkeypatch):
-    monkeypatch.setattr(design, "find_spec", lambda name: None if name == missing else name)
-    with pytest.raises(AntsError, match=rf"{missing}.* pip install 'taichi-ants\[search\]'"):
+    monkeypatch.setitem(sys.modules, missing, None)
+    with pytest.raises(AntsError, match=rf'{missing}.* pip install -e "\.\[search\]"'):
         read()

@@ -304,7 +304,7 @@ def step_kernel(
         if a.changed[i] == 1:
             restore(a, own, origin, a.cells[own + a.size], a.cells[own + a.size + 1])
         ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
-        a.steps[i], a.changed[i] = 0, ti.cast(0, ti.u8)
+        a.steps[i], a.deliveries[i], a.changed[i] = 0, 0, ti.cast(0, ti.u8)
         put(a, i, ant)
         observe(a, i, origin, ant, 0)
 
@@ -333,6 +333,8 @@ def step_kernel(
             changed, a.random_states[i] = 1, after.random_state
         a.changed[i] = ti.cast(changed, ti.u8)
         a.steps[i] = a.steps[i] + 1
+        if after.event == Event.DELIVERED:
+            a.deliveries[i] += 1
         put(a, i, after)
         observe(a, i, ti.select(changed == 1, own, origin), after, clock + a.evaporates)
         last = ti.cast(a.steps[i] == a.max_steps, ti.i32)
@@ -354,6 +356,7 @@ def step_kernel(
                     ended = do(a, i, own, origin, ti.cast(a.actions[i], ti.i32))
                     if ended & a.same_step == 1:
                         a.final_states[i], a.final_percepts[i] = a.states[i], a.percepts[i]
+                        a.final_deliveries[i] = a.deliveries[i]
                         begin(a, i, own, origin)
                 elif a.commands[i] == Command.BEGIN:
                     a.rewards_of[i], a.events[i] = 0.0, ti.cast(Event.NONE, ti.u8)

@@ -76,6 +76,7 @@ def rollout_kernel(
         percept, state = ti.cast(a.percepts[i], ti.i32), a.states[i]
         # Until an ant changes its world, it reads cells that all ants share.
         steps, base = a.steps[i], ti.select(a.changed[i] == 1, own, origin)
+        deliveries = a.deliveries[i]
         command, choices = ti.cast(a.commands[i], ti.i32), a.choices[i]
         for t in range(n_steps):
             action, event, terminated, truncated = 0, ti.cast(Event.NONE, ti.i32), 0, 0
@@ -98,6 +99,7 @@ def rollout_kernel(
                     a.changed[i] = ti.cast(1, ti.u8)
                     base = own
                 steps += 1
+                deliveries += ti.cast(event == Event.DELIVERED, ti.i32)
                 percept, state, ant.random_state = observe(a, base, ant, steps * a.evaporates)
                 last = ti.cast(steps == a.max_steps, ti.i32)
                 terminated, truncated = step_end(
@@ -116,7 +118,7 @@ def rollout_kernel(
                 stream = ant.random_state
                 ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
                 ant.random_state = stream
-                steps, base, command = 0, origin, Command.STEP
+                steps, deliveries, base, command = 0, 0, origin, Command.STEP
                 percept, state, ant.random_state = observe(a, origin, ant, 0)
                 seen = state
             result = event | terminated * TERMINATED | truncated * TRUNCATED | action << 8
@@ -127,7 +129,7 @@ def rollout_kernel(
         if ti.static(deposit == FADING):
             a.carried[i] = ant.carried
         a.percepts[i], a.states[i] = ti.cast(percept, ti.u8), state
-        a.steps[i], a.commands[i] = steps, ti.cast(command, ti.u8)
+        a.steps[i], a.deliveries[i], a.commands[i] = steps, deliveries, ti.cast(command, ti.u8)
         ended = ti.cast(command != Command.STEP, ti.u8)  # for `LoneAnts.over`
         a.terminations[i], a.truncations[i] = ended, ended
         if ti.static(follows):
