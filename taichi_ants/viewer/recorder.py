@@ -6,7 +6,7 @@ A colony of one ant replays the episode of a trace.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import Episode, colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
-from taichi_ants.task.field import TRAIL
+from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.viewer.frames import Recording, pack, types_of
 
@@ -111,7 +111,6 @@ class Recorder:
         self._learns = colony.sharing != "frozen"
         learner = learners.get(colony.training.learner)
         self._has_td_errors = learner.td_error is not None and not learner.plans
-        self._draws_ahead = self._learns and learner.draws_next_action
         # The data of a page that has read all frames so far.
         self._numbers = np.zeros(0, np.int32)
         self._ground, self._kinds = (np.zeros(self.grid.size, np.uint8) for _ in range(2))
@@ -137,7 +136,7 @@ class Recorder:
         changes = task.life.births or task.life.lifespan
         ants = "Ants" if changes else count(colony.ants, "ant")
         return {
-            "format": 3,
+            "format": 4,
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
@@ -154,12 +153,33 @@ class Recorder:
             "castes": list(task.castes),
             "foods": list(task.foods),
             "idles": task.labour.divides,
+            "rule": "" if colony.is_given_actions else task.choice.rule,
+            "values": self._by_values,  # whether ants choose by action values
+            # The view of the pheromone, "" if an ant may know more or less than its letters say.
+            "seen_by": self._rule.view if self._by_letters else "",
+            "groups": [*self._groups()],  # of ants: the castes, or one of all ants
             "learns": self._learns,
             "own_tables": colony.one_a_slot,
-            "draws_ahead": self._draws_ahead,
             "follow": self._follow,
             "about": self._about(),
         }
+
+    @property
+    def _by_values(self) -> bool:
+        return self.colony.task.choice.needs_table and not self.colony.is_given_actions
+
+    @property
+    def _by_letters(self) -> bool:
+        task = self.colony.task
+        is_own = task.choice.own_rule or not task.sees.encode.__module__.startswith("taichi_ants.")
+        return self._by_values and not is_own and not task.noise.misread
+
+    def _groups(self) -> Iterator[dict[str, Any]]:
+        task = self.colony.task
+        names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
+        for caste in task.castes.values() or [None]:
+            learns = self._learns and not (caste and caste.policy)
+            yield {"cues": [names[cue] for cue in task.cues_of(caste)], "learns": learns}
 
     @property
     def _rewards_by_event(self) -> bool:
@@ -201,8 +221,10 @@ class Recorder:
             lines["table"] = "one per ant" if colony.one_a_slot else shared
             lines["learning rate"] = f"{config.learning_rate:g}"
             lines["discount"] = f"{config.discount:g}"
-        else:
+        elif self._by_values:
             lines |= {"policy": "frozen", "epsilon": f"{colony.epsilon:g}"}
+        if colony.task.choice.rule != "greedy":
+            lines["rule of choice"] = colony.task.choice.rule
         return [*lines.items()]
 
     def snapshot(self) -> bytes:
@@ -229,7 +251,11 @@ class Recorder:
             return self._frame({})
         colony, slots = self.colony, self._living()
         states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
-        before = self._tables()
+        before, ahead = self._tables(), np.zeros(len(slots), bool)
+        if colony.draws_ahead:
+            ahead = (
+                colony.arrays["next_action"].reshape(colony.living.shape)[self.world, slots] >= 0
+            )
         colony.tick()
         # Slots of ants that died still hold their data.
         after = colony.numbers[self.world]
@@ -237,8 +263,10 @@ class Recorder:
         places = order[np.searchsorted(after, numbers, sorter=order)]
         actions = colony.actions[self.world, places]
         executed = colony.executed[self.world, places]
-        executed = np.where(executed < 0, _IDLE, executed)
-        acts = {"acts": executed + 16 * colony.events[self.world, places]}
+        acted = np.where(executed < 0, _IDLE, executed)
+        acts = {"acts": acted + 16 * colony.events[self.world, places]}
+        if ahead.any() or (actions != executed).any():
+            acts["choices"] = np.maximum(actions, 0) + 8 * ahead
         if not self._rewards_by_event:
             acts["rewards"] = colony.rewards[self.world, places]
         if td_errors is None and self._learns:

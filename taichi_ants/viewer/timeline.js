@@ -87,8 +87,8 @@ class Timeline {
           <line class="cursor" y1="0" y2="100"/>
         </svg></div>`).join("");
     this.curves = [...document.querySelectorAll(".curve")];
-    // There is no curve of epsilon if it is always 0.
-    const explores = history.live || history.frames.some((frame) => frame.epsilon > 0);
+    // There is no curve of epsilon if it is always 0, or has no effect.
+    const explores = history.header.values && (history.live || history.frames.some((frame) => frame.epsilon > 0));
     this.curves.forEach((curve, number) => (curve.hidden = CURVES[number][0] === "epsilon" && !explores));
     for (const curve of this.curves) {
       const svg = curve.querySelector("svg");

@@ -259,7 +259,7 @@ def test_a_click_follows_an_ant_or_looks_at_a_cell(crowd, colony):
     marked = np.flatnonzero((true.ground == 0) & (true.trail >= 1)).tolist()
     cell = next(c for c in marked if c not in taken)
     crowd.click_cell(cell)
-    assert f"trail {true.trail[cell]:.2f} of 250" in crowd.text("#cell")
+    assert f"trail {true.trail[cell]:.2f} (darkest from 250)" in crowd.text("#cell")
     crowd.click("#cell-close")
     crowd.tab.wait_for_selector("#cell", state="hidden")
 
@@ -472,7 +472,7 @@ def test_the_panel_shows_what_an_ant_with_food_sees(ant, episode):
     letters = ant.text("#ant b").split()[1:]
     colours = {"E": "var(--empty)", "O": "var(--rock)", "S": "var(--empty)"}
     assert ant.read(fills) == [colours[letter] for letter in letters]
-    assert "ants with food do not see trails" in ant.text("#ant")
+    assert "ants with food do not see the trail" in ant.text("#ant")
     ant.read("() => { viewer.history.kept = []; viewer.history.world.moment = 1e9; }")
 
 
