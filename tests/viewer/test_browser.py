@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from browser import Page, assert_policy_holds, started
+from browser import Page, assert_policy_holds, printed, shares, started
 from command_lines import crowding
 from playback import played
 
@@ -230,6 +230,7 @@ def test_the_time_line_and_the_curves_seek(ant):
     events = ant.read("viewer.history.events.map(({ moment, kind }) => [moment, kind])")
     assert events == [[17, "PICKED_UP"], [34, "DELIVERED"]]
     assert ant.tab.locator("#events .picked").get_attribute("d").count("M") == 1
+    assert ant.tab.locator("#events .gaps").get_attribute("d") == ""  # each action is recorded
     # Who never explores has no curve of epsilon.
     assert ant.tab.locator(".curve:visible b").all_inner_texts() == ["0", "19"]
 
@@ -491,6 +492,28 @@ def test_a_page_is_printed_light_and_without_controls(browser, episode):
     dark.close()
 
 
+def test_ants_are_printed_in_their_world(browser, episode, tmp_path):
+    """The first print of a page has cells, trails and marks, in light colours, and all facts."""
+    dark = Page(browser, episode[0], color_scheme="dark")
+    dark.read("viewer.player.go(9)")
+    dark.settle()
+    text, sheets = printed(dark.tab, tmp_path)
+    assert len(sheets) <= 2
+    assert dark.read("document.documentElement.dataset.theme") == "dark"
+    light = dark.read(
+        """() => { viewer.wear("light"); const { ramp, colours } = viewer.stage;
+          const level = ramp[Math.round(255 * (25 - 9) / 250)].map((one) => one.toString(16));
+          return [colours.empty, "#" + level.join(""), colours.food, colours.queen]; }"""
+    )
+    empty, trail, food, queen = shares(sheets, *light)
+    assert empty > 0.08  # much more than in the legend
+    assert trail > 0.002
+    assert food > 1e-4
+    assert queen > 1e-4
+    assert all(words in text for words in ("Chooses forward", "observation", "delivered", "trail"))
+    dark.close()
+
+
 def test_light_and_dark(browser, episode):
     dark = Page(browser, episode[0], color_scheme="dark")
     look = "document.documentElement.dataset.theme"
@@ -740,6 +763,7 @@ def test_what_lies_between_moments_is_not_made_up(browser, folder):
     opened.read("viewer.player.go(6)")
     assert opened.read("viewer.history.path(6, 0).length") == 1
     assert opened.tab.get_attribute("#time", "max") == "60"
+    assert opened.tab.locator("#events .gaps").get_attribute("d") == "M0.0 7H1000.0"
     opened.read("viewer.timeline.setSpeed(12)")
     assert opened.text("#speed-value") == "120 ticks/s"
     opened.tab.focus("#time")
