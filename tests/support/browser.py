@@ -52,7 +52,7 @@ def printed(tab: Any, folder: Path) -> tuple[str, list[np.ndarray]]:
 
 
 def shares(sheets: list[np.ndarray], *colours: str) -> list[float]:
-    """Return the largest share of a sheet that has each colour, "#rrggbb"; print changes it a bit."""
+    """Return the largest share of a sheet with each colour, "#rrggbb"; print changes it a bit."""
     wanted = [np.array([*bytes.fromhex(one[1:])]) for one in colours]
     same = [[(abs(sheet - one) <= 3).all(-1).mean() for sheet in sheets] for one in wanted]
     return [float(max(of_sheets)) for of_sheets in same]

@@ -508,8 +508,8 @@ def test_ants_are_printed_in_their_world(browser, episode, tmp_path):
     empty, trail, food, queen = shares(sheets, *light)
     assert empty > 0.08  # much more than in the legend
     assert trail > 0.002
-    assert food > 1e-4
-    assert queen > 1e-4
+    assert food > 5e-5
+    assert queen > 5e-5
     assert all(words in text for words in ("Chooses forward", "observation", "delivered", "trail"))
     dark.close()
 
