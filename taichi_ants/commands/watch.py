@@ -51,6 +51,10 @@ START: dict[str, Any] = {
 }
 
 
+FULL = 300  # ticks after which lanes connect the queen and the food
+LEARNED = 20  # episodes of the first session before a page opens, so that its ants deliver
+
+
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
@@ -89,8 +93,13 @@ def watch(settings: argparse.Namespace) -> None:
             session = Session.load(settings.session, progress)
     else:
         session = Session(choices.setup(START))
+        with progress_bar("Learning") as progress:
+            for done in range(LEARNED):
+                session.leap(session.setup.ticks_per_episode + 1)
+                progress((done + 1) / LEARNED)
+            session.leap(FULL)
     prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
-    room = Room(session, choices, settings.port, prepare)
+    room = Room(session, choices, settings.port, prepare, playing=not settings.session)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
     with ExitStack() as opened:
         if not settings.no_browser and sys.stdout.isatty():
