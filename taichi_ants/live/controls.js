@@ -175,7 +175,8 @@ class Controls {
     }
     for (const group of document.querySelectorAll("#settings fieldset")) group.hidden = !group.querySelector(".setting:not([hidden])");
     const follows = policy === "by hand" ? "The ants follow trails by a fixed rule, and do not learn." : `The ants follow ${name}, and do not learn.`;
-    byId("policy-help").textContent = policy.startsWith("learn ") ? `The ants learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
+    byId("policy-help").textContent = this.settings()["task.choice.rule"] === "deneubourg" ? "The ants choose by the rule deneubourg, without a policy, and do not learn."
+      : policy.startsWith("learn ") ? `The ants learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
   }
 
   /* Insert long text into the map at once, because browsers need quadratic time in its lines. */
