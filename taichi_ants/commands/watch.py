@@ -51,8 +51,9 @@ START: dict[str, Any] = {
 }
 
 
-FULL = 300  # ticks after which lanes connect the queen and the food
-LEARNED = 20  # episodes of the first session before a page opens, so that its ants deliver
+# Steps of the first session before a page opens: twenty episodes, after which its ants deliver, and
+# the ticks in which they lay lanes between the queen and the food.
+LEARNED = 20 * (1000 + 1) + 300
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -93,11 +94,7 @@ def watch(settings: argparse.Namespace) -> None:
             session = Session.load(settings.session, progress)
     else:
         session = Session(choices.setup(START))
-        with progress_bar("Learning") as progress:
-            for done in range(LEARNED):
-                session.leap(session.setup.ticks_per_episode + 1)
-                progress((done + 1) / LEARNED)
-            session.leap(FULL)
+        session.leap(LEARNED)
     prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
     room = Room(session, choices, settings.port, prepare, playing=not settings.session)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)

@@ -50,16 +50,10 @@ class Controls {
     document.querySelector(".stage").append(byId("notices"));
     byId("hint").before(byId("intro"));
     for (const label of document.querySelectorAll("[data-help]")) {
-      const box = document.createElement("div");
-      box.className = "field";
-      label.replaceWith(box);
-      box.append(label);
-      box.insertAdjacentHTML("beforeend", helpOf(label.firstChild.data.trim(), label.dataset.help));
+      label.outerHTML = `<div class="field">${label.outerHTML}${helpOf(label.firstChild.data.trim(), label.dataset.help)}</div>`;
     }
-    byId("controls").addEventListener("click", ({ target }) => {
-      if (!target.matches(".help")) return;
-      target.setAttribute("aria-expanded", target.nextSibling.hidden);
-      target.nextSibling.hidden = !target.nextSibling.hidden;
+    byId("controls").addEventListener("click", ({ target: { classList, ariaExpanded, nextSibling }, target }) => {
+      if (classList.contains("help")) [target.ariaExpanded, nextSibling.hidden] = [ariaExpanded === "false", ariaExpanded === "true"];
     });
     byId("theme").insertAdjacentHTML("beforebegin", '<span class="watchers" id="watchers"></span>');
     const on = (id, kind, act) => byId(id).addEventListener(kind, act);
@@ -272,7 +266,8 @@ class Controls {
     this.showWorks(works);
     byId("undo").disabled = !canUndo;
     byId("go-back").hidden = !canGoBack;
-    this.introduce(values);
+    byId("sees").textContent = `Ants search for food and carry it to their queen${values.deposit ? ", and lay trails that other ants can follow" : ""}.`;
+    document.querySelector("[data-try=rule]").hidden = !values.evaporation;
     const box = byId("sliders"), names = Object.keys(values).join();
     if (box.dataset.names !== names) {
       box.dataset.names = names;
@@ -297,28 +292,16 @@ class Controls {
     byId("watchers").innerHTML = pages > 1 ? `${pages} pages<span> show this session</span>` : "";
   }
 
-  /* Tell in a sentence what the page shows. */
-  introduce({ deposit, evaporation }) {
-    const { learns, nests } = this.live.viewer?.history.header ?? {}, queen = nests > 1 ? "queens" : "queen";
-    byId("sees").textContent = `The ants ${learns ? "learn to carry" : "carry"} food to their ${queen}`
-      + (deposit ? `, and those with food lay the trail by which others find it.` : ".");
-    document.querySelector("[data-try=rule]").hidden = !evaporation;
-  }
-
   /* Do what a card suggests, or choose the tool for it. */
   suggest(what) {
-    const { live } = this, { history } = live.viewer;
-    if (what === "rule") byId("set-evaporation").click();
-    if (what === "wall") {
-      live.tools.choose("rock");
-      byId("world").focus();
-    } else if (what === "trail") {
-      const { trail } = history.worldAt(history.length - 1), cells = [...trail.keys()].filter((cell) => trail[cell] > 0);
-      live.tools.number = live.nextStroke();
-      live.tools.edit("trail", { level: 0, ...live.tools.field() }, cells);
-    }
-    const said = { wall: "Draw on the world.", trail: "The trail is gone.", rule: `Trails ${byId("set-evaporation")?.checked ? "evaporate" : "do not evaporate"} from now on.` };
-    if (what) this.say(`${said[what]} Undo takes it back.`);
+    const { tools, viewer: { history } } = this.live, rule = byId("set-evaporation"), { trail } = history.worldAt(history.length - 1);
+    if (what === "rule") rule.click();
+    if (what === "wall") tools.choose("rock");
+    if (what === "wall") byId("world").focus();
+    if (what === "trail") tools.number = this.live.nextStroke();
+    if (what === "trail") tools.edit("trail", { level: 0, ...tools.field() }, [...trail.keys()].filter((cell) => trail[cell] > 0));
+    const said = { wall: "Draw on the world.", trail: "The trail is gone.", rule: `From now on, trails ${rule?.checked ? "" : "do not "}evaporate.` }[what];
+    if (said) this.say(`${said} Undo takes it back.`);
   }
 
   /* Show the rates, which decay per episode, of the drawn frame. */

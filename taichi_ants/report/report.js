@@ -3,7 +3,7 @@
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 const players = [];
-let chosenTheme = "", closed = []; // details that only a print opens
+let chosenTheme = "", closed = []; // details that are open only in print
 
 function showTheme(wanted = chosenTheme || (dark.matches ? "dark" : "light")) {
   document.documentElement.dataset.theme = wanted;
@@ -11,14 +11,10 @@ function showTheme(wanted = chosenTheme || (dark.matches ? "dark" : "light")) {
 }
 
 /* Print in light mode, with all details open: before the browser divides the text into pages. */
-function print() {
-  closed = [...document.querySelectorAll("details:not([open])")];
-  for (const one of closed) one.open = true;
-  showTheme("light");
-}
-function printed() {
-  for (const one of closed) one.open = false;
-  showTheme();
+function print(begins) {
+  if (begins) closed = [...document.querySelectorAll("details:not([open])")];
+  for (const one of closed) one.open = begins;
+  showTheme(begins ? "light" : undefined);
 }
 
 class SmallPlayer {
@@ -167,8 +163,7 @@ async function open() {
     showTheme();
   });
   dark.addEventListener("change", () => showTheme());
-  addEventListener("beforeprint", print);
-  addEventListener("afterprint", printed);
+  for (const kind of ["beforeprint", "afterprint"]) addEventListener(kind, () => print(kind === "beforeprint"));
   showTheme();
   for (const figure of document.querySelectorAll(".player")) {
     players.push(new SmallPlayer(figure, await recordingIn(figure.querySelector("script").textContent)));

@@ -48,9 +48,8 @@ SECTIONS = {
     "states": "state",
     # Actions of the ants of the previous frame; empty unless exactly one tick has passed.
     "acts": "u1",  # the executed action, or 15 of an idle ant, plus 16 times the event
-    # The chosen action, plus 8 if it was drawn one tick earlier; empty if it is the executed one.
-    "choices": "u1",
-    "rewards": "f4",  # of these actions; empty if events determine them
+    "choices": "u1",  # the chosen action, plus 8 if it was drawn one tick earlier; 15 if idle
+    "rewards": "f4",  # of these actions
     "td_errors": "f4",  # NaN where unknown; empty if no ant learns
     # Changes since the previous frame: indices and new values.
     "ground_at": "cell",

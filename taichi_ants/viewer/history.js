@@ -353,9 +353,11 @@ class History {
   act(moment, i, ant) {
     const { header } = this, frame = this.frames[moment], next = this.frames[moment + 1];
     const executed = next.acts[i] & 15, event = header.events[next.acts[i] >> 4];
-    const action = this.chosen(next, i), ahead = next.choices[i] > 7;
+    const action = next.choices[i] & 7, ahead = next.choices[i] > 7;
     // Some learners draw an action one tick ahead, from the values at that time.
-    const known = !ahead || (frame.passed === 1 && this.knows(moment - 1, ant));
+    // If nothing came before the history, states have their first values until an ant visits them.
+    const isNew = this.frames[0].ticks > 0 && !(this.values.get(this.firstOf(ant))?.[0][0] < moment);
+    const known = !ahead || (frame.passed === 1 && !isNew);
     const values = ahead && known ? this.row(moment - 1, ant) : ant.values;
     const best = Math.max(...values), ties = values.filter((value) => value === best).length;
     const byValues = !known ? "" : values[action] < best ? "explored" : ties > 1 ? "tie" : "best";
@@ -367,17 +369,11 @@ class History {
       sharers = 0;
       for (let k = 0; k < next.acts.length; k++) {
         const group = { nest: frame.poses[k] >> 4, caste: frame.groups[k] & 15 };
-        if (frame.states[k] === ant.state && this.owner(group) === this.owner(ant) && (next.acts[k] & 15) !== IDLE && this.chosen(next, k) === action) sharers++;
+        if (frame.states[k] === ant.state && this.owner(group) === this.owner(ant) && (next.choices[k] & 7) === action) sharers++;
       }
     }
     const tdError = next.td_errors.length ? next.td_errors[i] : NaN;
-    const reward = header.rewards ? header.rewards[next.acts[i] >> 4] : next.rewards[i];
-    return { action, executed, event, reward, why, ties, ahead, tdError, sharers, before, after, values };
-  }
-
-  /* The chosen action of an ant, by the frame after it. */
-  chosen(next, i) {
-    return next.choices.length ? next.choices[i] & 7 : next.acts[i] & 15;
+    return { action, executed, event, reward: next.rewards[i], why, ties, ahead, tdError, sharers, before, after, values };
   }
 
   /* The five action values of an ant's state as they stood at a moment. */
@@ -387,12 +383,6 @@ class History {
 
   firstOf(ant) {
     return (this.owner(ant) * this.header.n_states + ant.state) * N_ACTIONS;
-  }
-
-  /* Whether these values are known. If nothing came before the history, states have their first
-     values until an ant visits them. */
-  knows(moment, ant) {
-    return this.frames[0].ticks === 0 || this.values.get(this.firstOf(ant))?.[0][0] <= moment;
   }
 
   entry(moment, entry) {

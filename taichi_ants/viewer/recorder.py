@@ -149,12 +149,11 @@ class Recorder:
             "letters": task.sees.letters,
             "actions": ACTION_NAMES,
             "events": [event.name for event in Event],
-            "rewards": task.rewards.by_event().tolist() if self._rewards_by_event else None,
             "castes": list(task.castes),
             "foods": list(task.foods),
             "idles": task.labour.divides,
-            "rule": "" if colony.is_given_actions else task.choice.rule,
-            "values": self._by_values,  # whether ants choose by action values
+            "rule": task.choice.rule,
+            "values": colony.has_training,  # whether ants choose by action values
             # The view of the pheromone, "" if an ant may know more or less than its letters say.
             "seen_by": self._rule.view if self._by_letters else "",
             "groups": [*self._groups()],  # of ants: the castes, or one of all ants
@@ -165,14 +164,10 @@ class Recorder:
         }
 
     @property
-    def _by_values(self) -> bool:
-        return self.colony.task.choice.needs_table and not self.colony.is_given_actions
-
-    @property
     def _by_letters(self) -> bool:
         task = self.colony.task
         is_own = task.choice.own_rule or not task.sees.encode.__module__.startswith("taichi_ants.")
-        return self._by_values and not is_own and not task.noise.misread
+        return self.colony.has_training and not is_own and not task.noise.misread
 
     def _groups(self) -> Iterator[dict[str, Any]]:
         task = self.colony.task
@@ -180,11 +175,6 @@ class Recorder:
         for caste in task.castes.values() or [None]:
             learns = self._learns and not (caste and caste.policy)
             yield {"cues": [names[cue] for cue in task.cues_of(caste)], "learns": learns}
-
-    @property
-    def _rewards_by_event(self) -> bool:
-        task = self.colony.task
-        return task.reward == "by_event" and not task.foods
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
         """Return the `name_parts` of the states seen so far, except those in `known`.
@@ -221,7 +211,7 @@ class Recorder:
             lines["table"] = "one per ant" if colony.one_a_slot else shared
             lines["learning rate"] = f"{config.learning_rate:g}"
             lines["discount"] = f"{config.discount:g}"
-        elif self._by_values:
+        elif colony.has_training:
             lines |= {"policy": "frozen", "epsilon": f"{colony.epsilon:g}"}
         if colony.task.choice.rule != "greedy":
             lines["rule of choice"] = colony.task.choice.rule
@@ -253,9 +243,8 @@ class Recorder:
         states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
         before, ahead = self._tables(), np.zeros(len(slots), bool)
         if colony.draws_ahead:
-            ahead = (
-                colony.arrays["next_action"].reshape(colony.living.shape)[self.world, slots] >= 0
-            )
+            next_actions = colony.arrays["next_action"].reshape(colony.living.shape)
+            ahead = next_actions[self.world, slots] >= 0
         colony.tick()
         # Slots of ants that died still hold their data.
         after = colony.numbers[self.world]
@@ -263,12 +252,10 @@ class Recorder:
         places = order[np.searchsorted(after, numbers, sorter=order)]
         actions = colony.actions[self.world, places]
         executed = colony.executed[self.world, places]
-        acted = np.where(executed < 0, _IDLE, executed)
-        acts = {"acts": acted + 16 * colony.events[self.world, places]}
-        if ahead.any() or (actions != executed).any():
-            acts["choices"] = np.maximum(actions, 0) + 8 * ahead
-        if not self._rewards_by_event:
-            acts["rewards"] = colony.rewards[self.world, places]
+        executed = np.where(executed < 0, _IDLE, executed)
+        acts = {"acts": executed + 16 * colony.events[self.world, places]}
+        acts["choices"] = np.where(actions < 0, _IDLE, actions + 8 * ahead)
+        acts["rewards"] = colony.rewards[self.world, places]
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})

@@ -949,8 +949,8 @@ def test_every_setting_has_help_for_fingers_and_keys(browser, room):
 
 def test_a_sentence_and_three_cards_say_what_to_try(page, room):
     assert page.text("#sees") == (
-        "The ants learn to carry food to their queen, and those with food lay the trail by which "
-        "others find it."
+        "Ants search for food and carry it to their queen, and lay trails that other ants can "
+        "follow."
     )
     page.tab.focus("[data-try=wall]")
     page.tab.keyboard.press("Enter")
@@ -967,7 +967,7 @@ def test_a_sentence_and_three_cards_say_what_to_try(page, room):
     page.click("[data-try=rule]")
     edits(room, 1)
     assert room.session.values()["evaporation"]["value"] == 0
-    assert "do not evaporate" in page.text("#toast")
+    assert "trails do not evaporate" in page.text("#toast")
 
 
 def test_the_page_is_printed_with_its_world(browser, room, tmp_path):
