@@ -243,8 +243,7 @@ class Recorder:
         states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
         before, ahead = self._tables(), np.zeros(len(slots), bool)
         if colony.draws_ahead:
-            next_actions = colony.arrays["next_action"].reshape(colony.living.shape)
-            ahead = next_actions[self.world, slots] >= 0
+            ahead = colony.next_actions[self.world, slots] >= 0
         colony.tick()
         # Slots of ants that died still hold their data.
         after = colony.numbers[self.world]
