@@ -19,7 +19,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import whole_number
 from taichi_ants.studies.interruption import held, stoppable
-from taichi_ants.task import Task
+from taichi_ants.task import Task, queueing
 
 if TYPE_CHECKING:
     from taichi_ants import Colony
@@ -147,7 +147,7 @@ def _add_live(parser: command_line.Parser) -> None:
     add("--capacity", **COUNT, help=capacity)
     which = (
         "rules to start from; options such as --task.delivery change them (default: the rules in "
-        "the file of --policy, or paper)"
+        "the file of --policy, or queueing)"
     )
     add("--task", choices=("paper", "foraging", "queueing"), help=which)
     add = parser.add_argument_group("files").add_argument
@@ -160,7 +160,7 @@ def _add_live(parser: command_line.Parser) -> None:
     add("--figure", metavar="FILE.png", help=figure)
     command_line.add_common(parser)
     parser.open_settings = ("world", "task", "training")
-    command_line.add_settings(parser, _living(Task()))
+    command_line.add_settings(parser, queueing())
     command_line.add_settings(parser, _learning(0.1))
 
 
@@ -173,11 +173,6 @@ KINDS = {
 def _learning(epsilon: float) -> TrainingConfig:
     """Return the default training, without a decay of epsilon, which the study adds."""
     return TrainingConfig("sarsa", 0.1, 0.9, epsilon, 1.0)
-
-
-def _living(task: Task) -> Task:
-    """Return the task with trails that evaporate, and deliveries that do not end learning."""
-    return replace(task, delivery="truncates", evaporation_in_training=True)
 
 
 def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingConfig:
@@ -293,9 +288,9 @@ def new_colony(settings: argparse.Namespace) -> Colony:
 
 
 def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
-    """Return the task of --task, or the policy's, or the paper's, with settings from options."""
+    """Return the task of --task, or the policy's, or `queueing`, with settings from options."""
     named = Task.named()[settings.task] if settings.task else None
-    base = _living(named or (policy.task if policy else Task()))
+    base = named or (policy.task if policy else queueing())
     if policy:
         base = replace(base, observation=policy.observation)
     return base.but(**command_line.given_settings(settings).get("task", {}))

@@ -51,6 +51,11 @@ START: dict[str, Any] = {
 }
 
 
+# Steps of the first session before a page opens: twenty episodes, after which its ants deliver, and
+# the ticks in which they lay lanes between the queen and the food.
+LEARNED = 20 * (1000 + 1) + 300
+
+
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
@@ -89,8 +94,9 @@ def watch(settings: argparse.Namespace) -> None:
             session = Session.load(settings.session, progress)
     else:
         session = Session(choices.setup(START))
+        session.leap(LEARNED)
     prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
-    room = Room(session, choices, settings.port, prepare)
+    room = Room(session, choices, settings.port, prepare, playing=not settings.session)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
     with ExitStack() as opened:
         if not settings.no_browser and sys.stdout.isatty():

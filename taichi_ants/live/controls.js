@@ -4,6 +4,9 @@ const SLIDERS = {
   ants: "Ants", evaporation: "Trails evaporate", half_life: "Half-life of trails", diffusion: "Diffusion",
   deposit: "Deposit", cap: "Largest trail level", slope: "Slope of trails", epsilon: "Exploration rate (epsilon)", learning_rate: "Learning rate",
 };
+// The settings that explain sliders whose edits have other names.
+const EXPLAINS = { epsilon: "training.epsilon", learning_rate: "training.learning_rate", evaporation: "task.pheromone.evaporation" };
+const PARTS = ".controls, .palette, .intro"; // what needs a connection
 const FILE_TYPES = { html: "text/html", gif: "image/gif" };
 const WORKS = { page: "page", gif: "GIF" };
 // The state of a lost connection: its message, and the label of the second button.
@@ -30,6 +33,9 @@ const MAP = `; lines shift by two columns
           .
 `;
 
+/* A button that shows the help of a setting below it. */
+const helpOf = (words, help) => `<button type="button" class="help" aria-expanded="false" aria-label="Help: ${words}">?</button><small hidden>${safe(help)}</small>`;
+
 /* Whether a value is either 0 or 1. */
 const isSwitch = ({ least, most, step }) => least === 0 && most === 1 && step === 1;
 
@@ -42,6 +48,13 @@ class Controls {
     this.roomy = matchMedia("(min-height: 1150px) and (min-width: 841px)"); // all cards fit
     byId("new").open = this.roomy.matches;
     document.querySelector(".stage").append(byId("notices"));
+    byId("hint").before(byId("intro"));
+    for (const label of document.querySelectorAll("[data-help]")) {
+      label.outerHTML = `<div class="field">${label.outerHTML}${helpOf(label.firstChild.data.trim(), label.dataset.help)}</div>`;
+    }
+    byId("controls").addEventListener("click", ({ target: { classList, ariaExpanded, nextSibling }, target }) => {
+      if (classList.contains("help")) [target.ariaExpanded, nextSibling.hidden] = [ariaExpanded === "false", ariaExpanded === "true"];
+    });
     byId("theme").insertAdjacentHTML("beforebegin", '<span class="watchers" id="watchers"></span>');
     const on = (id, kind, act) => byId(id).addEventListener(kind, act);
     on("chosen", "submit", (event) => {
@@ -75,6 +88,7 @@ class Controls {
     on("load", "click", () => byId("upload").click());
     on("upload", "change", () => this.upload());
     on("quit", "click", () => this.quit());
+    on("intro", "click", (event) => this.suggest(event.target.closest("button")?.dataset.try));
     on("sliders", "input", (event) => this.slide(event.target));
     live.news.addEventListener("begin", () => this.fill());
     live.news.addEventListener("state", ({ detail }) => this.show(detail));
@@ -144,18 +158,19 @@ class Controls {
   explain() {
     const { choices } = this.live, policy = byId("policy").value, name = policy.replace(/^(learn|file) /, "");
     for (const [place, one] of choices.settings.entries()) {
-      const field = byId(`setting-${place}`), label = field.closest("label"), { world = byId("world-name").value, learner } = one;
+      const field = byId(`setting-${place}`), box = field.closest(".setting"), { world = byId("world-name").value, learner } = one;
       const learns = learner === undefined || policy === `learn ${learner}` || (learner === "" && policy.startsWith("learn "));
       const [other, ...values] = one.only ?? [], counts = !other || values.includes(this.settings()[other]);
-      label.hidden = field.disabled = !(learns && counts && world === byId("world-name").value);
+      box.hidden = field.disabled = !(learns && counts && world === byId("world-name").value);
       if (one.path === "task.observation") {
         field.disabled = policy.startsWith("file ");
-        label.title = choices.sees[field.value] ?? "";
+        box.querySelector("small").textContent = `${one.help}: ${choices.sees[field.value] ?? ""}`;
       }
     }
-    for (const group of document.querySelectorAll("#settings fieldset")) group.hidden = !group.querySelector("label:not([hidden])");
+    for (const group of document.querySelectorAll("#settings fieldset")) group.hidden = !group.querySelector(".setting:not([hidden])");
     const follows = policy === "by hand" ? "The ants follow trails by a fixed rule, and do not learn." : `The ants follow ${name}, and do not learn.`;
-    byId("policy-help").textContent = policy.startsWith("learn ") ? `The ants learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
+    byId("policy-help").textContent = this.settings()["task.choice.rule"] === "deneubourg" ? "The ants choose by the rule deneubourg, without a policy, and do not learn."
+      : policy.startsWith("learn ") ? `The ants learn: ${choices.learners[name]?.summary ?? ""}.` : follows;
   }
 
   /* Insert long text into the map at once, because browsers need quadratic time in its lines. */
@@ -186,7 +201,7 @@ class Controls {
       const input = one.kind === "bool" ? `<input type="checkbox" ${about}>`
         : one.words.length ? `<select ${about}>${one.words.map((word) => `<option value="${safe(word)}">${safe(word.replaceAll("_", " "))}</option>`).join("")}</select>`
           : `<input type="number" ${about} step="${step}" min="${one.least ?? one.above ?? ""}" max="${one.most ?? ""}" ${one.optional ? 'placeholder="none"' : "required"}>`;
-      html[group] = (html[group] ?? "") + `<label class="setting" title="${safe(one.help + (one.unit ? `, in ${one.unit}` : ""))}">${input} ${words}</label>`;
+      html[group] = (html[group] ?? "") + `<div class="setting"><label>${input} ${words}</label>${helpOf(words, one.help + (one.unit ? `, in ${one.unit}` : ""))}</div>`;
     });
     return Object.entries(html).map(([group, inner]) => `<fieldset><legend>${safe(group.split(".").at(-1).replace(/^./, (letter) => letter.toUpperCase()))}</legend>${inner}</fieldset>`).join("");
   }
@@ -195,7 +210,7 @@ class Controls {
   settings() {
     const given = {};
     for (const field of document.querySelectorAll("#settings [data-path]")) {
-      if (field.closest("label").hidden || field.value === "") continue;
+      if (field.closest(".setting").hidden || field.value === "") continue;
       given[field.dataset.path] = field.type === "checkbox" ? field.checked : field.type === "number" ? field.valueAsNumber : field.value;
     }
     return given;
@@ -251,13 +266,17 @@ class Controls {
     this.showWorks(works);
     byId("undo").disabled = !canUndo;
     byId("go-back").hidden = !canGoBack;
+    byId("sees").textContent = `Ants search for food and carry it to their queen${values.deposit ? ", and lay trails that other ants can follow" : ""}.`;
+    document.querySelector("[data-try=rule]").hidden = !values.evaporation;
     const box = byId("sliders"), names = Object.keys(values).join();
     if (box.dataset.names !== names) {
       box.dataset.names = names;
       box.innerHTML = Object.entries(values).map(([name, one]) => {
         const words = SLIDERS[name] ?? name.replaceAll("_", " "), about = `id="set-${name}" data-name="${name}"`;
-        if (isSwitch(one)) return `<label class="rule"><input type="checkbox" ${about}> ${words}</label>`;
-        return `<label class="slider" for="set-${name}"><span>${words}</span><output for="set-${name}"></output><input type="range" ${about}></label>`;
+        const path = EXPLAINS[name] ?? one.path, setting = this.live.choices.settings.find((other) => other.path === path);
+        const field = isSwitch(one) ? `<label class="rule"><input type="checkbox" ${about}> ${words}</label>`
+          : `<label class="slider" for="set-${name}"><span>${words}</span><output for="set-${name}"></output><input type="range" ${about}></label>`;
+        return `<div class="field">${field}${helpOf(words, setting?.help ?? "living ants, also at the start of later episodes")}</div>`;
       }).join("");
     }
     for (const [name, one] of Object.entries(values)) {
@@ -271,6 +290,18 @@ class Controls {
     }
     this.live.viewer?.timeline.showSpeed();
     byId("watchers").innerHTML = pages > 1 ? `${pages} pages<span> show this session</span>` : "";
+  }
+
+  /* Do what a card suggests, or choose the tool for it. */
+  suggest(what) {
+    const { tools, viewer: { history } } = this.live, rule = byId("set-evaporation"), { trail } = history.worldAt(history.length - 1);
+    if (what === "rule") rule.click();
+    if (what === "wall") tools.choose("rock");
+    if (what === "wall") byId("world").focus();
+    if (what === "trail") tools.number = this.live.nextStroke();
+    if (what === "trail") tools.edit("trail", { level: 0, ...tools.field() }, [...trail.keys()].filter((cell) => trail[cell] > 0));
+    const said = { wall: "Draw on the world.", trail: "The trail is gone.", rule: `From now on, trails ${rule?.checked ? "" : "do not "}evaporate.` }[what];
+    if (said) this.say(`${said} Undo takes it back.`);
   }
 
   /* Show the rates, which decay per episode, of the drawn frame. */
@@ -307,7 +338,7 @@ class Controls {
     if (this.holds === holds) return;
     this.holds = holds;
     if (holds) this.focused = document.activeElement;
-    for (const part of document.querySelectorAll(".controls, .palette, .buttons")) part.inert = holds || (this.lost && !part.matches(".buttons"));
+    for (const part of document.querySelectorAll(`${PARTS}, .buttons`)) part.inert = holds || (this.lost && !part.matches(".buttons"));
     if (!holds && document.activeElement === document.body) this.focused?.focus(); // restore the focus
   }
 
@@ -407,7 +438,7 @@ class Controls {
   connected(is) {
     if (is) [this.lost, this.kept] = ["", false];
     byId("lost").hidden = is;
-    for (const part of document.querySelectorAll(".controls, .palette")) part.inert = !is || this.holds;
+    for (const part of document.querySelectorAll(PARTS)) part.inert = !is || this.holds;
     for (const id of ["play", "speed"]) byId(id).disabled = !is;
   }
 

@@ -40,10 +40,9 @@ def values(interventions: Interventions) -> dict[str, Value]:
     - evaporation: 1 if trails evaporate, else 0.
     """
     colony, pheromone = interventions.colony, interventions.colony.pheromone
-    found = {
-        "ants": Value(max(interventions.living, 1), 1, colony.capacity, 1, "ants"),
-        "epsilon": Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon"),
-    }
+    found = {"ants": Value(max(interventions.living, 1), 1, colony.capacity, 1, "ants")}
+    if colony.task.choice.needs_table:
+        found["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
     if colony.sharing != "frozen":
         found["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001, "learning_rate")
     if pheromone.deposit != "none":

@@ -129,8 +129,9 @@ class Room:
     """The server of a session that several pages can watch and change together.
 
     Pages offer `choices`. The server listens on `port`; 0 means any free port. Worker processes
-    that replay the session call `prepare` first, for example to load a plugin. Raises AntsError if
-    the library `websockets` is not installed, or the port cannot be used.
+    that replay the session call `prepare` first, for example to load a plugin. If `playing`, the
+    session runs as soon as a page is open. Raises AntsError if the library `websockets` is not
+    installed, or the port cannot be used.
     """
 
     def __init__(
@@ -139,6 +140,7 @@ class Room:
         choices: Choices,
         port: int = 0,
         prepare: Callable[[], None] | None = None,
+        playing: bool = False,
     ) -> None:
         imported("the live page", "websockets", "watch")
         try:
@@ -150,7 +152,7 @@ class Room:
         self.session, self.choices = session, choices
         self.port = self._socket.getsockname()[1]
         self.token = secrets.token_urlsafe(24)
-        self.playing, self.speed = False, 12.0
+        self.playing, self.speed = playing, 12.0
         self._shown = secrets.token_hex(8)  # identifies the session for pages that reconnect
         self._pages: set[Page] = set()
         self._joined = 0  # sockets, including those that have not received a session yet

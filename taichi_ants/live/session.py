@@ -384,6 +384,9 @@ class Session:
     def policy_bytes(self) -> bytes:
         """Return the bytes of a policy file; raise AntsError if ants have several tables."""
         colony, table = self.colony, self.colony.q_values[0]
+        if not colony.task.choice.needs_table:
+            rule = colony.task.choice.rule
+            raise AntsError(f"the rule {rule} has no policy; export the colony instead.")
         if colony.one_a_slot:
             raise AntsError(
                 "each ant has its own table, but a policy file holds a single one; begin a session "

@@ -63,7 +63,8 @@ class Setup:
 
     world: str  # the name of a registered world, or the text of a map
     task: Task
-    policy: TrainingConfig | np.ndarray  # a learner, or action values (n_states, 5) to follow
+    # A learner, or action values (n_states, 5) to follow; unused if the task's rule needs neither.
+    policy: TrainingConfig | np.ndarray
     ants: int = 64  # ants at the start of each episode
     capacity: int | None = None  # largest number of living ants; None means 2 * `ants` + 64
     seed: int = 0  # seed of the colony
@@ -147,7 +148,10 @@ class Setup:
                 f"capacity is {self.capacity}, but that many tables of {self.task.n_states} states "
                 'need too much memory; use a smaller capacity, or sharing "shared".'
             )
-        if isinstance(self.policy, TrainingConfig):
+        training: TrainingConfig | None = None
+        if not self.task.choice.needs_table:
+            options["sharing"] = "frozen"
+        elif isinstance(self.policy, TrainingConfig):
             training, options["sharing"] = self.policy, self.sharing
         else:
             training = TrainingConfig.frozen(self.epsilon)

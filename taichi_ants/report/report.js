@@ -1,16 +1,20 @@
 /* The report: light and dark mode, tables that sort and filter, and small players. */
 
-const dark = matchMedia("(prefers-color-scheme: dark)"), printing = matchMedia("print");
+const dark = matchMedia("(prefers-color-scheme: dark)");
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 const players = [];
-let chosenTheme = "";
+let chosenTheme = "", closed = []; // details that are open only in print
 
-/* Print in light mode, with all details open. */
-function showTheme() {
-  if (printing.matches) document.querySelectorAll(".more").forEach((one) => (one.open = true));
-  const wanted = chosenTheme || (dark.matches ? "dark" : "light");
-  document.documentElement.dataset.theme = printing.matches ? "light" : wanted;
+function showTheme(wanted = chosenTheme || (dark.matches ? "dark" : "light")) {
+  document.documentElement.dataset.theme = wanted;
   for (const player of players) player.readColours();
+}
+
+/* Print in light mode, with all details open: before the browser divides the text into pages. */
+function print(begins) {
+  if (begins) closed = [...document.querySelectorAll("details:not([open])")];
+  for (const one of closed) one.open = begins;
+  showTheme(begins ? "light" : undefined);
 }
 
 class SmallPlayer {
@@ -18,9 +22,9 @@ class SmallPlayer {
     this.figure = figure;
     this.history = new History(source.header);
     source.start((bytes) => this.history.add(bytes));
-    const [canvas, overlay] = figure.querySelectorAll("canvas");
+    const canvas = figure.querySelector("canvas");
     [this.slider, this.place, this.button] = ["input", "output", "button"].map((name) => figure.querySelector(name));
-    this.stage = new Stage(canvas, overlay, this.history);
+    this.stage = new Stage(canvas, this.history);
     this.player = new Player(this.history, () => this.draw());
     this.player.speed = Number(figure.dataset.speed);
     this.player.moment = Math.round(this.player.last / 2); // shows the ants at work
@@ -158,7 +162,8 @@ async function open() {
     chosenTheme = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
     showTheme();
   });
-  for (const one of [dark, printing]) one.addEventListener("change", showTheme);
+  dark.addEventListener("change", () => showTheme());
+  for (const kind of ["beforeprint", "afterprint"]) addEventListener(kind, () => print(kind === "beforeprint"));
   showTheme();
   for (const figure of document.querySelectorAll(".player")) {
     players.push(new SmallPlayer(figure, await recordingIn(figure.querySelector("script").textContent)));

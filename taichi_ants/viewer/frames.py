@@ -47,8 +47,9 @@ SECTIONS = {
     "groups": "u1",
     "states": "state",
     # Actions of the ants of the previous frame; empty unless exactly one tick has passed.
-    "acts": "u1",  # the action, or 15 of an idle ant, plus 16 times the event
-    "rewards": "f4",  # of these actions; empty if events determine them
+    "acts": "u1",  # the executed action, or 15 of an idle ant, plus 16 times the event
+    "choices": "u1",  # the chosen action, plus 8 if it was drawn one tick earlier; 15 if idle
+    "rewards": "f4",  # of these actions
     "td_errors": "f4",  # NaN where unknown; empty if no ant learns
     # Changes since the previous frame: indices and new values.
     "ground_at": "cell",

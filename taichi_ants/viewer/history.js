@@ -176,7 +176,7 @@ class History {
     for (; this.first < first; this.first++) {
       const { number, size, ...rest } = this.frames[this.first];
       const clock = Object.fromEntries(CLOCK.map((name) => [name, rest[name]]));
-      const nothing = { numbers: [], cells: [], poses: [], groups: [], states: [], acts: [], td_errors: [], passed: 0 };
+      const nothing = { numbers: [], cells: [], poses: [], groups: [], states: [], acts: [], choices: [], td_errors: [], passed: 0 };
       this.frames[this.first] = { number, ...clock, ...nothing };
       this.bytes -= size;
     }
@@ -229,7 +229,7 @@ class History {
     const points = [...(moment > this.first ? [] : this.within), ...this.ends].filter(({ ticks }) => ticks > since && ticks <= frame.ticks);
     const entries = [...this.values.keys()].filter((entry) => this.values.get(entry)[0][0] <= moment);
     const sections = {
-      ...frame, acts: [], rewards: [], td_errors: [], ground_at: ground.keys(), ground, kinds_at: kinds.keys(), kinds,
+      ...frame, acts: [], choices: [], rewards: [], td_errors: [], ground_at: ground.keys(), ground, kinds_at: kinds.keys(), kinds,
       trail_at: stored.keys(), trail: stored,
       table_at: entries, table: entries.map((entry) => this.entry(moment, entry)),
       progress: points.flatMap((point) => POINT.map((name) => point[name])),
@@ -325,10 +325,11 @@ class History {
 
      {number, nest, caste, kind, idle, cell, heading, loaded, state, values, act}. kind is that of its
      food. act is null if unknown or if the ant is idle, else
-     {action, event, reward, why, ties, ahead, tdError, sharers, before, after, values}. why is
-     "best", "tie" (of `ties` actions) or "explored", by the values at the time of the choice, one
-     tick earlier if it was made `ahead`. tdError is a mean over `sharers`; before and after are
-     action values. */
+     {action, executed, event, reward, why, ties, ahead, tdError, sharers, before, after, values}.
+     action is the chosen one. why is "best", "tie" (of `ties` actions) or "explored", by the values
+     at the time of the choice, one tick earlier if it was made `ahead`; "" if these are unknown; or
+     "rule" if the ants are not greedy. tdError is a mean over `sharers`; before and after are action
+     values. */
   ant(moment, number) {
     const i = this.place(moment, number);
     if (i < 0) return null;
@@ -351,12 +352,16 @@ class History {
 
   act(moment, i, ant) {
     const { header } = this, frame = this.frames[moment], next = this.frames[moment + 1];
-    const action = next.acts[i] & 15, event = header.events[next.acts[i] >> 4];
+    const executed = next.acts[i] & 15, event = header.events[next.acts[i] >> 4];
+    const action = next.choices[i] & 7, ahead = next.choices[i] > 7;
     // Some learners draw an action one tick ahead, from the values at that time.
-    const ahead = header.draws_ahead && frame.tick > 0 && frame.passed === 1;
-    const values = ahead ? this.row(moment - 1, ant) : ant.values;
+    // If nothing came before the history, states have their first values until an ant visits them.
+    const isNew = this.frames[0].ticks > 0 && !(this.values.get(this.firstOf(ant))?.[0][0] < moment);
+    const known = !ahead || (frame.passed === 1 && !isNew);
+    const values = ahead && known ? this.row(moment - 1, ant) : ant.values;
     const best = Math.max(...values), ties = values.filter((value) => value === best).length;
-    const why = values[action] < best ? "explored" : ties > 1 ? "tie" : "best";
+    const byValues = !known ? "" : values[action] < best ? "explored" : ties > 1 ? "tie" : "best";
+    const why = header.rule === "greedy" ? byValues : "rule";
     const after = this.row(moment + 1, ant)[action];
     const before = ant.values[action];
     let sharers = 1;
@@ -364,18 +369,20 @@ class History {
       sharers = 0;
       for (let k = 0; k < next.acts.length; k++) {
         const group = { nest: frame.poses[k] >> 4, caste: frame.groups[k] & 15 };
-        if (frame.states[k] === ant.state && this.owner(group) === this.owner(ant) && (next.acts[k] & 15) === action) sharers++;
+        if (frame.states[k] === ant.state && this.owner(group) === this.owner(ant) && (next.choices[k] & 7) === action) sharers++;
       }
     }
     const tdError = next.td_errors.length ? next.td_errors[i] : NaN;
-    const reward = header.rewards ? header.rewards[next.acts[i] >> 4] : next.rewards[i];
-    return { action, event, reward, why, ties, ahead, tdError, sharers, before, after, values };
+    return { action, executed, event, reward: next.rewards[i], why, ties, ahead, tdError, sharers, before, after, values };
   }
 
   /* The five action values of an ant's state as they stood at a moment. */
   row(moment, ant) {
-    const first = (this.owner(ant) * this.header.n_states + ant.state) * N_ACTIONS;
-    return Array.from({ length: N_ACTIONS }, (_, action) => this.entry(moment, first + action));
+    return Array.from({ length: N_ACTIONS }, (_, action) => this.entry(moment, this.firstOf(ant) + action));
+  }
+
+  firstOf(ant) {
+    return (this.owner(ant) * this.header.n_states + ant.state) * N_ACTIONS;
   }
 
   entry(moment, entry) {
@@ -407,17 +414,17 @@ class History {
     return { task, rest, letters };
   }
 
-  /* The cell that an ant turns to with a move, or where it takes or gives. */
-  target(ant, action) {
+  /* The cells that an ant may turn to with a move, or where it may take or give. */
+  targets(ant, action) {
     const { offsets } = this.grid;
     const towards = (turn) => ant.cell + offsets[(ant.heading + turn + 6) % 6];
-    if (action < 3) return towards(action - 1);
+    if (action < 3) return [towards(action - 1)];
     const { ground, moment } = this.world, queen = this.frames[moment].queens[ant.nest];
-    const seen = [-1, 0, 1].map(towards).filter((cell) => (action === 3 ? ground[cell] === FOOD : cell === queen));
-    return seen.length ? seen[0] : -1;
+    return [-1, 0, 1].map(towards).filter((cell) => (action === 3 ? ground[cell] === FOOD : cell === queen));
   }
 
-  /* The ants that want to enter a cell, or what lies in it: [{number, action, event}]. */
+  /* The ants that want to enter a cell, or what lies in it: [{number, action, event, several}].
+     There are several if an ant takes one of them, drawn at random. */
   wanting(moment, cell) {
     const frame = this.frames[moment], next = this.frames[moment + 1], found = [];
     if (!next || !next.acts.length) return found;
@@ -427,7 +434,8 @@ class History {
         if (frame.cells[i] !== cell + offset) continue;
         const ant = { nest: frame.poses[i] >> 4, cell: frame.cells[i], heading: frame.poses[i] & 7 };
         const action = next.acts[i] & 15, event = this.header.events[next.acts[i] >> 4];
-        if (action !== IDLE && this.target(ant, action) === cell) found.push({ number: frame.numbers[i], action, event });
+        const targets = action === IDLE ? [] : this.targets(ant, action);
+        if (targets.includes(cell)) found.push({ number: frame.numbers[i], action, event, several: targets.length > 1 });
       }
     }
     return found;

@@ -2,12 +2,17 @@
 
 const HOLDS = { [EMPTY]: "nothing", [OBSTACLE]: "a rock", [FOOD]: "food", [QUEEN]: "the queen" };
 const CAME = {
-  ENTERED_EMPTY: "It enters an empty cell", BLOCKED: "It is blocked", PICKED_UP: "It picks up food",
+  ENTERED_EMPTY: "It moves", BLOCKED: "It is blocked", PICKED_UP: "It picks up food",
   DELIVERED: "It delivers food to the queen", FAILED: "The action fails", PUSHED: "It is pushed aside",
 };
-const WHY = { best: () => "highest value", tie: ({ ties }) => `one of ${ties} equal values`, explored: () => "at random" };
-const LETTERS = {
-  E: "empty", O: "obstacle", T: "trail", S: "nearer to the queen", F: "food", Q: "queen",
+const WHY = {
+  best: () => "highest value", tie: ({ ties }) => `one of ${ties} equal values`, explored: () => "at random",
+  rule: (_, rule) => `by the rule ${safe(rule)}`, "": () => "",
+};
+const LETTERS = { E: "empty", O: "obstacle", F: "food", Q: "queen" };
+const STRONGER = { // what hides a level in view, by the view of the pheromone
+  half: "below half of the strongest in view", strongest: "below the strongest in view",
+  strongest_under_carriers: "below the strongest in view, also under ants with food",
 };
 const HEXAGON = "M1 0 .5 .866-.5 .866-1 0-.5-.866 .5-.866z";
 const ICONS = {
@@ -21,6 +26,7 @@ const safe = (text) => String(text).replace(/[&<>"]/g, (letter) => `&#${letter.c
 const signed = (number, digits) => (number > 0 ? "+" : "") + plain(number, digits);
 const plain = (number, digits = 2) => (Number(number.toFixed(digits)) + 0).toFixed(digits).replace("-", "−");
 const grouped = (text) => String(text).replace(/\d{5,}/, (digits) => digits.replace(/\B(?=(\d{3})+$)/g, "\u202f"));
+const nameOf = (pheromone) => (pheromone === "trail" ? "trail" : `field ${safe(pheromone)}`);
 const icon = (name) => `<svg viewBox="0 0 20 20" aria-hidden="true">${ICONS[name]}</svg>`;
 const button = (id, label, name, more = "") =>
   `<button type="button" class="icon" id="${id}" aria-label="${label}" title="${label}" ${more}>${icon(name)}</button>`;
@@ -71,7 +77,7 @@ class Panel {
       ...(episodes ? [["episode", frame.episode]] : []),
       ["tick", frame.tick], ...(episodes && frame.ants === 1 ? [] : [["ants", frame.ants]]), ["with food", loaded],
       [`delivered${ofOne}`, frame.deliveries], [`return${ofOne}`, plain(frame.returns, 0)],
-      ["epsilon", plain(frame.epsilon, frame.epsilon < 0.01 && frame.epsilon ? 4 : 2)],
+      ...(this.history.header.values ? [["epsilon", plain(frame.epsilon, frame.epsilon < 0.01 && frame.epsilon ? 4 : 2)]] : []),
     ];
     byId("now").innerHTML = facts.map(([name, value]) => `<div><dt>${name}</dt><dd>${grouped(value)}</dd></div>`).join("");
   }
@@ -115,20 +121,22 @@ class Panel {
   viewOf(ant) {
     const { header, world } = this.history;
     const { task, rest, letters } = this.history.stateName(ant.state);
+    const { pheromone, seen_by: seenBy } = header, cue = this.cueOf(ant), own = cue === pheromone;
     let hides = false; // whether the ant does not see a trail that exists
     const shapes = header.view.map((turn, i) => {
       const angle = (turn * Math.PI) / 3, x = 1.732 * Math.sin(angle), y = -1.732 * Math.cos(angle);
       const cell = ant.cell + this.history.grid.offsets[(ant.heading + turn + 6) % 6], letter = letters[i] ?? "";
-      // Ants may see another field by other rules.
-      const hidden = header.pheromone === "trail" && (letter === "E" || (ant.loaded && /^[A-SU-Z]/i.test(letter)));
+      const hidden = seenBy && letter && (own ? letter === "E" : letter !== "O");
       hides ||= hidden && world.trail[cell] >= 1;
       return `<g transform="translate(${x} ${y})">
         <path d="${HEXAGON}" transform="scale(.93)" fill="${letter === "O" ? "var(--rock)" : this.fillOf(cell, world, hidden)}"/>
         <text font-size=".95" stroke="var(--halo)" stroke-width=".2" paint-order="stroke">${safe(letter)}</text></g>`;
     });
-    const blind = !hides ? "" : ant.loaded ? "ants with food do not see trails" : "it sees only the strongest trails";
-    const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => LETTERS[kind]);
-    const meanings = known.map((kind) => `${kind} ${LETTERS[kind]}`);
+    const name = nameOf(pheromone), blind = !hides ? "" : own ? `where the ${name} is ${STRONGER[seenBy]}, the ant sees E`
+      : `ants ${ant.loaded ? "with" : "without"} food do not see the ${name}`;
+    const means = { ...LETTERS, T: nameOf(cue), S: cue === "compass" ? "nearer to the queen" : nameOf(cue) };
+    const kinds = [...new Set(letters.map((letter) => letter[0]))], known = kinds.filter((kind) => means[kind]);
+    const meanings = known.map((kind) => `${kind} ${means[kind]}`);
     const more = known.length < kinds.length || !kinds.length ? header.letters : "";
     const meaning = [meanings.join(", "), more, blind].filter(Boolean).join("; ");
     const around = header.view.some((turn) => Math.abs(turn) > 1);
@@ -137,6 +145,11 @@ class Panel {
       + `${shapes.join("")}<path d="${HEXAGON}" transform="scale(.93)" fill="none" stroke="var(--rule)" stroke-width=".07"/>`
       + `${antShape(ant.loaded, "var(--ant)", this.stage.colours[ofKind(ant.kind)])}</svg><div><span class="label">state ${ant.state}</span><b>${safe(task)} ${safe(rest)}</b>`
       + `<small>${safe(meaning)}</small></div></div>`;
+  }
+
+  /* The name of what an ant follows. */
+  cueOf({ loaded, caste }) {
+    return this.history.header.groups[caste].cues[Number(loaded)];
   }
 
   /* The colour of a cell, without a trail that the ant does not see. */
@@ -150,6 +163,7 @@ class Panel {
   }
 
   barsOf(ant) {
+    if (!this.history.header.values) return "";
     const values = ant.act?.values ?? ant.values;
     const low = Math.min(0, ...values), high = Math.max(0, ...values), span = high - low || 1;
     const share = (value) => (100 * (value - low)) / span;
@@ -176,14 +190,15 @@ class Panel {
       const words = live ? early : "The recording ends here.";
       return `<div class="story"><span class="label">${words}</span></div>`;
     }
-    const better = ant.loaded ? "It moves nearer to the queen" : "It enters a trail";
+    const cue = this.cueOf(ant), better = cue === "compass" ? "It moves nearer to the queen" : `It steps onto the ${nameOf(cue)}`;
     const came = CAME[act.event] || better;
     const action = header.actions[act.action], worth = { 1: "up", "-1": "down" }[Math.sign(act.reward)] ?? "";
     const lines = [
-      `Chooses <b>${action}</b> <span class="why ${act.why}">${WHY[act.why](act)}</span>`,
+      `Chooses <b>${action}</b> <span class="why ${act.why}">${WHY[act.why](act, header.rule)}</span>`,
+      ...(act.executed === act.action ? [] : [`It slips: the action becomes <b>${header.actions[act.executed]}</b>`]),
       `${came}, reward <span class="reward ${worth}">${signed(act.reward, 0)}</span>`,
     ];
-    if (header.learns) {
+    if (header.groups[ant.caste].learns) {
       const digits = digitsFor(act.before, act.after), { task, rest } = this.history.stateName(ant.state);
       if (!Number.isNaN(act.tdError)) {
         const mean = act.sharers > 1 ? `, the mean of ${act.sharers} ants` : "";
@@ -203,11 +218,11 @@ class Panel {
     const holds = ground[cell] === FOOD ? this.foodOf(kinds[cell]) : HOLDS[ground[cell]] ?? "?";
     const level = trail[cell];
     const link = (number) => `<button type="button" class="link" data-follow="${number}">ant ${number}</button>`;
-    const wanting = history.wanting(moment, cell).map(({ number, action, event }) =>
-      `${link(number)} (${history.header.actions[action]}${["BLOCKED", "FAILED"].includes(event) ? ", failed" : ""})`);
+    const wanting = history.wanting(moment, cell).map(({ number, action, event, several }) =>
+      `${link(number)} (${history.header.actions[action]}${several ? ", here or next to it" : ""}${["BLOCKED", "FAILED"].includes(event) ? ", failed" : ""})`);
     const lines = [
       ["contains", ants.length ? ants.map(link).join(", ") : holds],
-      [safe(history.header.pheromone), `${plain(level, Number.isInteger(level) ? 0 : 2)} of ${history.header.strongest}`],
+      [safe(history.header.pheromone), `${plain(level, Number.isInteger(level) ? 0 : 2)} (darkest from ${history.header.strongest})`],
       ["next actions", wanting.join(", ") || "none"],
     ];
     card.innerHTML = `<div class="head"><h2>Cell (${history.grid.cube(cell).join(", ")})</h2>`
@@ -223,7 +238,7 @@ class Panel {
     if (!ant) return said;
     const { task, rest } = this.history.stateName(ant.state);
     said += ` Ant ${followed}: ${task} ${rest}.`;
-    if (ant.act) said += ` Chooses ${this.history.header.actions[ant.act.action]}, ${WHY[ant.act.why](ant.act)}, reward ${ant.act.reward}.`;
+    if (ant.act) said += ` Chooses ${[this.history.header.actions[ant.act.action], WHY[ant.act.why](ant.act, this.history.header.rule)].filter(Boolean).join(", ")}, reward ${ant.act.reward}.`;
     return said;
   }
 

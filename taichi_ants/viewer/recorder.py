@@ -6,7 +6,7 @@ A colony of one ant replays the episode of a trace.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from taichi_ants.rendering.scene import name_parts
 from taichi_ants.rendering.snapshots import Episode, colony_of_rollout, intervals
 from taichi_ants.task.constants import ACTION_NAMES, N_ACTIONS
 from taichi_ants.task.events import Event
-from taichi_ants.task.field import TRAIL
+from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.viewer.frames import Recording, pack, types_of
 
@@ -113,7 +113,6 @@ class Recorder:
         self._learns = colony.sharing != "frozen"
         learner = learners.get(colony.training.learner)
         self._has_td_errors = learner.td_error is not None and not learner.plans
-        self._draws_ahead = self._learns and learner.draws_next_action
         # The data of a page that has read all frames so far.
         self._numbers = np.zeros(0, np.int32)
         self._ground, self._kinds = (np.zeros(self.grid.size, np.uint8) for _ in range(2))
@@ -139,7 +138,7 @@ class Recorder:
         changes = task.life.births or task.life.lifespan
         ants = "Ants" if changes else count(colony.ants, "ant")
         return {
-            "format": 3,
+            "format": 4,
             "title": self._title or f"{ants} in a world of {self.grid.count} cells",
             "ranges": list(self.grid.ranges),
             "types": self.types,
@@ -152,21 +151,32 @@ class Recorder:
             "letters": task.sees.letters,
             "actions": ACTION_NAMES,
             "events": [event.name for event in Event],
-            "rewards": task.rewards.by_event().tolist() if self._rewards_by_event else None,
             "castes": list(task.castes),
             "foods": list(task.foods),
             "idles": task.labour.divides,
+            "rule": task.choice.rule,
+            "values": colony.has_training,  # whether ants choose by action values
+            # The view of the pheromone, "" if an ant may know more or less than its letters say.
+            "seen_by": self._rule.view if self._by_letters else "",
+            "groups": [*self._groups()],  # of ants: the castes, or one of all ants
             "learns": self._learns,
             "own_tables": colony.one_a_slot,
-            "draws_ahead": self._draws_ahead,
             "follow": self._follow,
             "about": self._about(),
         }
 
     @property
-    def _rewards_by_event(self) -> bool:
+    def _by_letters(self) -> bool:
         task = self.colony.task
-        return task.reward == "by_event" and not task.foods
+        is_own = task.choice.own_rule or not task.sees.encode.__module__.startswith("taichi_ants.")
+        return self.colony.has_training and not is_own and not task.noise.misread
+
+    def _groups(self) -> Iterator[dict[str, Any]]:
+        task = self.colony.task
+        names = (TRAIL, *task.fields, COMPASS)  # the number of the compass is -1
+        for caste in task.castes.values() or [None]:
+            learns = self._learns and not (caste and caste.policy)
+            yield {"cues": [names[cue] for cue in task.cues_of(caste)], "learns": learns}
 
     def names(self, known: Collection[int] = ()) -> dict[int, tuple[str, str, list[str]]]:
         """Return the `name_parts` of the states seen so far, except those in `known`.
@@ -203,8 +213,10 @@ class Recorder:
             lines["table"] = "one per ant" if colony.one_a_slot else shared
             lines["learning rate"] = f"{config.learning_rate:g}"
             lines["discount"] = f"{config.discount:g}"
-        else:
+        elif colony.has_training:
             lines |= {"policy": "frozen", "epsilon": f"{colony.epsilon:g}"}
+        if colony.task.choice.rule != "greedy":
+            lines["rule of choice"] = colony.task.choice.rule
         return [*lines.items()]
 
     def snapshot(self) -> bytes:
@@ -231,7 +243,9 @@ class Recorder:
             return self._frame({})
         colony, slots = self.colony, self._living()
         states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
-        before = self._tables()
+        before, ahead = self._tables(), np.zeros(len(slots), bool)
+        if colony.draws_ahead:
+            ahead = colony.next_actions[self.world, slots] >= 0
         colony.tick()
         # Slots of ants that died still hold their data.
         after = colony.numbers[self.world]
@@ -241,8 +255,8 @@ class Recorder:
         executed = colony.executed[self.world, places]
         executed = np.where(executed < 0, _IDLE, executed)
         acts = {"acts": executed + 16 * colony.events[self.world, places]}
-        if not self._rewards_by_event:
-            acts["rewards"] = colony.rewards[self.world, places]
+        acts["choices"] = np.where(actions < 0, _IDLE, actions + 8 * ahead)
+        acts["rewards"] = colony.rewards[self.world, places]
         if td_errors is None and self._learns:
             td_errors = self._td_errors(before, slots, states, actions)
         return self._frame(acts if td_errors is None else {**acts, "td_errors": td_errors})

@@ -1,5 +1,6 @@
 /* The picture of the world. The cell of each pixel is computed once per view, so another moment needs
-   only new colours. Ants and marks are drawn on a second canvas above. Outlines are those of
+   only new colours. These pixels are on a hidden canvas; the visible one is a copy with ants and marks,
+   because browsers print no pixels that were put, but those that were drawn. Outlines are those of
    rendering/raster_kernels.py, colours are those of the style sheet. */
 
 const DOTS_BELOW = 2.1, DRAWN_FROM = 9; // radius of an ant in pixels; between them it is an arrowhead
@@ -16,9 +17,9 @@ const COLOURS = [
 ];
 
 class Stage {
-  constructor(canvas, overlay, history) {
-    this.canvas = canvas;
-    this.overlay = overlay;
+  constructor(visible, history) {
+    this.visible = visible;
+    this.canvas = document.createElement("canvas");
     this.history = history;
     this.grid = history.grid;
     this.camera = { x: 0, y: 0, scale: 10 }; // the scale is in pixels of the page
@@ -32,8 +33,8 @@ class Stage {
     this.count = this.exists.reduce((sum, one) => sum + one);
     this.fills = new Uint32Array(this.grid.size);
     // Only this script writes pixels, so the canvas should not be on a graphics processor.
-    this.context = canvas.getContext("2d", { alpha: false, willReadFrequently: true });
-    this.above = overlay.getContext("2d");
+    this.context = this.canvas.getContext("2d", { alpha: false, willReadFrequently: true });
+    this.above = visible.getContext("2d", { alpha: false });
     this.readColours();
   }
 
@@ -70,16 +71,16 @@ class Stage {
 
   /* Read the size from the page; return whether it has changed. */
   resize() {
-    const width = Math.max(1, this.canvas.clientWidth), height = Math.max(1, this.canvas.clientHeight);
+    const width = Math.max(1, this.visible.clientWidth), height = Math.max(1, this.visible.clientHeight);
     const ratio = Math.min(window.devicePixelRatio || 1, 3), size = `${width} ${height} ${ratio}`;
     if (size === this.size) return false;
     Object.assign(this, { width, height, size });
     this.ratio = Math.min(ratio, Math.sqrt(MOST_PIXELS / (this.width * this.height)));
-    this.sharpness = Math.min(ratio, 2); // of the second canvas
+    this.sharpness = Math.max(this.ratio, Math.min(ratio, 2)); // of the visible canvas
     this.canvas.width = Math.round(this.width * this.ratio);
     this.canvas.height = Math.round(this.height * this.ratio);
-    this.overlay.width = Math.round(this.width * this.sharpness);
-    this.overlay.height = Math.round(this.height * this.sharpness);
+    this.visible.width = Math.round(this.width * this.sharpness);
+    this.visible.height = Math.round(this.height * this.sharpness);
     this.sprites.clear();
     this.shown = this.laidOut = "";
     if (this.fitted) this.fit();
@@ -136,14 +137,15 @@ class Stage {
 
   /* Draw a moment, with ants a share of the way to the next moment, and marks of the followed ant. */
   draw(moment, share, marks) {
-    const { camera, above, sharpness } = this, view = `${camera.x} ${camera.y} ${camera.scale}`;
+    const { camera, above, sharpness, visible } = this, view = `${camera.x} ${camera.y} ${camera.scale}`;
     if (this.shown !== `${moment} ${view}`) {
       this.layOut(view);
       this.drawCells(moment);
       this.shown = `${moment} ${view}`;
     }
+    above.resetTransform();
+    above.drawImage(this.canvas, 0, 0, visible.width, visible.height);
     above.setTransform(sharpness, 0, 0, sharpness, 0, 0);
-    above.clearRect(0, 0, this.width, this.height);
     this.drawThings();
     if (marks.ant) this.drawPath(above, marks.path);
     this.drawAnts(moment, share);

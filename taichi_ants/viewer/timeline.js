@@ -87,8 +87,8 @@ class Timeline {
           <line class="cursor" y1="0" y2="100"/>
         </svg></div>`).join("");
     this.curves = [...document.querySelectorAll(".curve")];
-    // There is no curve of epsilon if it is always 0.
-    const explores = history.live || history.frames.some((frame) => frame.epsilon > 0);
+    // There is no curve of epsilon if it is always 0, or has no effect.
+    const explores = history.header.values && (history.live || history.frames.some((frame) => frame.epsilon > 0));
     this.curves.forEach((curve, number) => (curve.hidden = CURVES[number][0] === "epsilon" && !explores));
     for (const curve of this.curves) {
       const svg = curve.querySelector("svg");
@@ -134,6 +134,19 @@ class Timeline {
     player.seek(moment + Number(on));
   }
 
+  /* A path over the spans of ticks whose events are unknown, because no frame has their actions. */
+  gaps() {
+    const { history, player } = this, spans = [[history.origin, this.ticks(0)]];
+    for (let moment = 1; moment <= player.last; moment++) {
+      const [from, to] = [this.ticks(moment - 1), this.ticks(moment)], last = spans[spans.length - 1];
+      if (history.frames[moment].acts.length || from === to) continue;
+      if (last[1] === from) last[1] = to;
+      else spans.push([from, to]);
+    }
+    const at = (ticks) => (10 * this.across(ticks)).toFixed(1);
+    return spans.filter(([from, to]) => from < to).map(([from, to]) => `M${at(from)} 7H${at(to)}`).join("");
+  }
+
   setSpeed(speed) {
     const { player } = this;
     player.setSpeed(Math.min(Math.max(speed, player.slowest), player.fastest));
@@ -163,6 +176,7 @@ class Timeline {
       const [name, y] = kind === "PICKED_UP" ? ["picked", 9] : ["delivered", 1];
       return `<path class="${name}" d="${[...places].map((x) => `M${x} ${y}v4`).join("")}"/>`;
     });
+    paths.unshift(`<path class="gaps" d="${this.gaps()}"/>`);
     const svg = byId("events");
     svg.setAttribute("viewBox", "0 0 1000 14");
     svg.innerHTML = paths.join("");

@@ -71,7 +71,7 @@ class Viewer {
     document.body.classList.toggle("single", this.history.length === 1 && !this.source.live);
     const { signal } = this.closing, changed = () => (this.dirty = true);
     this.player = this.source.player?.(this.history, changed) ?? new Player(this.history, changed);
-    this.stage = new Stage(byId("world"), byId("marks"), this.history);
+    this.stage = new Stage(byId("world"), this.history);
     this.panel = new Panel(this.history, this.stage, {
       follow: (number) => this.follow(number), unfollow: () => this.follow(-1),
       cell: (cell) => this.chooseCell(cell), other: (step) => this.followOther(step), aim: () => this.toggleAim(),
@@ -256,6 +256,7 @@ class Viewer {
     on(byId("skip"), "click", () => byId("play").focus());
     // Print in the light theme. A canvas does not follow the style sheet by itself.
     on(window, "beforeprint", () => {
+      document.querySelector(".about").open = true;
       this.wear("light");
       this.draw(performance.now(), false); // there is no frame of the screen before the print
     });

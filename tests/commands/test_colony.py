@@ -117,7 +117,7 @@ OTHERS = [seed + 2**32 for seed in SEEDS]
 
 def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are frozen
     """That of a colony that lives for a while."""
-    return Task(pheromone=pheromone, delivery="truncates", evaporation_in_training=True, life=life)
+    return Task(pheromone=pheromone, life=life)
 
 
 @pytest.mark.slow
@@ -295,7 +295,10 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
             ["live", "--task.pheromone.cap", 5],
             "`task.pheromone.cap` is 5; leave it out unless `deposit` is 'add'",
         ),
-        (["live", "--task.pheromone.slope", 5], "`task.pheromone.slope` is 5; leave it out"),
+        (
+            ["live", "--task", "paper", "--task.pheromone.slope", 5],
+            "`task.pheromone.slope` is 5; leave it out",
+        ),
         (
             ["live", "--task", "foraging", "--task.pheromone.cap", 5],
             "`task.pheromone.cap` is 5; leave it out",
@@ -344,7 +347,10 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
             "--sharing frozen requires a policy; add --policy FILE",
         ),
         (
-            ["live", "--task.choice.rule", "deneubourg", "--training.discount", 0.5],
+            [
+                *("live", "--task", "paper", "--task.choice.rule", "deneubourg"),
+                *("--training.discount", 0.5),
+            ],
             "--task.choice.rule is deneubourg, by which ants choose without learning",
         ),
         (["live", "--policy", "x.npz"], "cannot read 'x.npz'"),
@@ -376,7 +382,7 @@ def test_mistakes_end_in_one_sentence(arguments, expected, capsys, tmp_path, mon
 
 
 def test_ants_that_choose_without_a_table_need_no_policy(capsys, tmp_path):
-    rule = ["--task.choice.rule", "deneubourg", "--ants", 9]
+    rule = ["--task", "paper", "--task.choice.rule", "deneubourg", "--ants", 9]
     file = tmp_path / "c.npz"
     status, _, err = call("colony", ["live", *rule, "--ticks", 7, "--save", file], capsys)
     assert (status, err) == (0, "")
@@ -412,7 +418,21 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
 
 
 LIFE = [
-    *("live", "--ants", 40, "--world.ranges", 20, 20, 20, "--capacity", 60, "--seed", 5),
+    *(
+        "live",
+        "--task",
+        "paper",
+        "--ants",
+        40,
+        "--world.ranges",
+        20,
+        20,
+        20,
+        "--capacity",
+        60,
+        "--seed",
+        5,
+    ),
     *("--task.life.births", "--task.life.lifespan", 90, "--task.life.regrowth", 3),
     *("--task.life.wander", 20, "--task.pheromone.evaporation", "exponential"),
     *("--task.pheromone.half-life", 30, "--task.pheromone.diffusion", 0.1),
@@ -506,14 +526,14 @@ def test_a_colony_starts_from_a_policy(capsys):
     assert call("colony", [*fixed, "--policy", policy, "--task.life.regrowth", 0], capsys)[0] == 0
 
 
-LASTING = {"delivery": "truncates", "evaporation_in_training": True}
 FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
 
 
 @pytest.mark.parametrize(
     ("arguments", "made_for", "expected"),
     [
-        ([], None, paper()),
+        ([], None, queueing()),
+        (["--task", "paper"], None, paper()),
         (["--task", "queueing"], None, queueing()),
         ([], FOOD_IS_BACK, FOOD_IS_BACK),
         (["--task", "queueing"], FOOD_IS_BACK, queueing()),
@@ -529,14 +549,22 @@ FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
             None,
             replace(foraging(), pheromone=Pheromone(deposit="none", view="strongest")),
         ),
-        (["--task.traffic", "right_of_way"], None, Task(traffic=Traffic(swap=True))),
+        (
+            ["--task.traffic", "right_of_way"],
+            None,
+            replace(queueing(), traffic=Traffic(swap=True)),
+        ),
         (
             ["--task", "foraging", "--task.observation", "paper", "--task.traffic", "blocking"],
             None,
-            Task(pheromone=Pheromone(deposit="fading", level=500, view="strongest")),
+            Task(
+                pheromone=Pheromone(deposit="fading", level=500, view="strongest"),
+                evaporation_in_training=True,
+            ),
         ),
         (
             [
+                *("--task", "paper"),
                 "--task.pheromone.deposit",
                 "fading",
                 "--task.pheromone.slope",
@@ -573,7 +601,7 @@ FOOD_IS_BACK = replace(queueing(), life=Life(regrowth=0))
         ),
     ],
 )
-def test_rules_are_those_named_else_the_policys_else_the_papers(
+def test_rules_are_those_named_else_the_policys_else_queueing(
     arguments, made_for, expected, tmp_path
 ):
     policy = None
@@ -583,7 +611,7 @@ def test_rules_are_those_named_else_the_policys_else_the_papers(
         save_policy(tmp_path / "a.npz", table, facts, made_for.observation)
         policy = load_policy(tmp_path / "a.npz")
     settings = command.parse_arguments(["live", *map(str, arguments)])
-    assert command.rules(settings, policy) == replace(expected, **LASTING)
+    assert command.rules(settings, policy) == expected
 
 
 @pytest.mark.long
@@ -644,7 +672,7 @@ def test_a_colony_sees_what_its_policy_or_the_option_says(from_file, capsys, tmp
 def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     where = ["--world.ranges", 20, 20, 20, "--task.life.regrowth", 0, "--ticks", 60]
-    where += ["--seed", 3, "--save", "x.npz"]
+    where += ["--task", "paper", "--seed", 3, "--save", "x.npz"]
     for place in ("nest", "spread"):
         many = ["live", "--ants", 9, "--colonies", 5, "--start", place]
         status, out, err = call("colony", [*many, *where], capsys)

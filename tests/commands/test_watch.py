@@ -16,6 +16,7 @@ from command_lines import call, load, promptly, run, start
 
 from taichi_ants import AntsError, save_policy
 from taichi_ants.learners.policies import trail_follower
+from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.server import Room
 from taichi_ants.live.session import Session
@@ -73,6 +74,30 @@ def test_it_ends_after_some_seconds(capsys: pytest.CaptureFixture[str]) -> None:
     assert (status, err) == (0, "")
     assert said.endswith("Ended.\n")
     assert time.monotonic() - began >= 1
+
+
+def test_the_first_session_delivers_and_runs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rooms = []
+
+    class Recorded(Room):
+        def __init__(self, *given: object, **options: object) -> None:
+            rooms.append(super().__init__(*given, **options) or self)  # type: ignore[arg-type]
+
+        def run(self, *given: object) -> None:
+            """Do not serve."""
+
+    monkeypatch.setattr(server, "Room", Recorded)
+    assert call("watch", [], capsys)[0] == 0
+    (room,) = rooms
+    colony = room.session.colony
+    assert room.playing
+    assert (colony.episode, colony.ticks, colony.learns) == (20, 300, True)
+    assert colony.outcome().deliveries[0, 0] > 100
+    # Most of the ants that carry food walk on trails.
+    snapshot = colony.snapshot()
+    assert (snapshot.trail[snapshot.ant_cells[snapshot.ant_carries]] > 0).mean() > 0.9
 
 
 def test_a_saved_session_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

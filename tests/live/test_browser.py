@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Page, assert_policy_holds, started
+from browser import Page, assert_policy_holds, printed, shares, started
 from command_lines import crowding
 from rooms import CHOSEN, Guest, running
 
@@ -895,6 +895,96 @@ def test_the_page_says_that_ants_move_aside(page, room):
 
 def test_the_form_takes_as_many_ants_as_a_session_can_have(page):
     assert page.tab.get_attribute("#ants", "max") == str(MOST_ANTS)
+
+
+# Elements beyond the sides of their card, and words that do not fit into their button or label.
+OVERFLOWING = """() => [...document.querySelectorAll(".card, .bar, .transport, .palette")].flatMap((card) => {
+  const { left, right, width } = card.getBoundingClientRect();
+  return !width ? [] : [...card.querySelectorAll(":not(.unseen, .unseen *, svg *)")].filter((one) => {
+    const box = one.getBoundingClientRect();
+    const cut = one.matches("button, label, h2, dd, output, summary") && one.clientWidth
+      && (one.scrollWidth > one.clientWidth + 1 || one.scrollHeight > one.clientHeight + 2);
+    return box.width && (box.right > right + 1 || box.left < left - 1 || cut);
+  }).map((one) => one.outerHTML.slice(0, 120)); })"""  # noqa: E501
+
+
+@pytest.mark.parametrize("width", [390, 1024, 1440])
+def test_nothing_leaves_its_card(browser, room, width):
+    opened = Page(browser, room.url, (width, 800), has_touch=width < 500)
+    assert opened.read(OVERFLOWING) == []
+    open_new(opened)
+    opened.tab.click("#settings-box > summary")
+    opened.read("document.querySelectorAll('.help').forEach((one) => one.click())")
+    assert opened.read(OVERFLOWING) == []
+    assert opened.read("document.documentElement.scrollWidth") == width
+    opened.close()
+
+
+def test_every_setting_has_help_for_fingers_and_keys(browser, room):
+    phone = Page(browser, room.url, (390, 844), has_touch=True)
+    declared = {one["path"]: one["help"] for one in phone.read("live.choices.settings")}
+    slider = phone.tab.locator("#sliders .field", has=phone.tab.locator("#set-slope"))
+    assert not slider.locator("small").is_visible()
+    slider.locator(".help").tap()
+    assert slider.locator("small").inner_text() == declared["task.pheromone.slope"]
+    assert slider.locator(".help").get_attribute("aria-expanded") == "true"
+    slider.locator(".help").press("Enter")
+    assert not slider.locator("small").is_visible()
+    open_new(phone)
+    phone.tab.click("#settings-box > summary")
+    boxes = phone.tab.locator("#new :is(.setting, .field):visible").all()
+    assert len(boxes) > 30
+    for box in boxes:
+        button = box.locator(".help").bounding_box()
+        assert min(button["width"], button["height"]) >= 26  # large enough for a finger
+        assert box.locator("small").text_content()
+    sees = phone.tab.locator(".setting", has=phone.tab.locator("[data-path='task.observation']"))
+    assert (
+        sees.locator("small")
+        .text_content()
+        .endswith("the three cells ahead, distinguishing ants with the other load from rocks")
+    )
+    phone.close()
+
+
+def test_a_sentence_and_three_cards_say_what_to_try(page, room):
+    assert page.text("#sees") == (
+        "Ants search for food and carry it to their queen, and lay trails that other ants can "
+        "follow."
+    )
+    page.tab.focus("[data-try=wall]")
+    page.tab.keyboard.press("Enter")
+    assert page.tab.get_attribute("[data-tool=rock]", "aria-pressed") == "true"
+    assert page.read("document.activeElement.id") == "world"
+    assert page.read(WORLD)["trail"] != [0] * room.session.colony.grid.size
+    page.click("[data-try=trail]")
+    edits(room, 1)
+    assert not room.session.colony.snapshot().trail.any()
+    wait(page, "!viewer.history.worldAt(viewer.history.length - 1).trail.some((one) => one > 0)")
+    page.tab.click("#undo")
+    wait(page, "viewer.history.worldAt(viewer.history.length - 1).trail.some((one) => one > 0)")
+    assert room.session.values()["evaporation"]["value"] == 1
+    page.click("[data-try=rule]")
+    edits(room, 1)
+    assert room.session.values()["evaporation"]["value"] == 0
+    assert "trails do not evaporate" in page.text("#toast")
+
+
+def test_the_page_is_printed_with_its_world(browser, room, tmp_path):
+    dark = Page(browser, room.url, color_scheme="dark")
+    text, sheets = printed(dark.tab, tmp_path)
+    light = dark.read(
+        "() => { viewer.wear('light'); const { colours } = viewer.stage;"
+        " return [colours.empty, colours.queen]; }"
+    )
+    empty, queen = shares(sheets, *light)
+    assert empty > 0.05
+    assert queen > 5e-5
+    assert "delivered" in text
+    assert "observation" in text  # the card about the session is open
+    assert "Start session" not in text
+    assert "Try this" not in text
+    dark.close()
 
 
 def test_play_is_among_the_first_that_tab_reaches(page):

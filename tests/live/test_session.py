@@ -767,3 +767,21 @@ def test_a_session_that_was_interrupted_after_a_launch_replays():
         session.apply({"place": {"what": "food", "cells": [(1, 1, 0)]}})
     with pytest.raises(AntsError, match="an intervention was interrupted"):
         session.leap(1)
+
+
+@pytest.mark.parametrize("policy", [TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9), trail_follower()])
+def test_ants_that_choose_without_action_values_need_no_policy(tmp_path, policy):
+    task = Task(choice=tasks.Choice("deneubourg"), life=tasks.Life(regrowth=0))
+    one = Session(Setup("paper", task, policy, ants=12))
+    one.advance(40)
+    assert {"ants", "deposit"} <= one.values().keys()
+    assert not {"epsilon", "learning_rate"} & one.values().keys()
+    assert one.header()["rule"] == "deneubourg"
+    with pytest.raises(AntsError, match="rule deneubourg has no policy"):
+        one.policy_bytes()
+    one.save(tmp_path / "one.npz")
+    assert Session.load(tmp_path / "one.npz").same(one)
+    alone = Colony(one.setup.build_world(), task, None, 0, ants=12, sharing="frozen")
+    alone.begin_episode()
+    alone.tick(40)
+    assert np.array_equal(alone.snapshot().ant_cells, one.colony.snapshot().ant_cells)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from browser import started
+from browser import printed, shares, started
 from finished_pages import colony_html, comparison_html, results
 
 from taichi_ants.analysis.paper.claims import claims_rows
@@ -238,7 +238,8 @@ def test_paper_is_light_and_has_no_controls(opened, name):
     controls = tab.locator("button:visible, input:visible, select:visible, nav:visible")
     assert controls.count() > 5
     tab.emulate_media(media="print")
-    tab.wait_for_function("document.documentElement.dataset.theme === 'light'")
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert tab.get_attribute("html", "data-theme") == "light"
     assert controls.count() == 0
     heads = tab.locator(".statements th").evaluate_all(CONTENT)
     assert all(one.strip('"') for one in heads)
@@ -248,7 +249,30 @@ def test_paper_is_light_and_has_no_controls(opened, name):
     assert sizes[".notes"] < sizes["p"]
     assert tab.locator(".more table").first.is_visible()
     assert tab.locator(".player canvas").first.is_visible()
-    assert tab.pdf().startswith(b"%PDF")
+    tab.emulate_media(media="screen")
+    tab.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert tab.get_attribute("html", "data-theme") == "dark"
+    assert not tab.locator(".more table").first.is_visible()
+
+
+@pytest.mark.parametrize("name", ["comparison", "colony"])
+def test_the_first_print_is_complete(opened, name, tmp_path):
+    """All claims with their numbers, the method, the files, and the players with their worlds."""
+    tab = opened(name, color_scheme="dark")
+    wanted = tab.evaluate("[...document.querySelectorAll('.statements td:first-child')]"
+                          ".map((one) => one.dataset.key)")  # fmt: skip
+    told = tab.evaluate("document.querySelector('main').textContent").count("Tested on")
+    text, sheets = printed(tab, tmp_path)
+    letters = text.replace(" ", "").replace("-", "")  # lines can be broken anywhere
+    assert len(wanted) == 51
+    for one in (*wanted, "Method", "Files in this folder", "computed from the files"):
+        assert one.replace(" ", "").replace("-", "") in letters, one
+    assert text.count("Tested on") == told
+    tab.click("#theme")
+    light = tab.evaluate("['empty', 'queen'].map((name) => report.players[0].stage.colours[name])")
+    empty, queen = shares(sheets, *light)
+    assert empty > 0.005
+    assert queen > 1e-5
 
 
 FADES = "one => getComputedStyle(one).maskImage"

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 
@@ -33,6 +36,26 @@ def started() -> Iterator[Any]:
         )
         yield browser
         browser.close()
+
+
+def printed(tab: Any, folder: Path) -> tuple[str, list[np.ndarray]]:
+    """Return the text of a page as the browser prints it, in one line, and its sheets as RGB."""
+    missing = [tool for tool in ("pdftotext", "pdftoppm") if shutil.which(tool) is None]
+    if missing:
+        pytest.skip(f"there is no {missing[0]} here; install the package poppler-utils")
+    path = folder / "printed.pdf"
+    tab.pdf(path=path)
+    text = subprocess.run(["pdftotext", path, "-"], check=True, capture_output=True, text=True)
+    subprocess.run(["pdftoppm", "-r", "70", "-png", path, folder / "sheet"], check=True)
+    sheets = [np.array(Image.open(one).convert("RGB")) for one in sorted(folder.glob("sheet*.png"))]
+    return " ".join(text.stdout.split()), sheets
+
+
+def shares(sheets: list[np.ndarray], *colours: str) -> list[float]:
+    """Return the largest share of a sheet with each colour, "#rrggbb"; print changes it a bit."""
+    wanted = [np.array([*bytes.fromhex(one[1:])]) for one in colours]
+    same = [[(abs(sheet - one) <= 3).all(-1).mean() for sheet in sheets] for one in wanted]
+    return [float(max(of_sheets)) for of_sheets in same]
 
 
 class Page:

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from browser import Page, assert_policy_holds, started
+from browser import Page, assert_policy_holds, printed, shares, started
 from command_lines import crowding
 from playback import played
 
@@ -230,6 +230,7 @@ def test_the_time_line_and_the_curves_seek(ant):
     events = ant.read("viewer.history.events.map(({ moment, kind }) => [moment, kind])")
     assert events == [[17, "PICKED_UP"], [34, "DELIVERED"]]
     assert ant.tab.locator("#events .picked").get_attribute("d").count("M") == 1
+    assert ant.tab.locator("#events .gaps").get_attribute("d") == ""  # each action is recorded
     # Who never explores has no curve of epsilon.
     assert ant.tab.locator(".curve:visible b").all_inner_texts() == ["0", "19"]
 
@@ -259,7 +260,7 @@ def test_a_click_follows_an_ant_or_looks_at_a_cell(crowd, colony):
     marked = np.flatnonzero((true.ground == 0) & (true.trail >= 1)).tolist()
     cell = next(c for c in marked if c not in taken)
     crowd.click_cell(cell)
-    assert f"trail {true.trail[cell]:.2f} of 250" in crowd.text("#cell")
+    assert f"trail {true.trail[cell]:.2f} (darkest from 250)" in crowd.text("#cell")
     crowd.click("#cell-close")
     crowd.tab.wait_for_selector("#cell", state="hidden")
 
@@ -472,7 +473,7 @@ def test_the_panel_shows_what_an_ant_with_food_sees(ant, episode):
     letters = ant.text("#ant b").split()[1:]
     colours = {"E": "var(--empty)", "O": "var(--rock)", "S": "var(--empty)"}
     assert ant.read(fills) == [colours[letter] for letter in letters]
-    assert "ants with food do not see trails" in ant.text("#ant")
+    assert "ants with food do not see the trail" in ant.text("#ant")
     ant.read("() => { viewer.history.kept = []; viewer.history.world.moment = 1e9; }")
 
 
@@ -488,6 +489,28 @@ def test_a_page_is_printed_light_and_without_controls(browser, episode):
         assert dark.tab.is_visible(shown), shown
     dark.read("dispatchEvent(new Event('afterprint'))")
     assert dark.read("document.documentElement.dataset.theme") == "dark"
+    dark.close()
+
+
+def test_ants_are_printed_in_their_world(browser, episode, tmp_path):
+    """The first print of a page has cells, trails and marks, in light colours, and all facts."""
+    dark = Page(browser, episode[0], color_scheme="dark")
+    dark.read("viewer.player.go(9)")
+    dark.settle()
+    text, sheets = printed(dark.tab, tmp_path)
+    assert len(sheets) <= 2
+    assert dark.read("document.documentElement.dataset.theme") == "dark"
+    light = dark.read(
+        """() => { viewer.wear("light"); const { ramp, colours } = viewer.stage;
+          const level = ramp[Math.round(255 * (25 - 9) / 250)].map((one) => one.toString(16));
+          return [colours.empty, "#" + level.join(""), colours.food, colours.queen]; }"""
+    )
+    empty, trail, food, queen = shares(sheets, *light)
+    assert empty > 0.08  # much more than in the legend
+    assert trail > 0.002
+    assert food > 5e-5
+    assert queen > 5e-5
+    assert all(words in text for words in ("Chooses forward", "observation", "delivered", "trail"))
     dark.close()
 
 
@@ -740,6 +763,7 @@ def test_what_lies_between_moments_is_not_made_up(browser, folder):
     opened.read("viewer.player.go(6)")
     assert opened.read("viewer.history.path(6, 0).length") == 1
     assert opened.tab.get_attribute("#time", "max") == "60"
+    assert opened.tab.locator("#events .gaps").get_attribute("d") == "M0.0 7H1000.0"
     opened.read("viewer.timeline.setSpeed(12)")
     assert opened.text("#speed-value") == "120 ticks/s"
     opened.tab.focus("#time")

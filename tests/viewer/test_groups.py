@@ -78,7 +78,6 @@ def test_frames_have_castes_kinds_of_food_and_rewards(sharing):
     assert np.array_equal(found, colony.snapshot().food_kinds)
     header = recorder.header()
     assert (header["castes"], header["foods"]) == ([*CASTES], [*FOODS])
-    assert header["rewards"] is None
     assert header["idles"]
 
 
@@ -153,5 +152,4 @@ def test_colonies_without_groups_have_no_sections_for_them():
     frames = [recorder.snapshot(), recorder.tick(), recorder.whole()]
     for frame in frames:
         sections = unpack(recorder.types, frame)
-        assert not any(len(sections[name]) for name in ("rewards", "groups", "kinds_at", "kinds"))
-    assert recorder.header()["rewards"] == colony.task.rewards.by_event().tolist()
+        assert not any(len(sections[name]) for name in ("groups", "kinds_at", "kinds"))

@@ -79,11 +79,11 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
                 transitions.append(sorted(plain.transitions, key=lambda one: one.number))
         recording = unpacked(Recording(recorder.header(), frames).to_bytes())
         moments = list(played(recording))
-        rewards = np.array(recording.header["rewards"])
+        rewards = [unpack(recorder.types, frame)["rewards"].tolist() for frame in frames]
         before, met = None, set()
         assert len(moments) == len(transitions)
-        for moment, snapshot, table, (slots, views), did in zip(
-            moments, snapshots, tables, ants, transitions, strict=False
+        for moment, reward, snapshot, table, (slots, views), did in zip(
+            moments, rewards, snapshots, tables, ants, transitions, strict=False
         ):
             assert np.array_equal(moment.ground, snapshot.ground)
             assert moment.trail.dtype == snapshot.trail.dtype
@@ -104,7 +104,7 @@ def test_a_recording_is_what_engine_and_reference_do(learner, sharing, sees, den
             if before is not None:
                 assert before.numbers.tolist() == [one.number for one in did]
                 assert moment.actions.tolist() == [one.executed for one in did]
-                assert rewards[moment.events].tolist() == [one.reward for one in did]
+                assert reward == [one.reward for one in did]
                 assert len(moment.td_errors) == (len(did) if sharing != "frozen" else 0)
             before = moment
 
