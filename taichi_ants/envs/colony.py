@@ -70,6 +70,7 @@ class ColonyWorlds(Ants):
         self.acted, self.rewards = np.zeros(shape, bool), np.zeros(shape)
         self.events = np.full(shape, Event.NONE, np.int64)
         self.deliveries = np.zeros(shape, np.int64)
+        self._counted = np.zeros(n_worlds, np.int64)  # ticks whose deliveries are counted
         self._last: dict[str, np.ndarray] = {}
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
@@ -88,19 +89,27 @@ class ColonyWorlds(Ants):
         if (which & ~new).any():
             self.colony.begin_some(which & ~new)
         self.events = np.where(which[:, None], Event.NONE, self.events)
-        self.deliveries[which] = 0
+        self.deliveries[which], self._counted[which] = 0, 0
 
     def step(self, actions: np.ndarray) -> None:
         """Take the actions of all ants, integers 0 to 4; worlds at their end do not change."""
         colony = self.colony
+        self._count()  # a step that was interrupted
         colony.stop(self.over())
         self.acted = colony.living & colony.running[:, None]
         colony.act(actions)
         events = np.where(self.acted, colony.events, Event.NONE)
         self.rewards = np.where(self.acted, colony.rewards, 0).astype(np.float64)
         self.events = events.astype(np.int64)
-        # A newborn ant starts at 0 in a slot that was free before.
-        self.deliveries = np.where(self.acted, self.deliveries + (events == Event.DELIVERED), 0)
+        self._count()
+
+    def _count(self) -> None:
+        """Count the deliveries of the last tick, if they are not counted yet."""
+        ticks = self.colony.episode_ticks
+        counted = self.deliveries + (self.colony.events == Event.DELIVERED)
+        counted = np.where(self.acted, counted, 0)  # a newborn ant starts at 0 in a free slot
+        self.deliveries = np.where((ticks > self._counted)[:, None], counted, self.deliveries)
+        self._counted = ticks.copy()
 
     def over(self) -> np.ndarray:
         return self.colony.episode_ticks >= self.max_steps
@@ -118,8 +127,10 @@ class ColonyWorlds(Ants):
         self, actions: np.ndarray, waiting: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Take a step, and return its rewards, terminations and truncations, (n,)."""
+        self._count()  # a step that was interrupted
         if self.task.delivery == "terminates":  # the next episode of these ants has begun
-            self.deliveries[self.events == Event.DELIVERED] = 0
+            delivered = self.colony.events == Event.DELIVERED
+            self.deliveries = np.where(delivered, 0, self.deliveries)
         self.step(actions.reshape(self.acted.shape))
         truncated = np.repeat(self.over() & ~waiting, self.colony.capacity)
         terminated = (self.events.reshape(-1) == Event.DELIVERED) & (

@@ -141,7 +141,7 @@ def test_a_disk_without_room_is_told_before_the_work(tmp_path, capsys, monkeypat
     Path("my.toml").write_text(SWEEP.replace("SEEDS", "1000"))
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: Usage(10**5))
     for name, arguments, needed in (
-        ("sweep", ["my.toml"], "576.0 kB"),  # 6000 runs, 2 measures, 8 + 2 * 20 bytes
+        ("sweep", ["my.toml"], "864.0 kB"),  # 6000 runs, 3 measures, 8 + 2 * 20 bytes
         ("compare", [*COMPARE, "--seeds", 1000], "12.0 MB"),  # 4000 runs, 2560 + 8 + 110 * 4 bytes
     ):
         status, out, err = call(name, [*arguments, "--out", "out"], capsys)

@@ -13,6 +13,7 @@ from taichi_ants import AntsError, Task, runtime
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
+from taichi_ants.task import foraging
 
 
 def lone(mode: str) -> Any:
@@ -43,6 +44,20 @@ def test_vector_environments_know_who_has_ended(make: Any, rolls: bool, mode: st
     for _ in range(6):
         one, two = ours.step(actions[0]), theirs.step(actions[0])
         assert all(np.array_equal(one[k], two[k]) for k in range(4))
+
+
+def test_deliveries_of_interrupted_steps_count() -> None:
+    rules = foraging().but(life={"regrowth": 0}, delivery="truncates")
+    made = {"task": rules, "ants": 16, "max_steps": 500}
+    ours, theirs = (HexColonyVectorEnv(16, **made) for _ in range(2))
+    for env in (ours, theirs):
+        env.reset(seed=2)
+    for actions in theirs.rollout("trail_follower", 300).actions:
+        with interrupted_after_launch():
+            ours.step(actions)
+    ones, others = (env.step(np.zeros(16, int))[-1]["deliveries"] for env in (ours, theirs))
+    assert np.array_equal(ones, others)
+    assert others.sum() > 10
 
 
 def test_a_lone_ant_does_not_go_on_after_its_last_step() -> None:
