@@ -1,25 +1,26 @@
 """Measure what a no-entry pheromone adds to the deliveries of ants on a decision tree.
 
 Corridors fork twice, and food grows back at the end of one of four branches. All ants lay an
-attractive path wherever they go, and choose the next cell by it, without learning. An ant that has
-been without food for longer than its patience also lays a repellent, as Pharaoh's ants mark
-unrewarding branches (Robinson et al. 2005). Both rules are in this file. See docs/models.md.
+attractive path wherever they go, and choose the next cell by it, without learning. Pharaoh's ants
+also mark unrewarding branches with a repellent (Robinson et al. 2005). Here, ants mark wherever
+they go after a search in vain, or only where they see three obstacles. In a control, the repellent
+lies on the three branches without food from the start. See docs/models.md.
 """
 
 from typing import Annotated
 
 import numpy as np
 
-from taichi_ants import Colony, Field, Pheromone, Task, World, rules
-from taichi_ants.rules import power
+from taichi_ants import Colony, Field, Interventions, Pheromone, Task, World, rules
+from taichi_ants.rules import pick, power
 from taichi_ants.settings import Is
 from taichi_ants.studies import model_script
 from taichi_ants.task import Choice, Life, Traffic
 
 ANTS, TICKS, STEP = 16, 3000, 100
 STEM, BRANCH = 2, 4  # lengths in cells
-# The factor `fear` by which the choice divides; 0 is a colony that ignores the repellent.
-FEARS = {"without repellent": 0.0, "with repellent": 2.0}
+FEAR, AMOUNT = 2.0, 100
+HALF_LIVES = (200.0, 50.0)  # of the path, in ticks
 
 
 @rules.register("deposit", summary="mark cells after a search in vain")
@@ -27,7 +28,7 @@ def no_entry(
     level,
     carried,
     patience: Annotated[int, Is("search time", unit="ticks", least=0, most=1000)] = 60,
-    amount: Annotated[float, Is("level of a mark", least=0, most=1000)] = 100.0,
+    amount: Annotated[float, Is("level of a mark", least=0, most=1000)] = AMOUNT,
 ):
     """Return the level of a cell after an ant without food has entered it."""
     return max(level, amount) if carried > patience else level
@@ -43,57 +44,73 @@ def wary(
     carries,
     random,
     k: Annotated[float, Is("attraction of a cell without a trail", least=0.1, most=1000)] = 20.0,
-    fear: Annotated[float, Is("strength of the repellent", least=0, most=10)] = 2.0,
+    fear: Annotated[float, Is("strength of the repellent", least=0, most=10)] = FEAR,
 ):
     """Return an action: the rule "deneubourg" with exponent 2, divided by the repellent."""
     sees_nearer = 0
     for i in range(3):
         if is_open[i] and nearer[i]:
             sees_nearer = 1
-    total = 0
-    for i in range(3):
-        if is_open[i] and nearer[i] >= carries * sees_nearer:
-            total += power(k + levels[i], 2) / (1 + fear * levels_no_entry[i] * (1 - carries))
-    action = 0 if random < 0.5 else 2  # turn, if no cell is open
+    weights = [
+        power(k + levels[i], 2) / (1 + fear * levels_no_entry[i] * (1 - carries))
+        if is_open[i] and nearer[i] >= carries * sees_nearer
+        else 0
+        for i in range(3)
+    ]
+    action = pick(weights, random)
     if codes[0] == 3 or codes[1] == 3 or codes[2] == 3:
         action = 3 + carries
-    elif total > 0:
-        drawn = random * total
-        total = 0
-        action = 0
-        for i in range(3):
-            if is_open[i] and nearer[i] >= carries * sees_nearer:
-                total += power(k + levels[i], 2) / (1 + fear * levels_no_entry[i] * (1 - carries))
-                if total <= drawn:
-                    action = i + 1
-        action = min(action, 2)
+    elif action < 0:
+        action = 0 if random < 0.5 else 2  # turn, if no cell is open
     return action
 
 
+# The repellent of each model: its name, then its field.
+MARKS = {
+    "without repellent": Field(laid="never"),
+    "after a search in vain": Field(
+        "exponential", half_life=100.0, deposit="no_entry", laid="without_food"
+    ),
+    "at dead ends": Field("exponential", half_life=100.0, level=AMOUNT, laid="dead_end"),
+    "on wrong branches": Field("none", laid="never"),
+}
+PLACED = "on wrong branches"
+
+
 def decision_tree() -> World:
-    """Return a world of corridors, three cells wide, that fork twice; one branch has food."""
+    """Return a world of corridors, three cells wide, that fork twice; one branch has food.
+
+    Its region "wrong" has the corridors that lead away from the food at both forks.
+    """
     up, left, right = np.array([1, 0, 0]), np.array([1, 0, 1]), np.array([1, 1, 0])
     queen = 2 * up
     fork = queen + STEM * up
-    walked, ends = [queen + n * up for n in range(STEM + 1)], []
+    walked, ends, wrong = [queen + n * up for n in range(STEM + 1)], [], []
     for side in (left, right):
         walked += [fork + n * side for n in range(1, BRANCH + 1)]
+        wrong += walked[-BRANCH:] if side is right else []
         second = fork + BRANCH * side
         for heading in (side, up):
             walked += [second + n * heading for n in range(1, BRANCH + 1)]
+            wrong += walked[-BRANCH:] if ends else []
             ends.append(second + BRANCH * heading)
     full = World((24, 16, 16), queen).grid
     cells = {tuple(cell) for cell in full.cells(np.flatnonzero(full.exists)).tolist()}
-    near = [one + around for one in walked for around in (0 * up, up, right, right - up)]
-    near += [one - around for one in walked for around in (up, right, right - up)]
-    free = {tuple((cell - cell.min()).tolist()) for cell in near}
-    return World(full.ranges, queen, [ends[0]], obstacles=sorted(cells - free))
+    steps = (0 * up, up, right, right - up, -up, -right, up - right)
+
+    def wide(middle: list[np.ndarray]) -> set[tuple[int, ...]]:
+        near = [one + step for one in middle for step in steps]
+        return {tuple((cell - cell.min()).tolist()) for cell in near}
+
+    right_way = [one for one in walked if not any(one is other for other in wrong)]
+    regions = {"wrong": sorted(wide(wrong) - wide(right_way))}
+    rock = sorted(cells - wide(walked))
+    return World(full.ranges, queen, [ends[0]], obstacles=rock, regions=regions)
 
 
-def task(fear: float) -> Task:
-    """Return the task of a colony."""
-    path = Field("exponential", half_life=200.0, deposit="add", level=20, cap=400, laid="always")
-    mark = Field("exponential", half_life=100.0, deposit="no_entry", laid="without_food")
+def task(mark: Field, half_life: float, fear: float = FEAR) -> Task:
+    """Return the task of a colony whose repellent is a field, and the half-life of its path."""
+    path = Field("exponential", half_life, deposit="add", level=20, cap=400, laid="always")
     return Task(
         pheromone=Pheromone(deposit="none"),
         fields={"path": path, "no_entry": mark},
@@ -106,10 +123,15 @@ def task(fear: float) -> Task:
     )
 
 
-def deliveries_over_time(seeds: list[int], fear: float) -> np.ndarray:
+def deliveries_over_time(
+    seeds: list[int], model: str, half_life: float = HALF_LIVES[0], fear: float = FEAR
+) -> np.ndarray:
     """Return the deliveries so far, every STEP ticks, (seeds, times)."""
-    colony = Colony(decision_tree(), task(fear), None, seeds, ANTS, sharing="frozen")
+    worlds, rules_of_all = [decision_tree()] * len(seeds), task(MARKS[model], half_life, fear)
+    colony = Colony(worlds, rules_of_all, None, seeds, ANTS, sharing="frozen")
     colony.begin_episode()
+    if model == PLACED:
+        Interventions(colony).lay_trail("wrong", AMOUNT, "no_entry")
     counts = []
     for _ in range(0, TICKS, STEP):
         colony.tick(STEP)
@@ -118,24 +140,26 @@ def deliveries_over_time(seeds: list[int], fear: float) -> np.ndarray:
 
 
 def measure(seeds: list[int]) -> model_script.Results:
-    """Return the deliveries over time with and without the repellent."""
-    found = {name: deliveries_over_time(seeds, fear) for name, fear in FEARS.items()}
-    numbers, summary = [], []
-    for name, counts in found.items():
-        for seed, of_seed in zip(seeds, counts.tolist(), strict=True):
-            for step, n in enumerate(of_seed, start=1):
-                numbers.append({"model": name, "seed": seed, "tick": step * STEP, "delivered": n})
-            summary.append({"model": name, f"deliveries in {TICKS} ticks": of_seed[-1]})
-    first, second = (counts[:, -1] for counts in found.values())
-    column = f"deliveries in {TICKS} ticks"
-    summary += [{"model": "difference", column: more} for more in (second - first).tolist()]
+    """Return the deliveries over time for each model, and their differences to the first."""
+    numbers, summary, found = [], [], {}
+    for half_life in HALF_LIVES:
+        for name in MARKS:
+            found[half_life, name] = counts = deliveries_over_time(seeds, name, half_life)
+            less = found[half_life, next(iter(MARKS))][:, -1]
+            for seed, of_seed, base in zip(seeds, counts.tolist(), less.tolist(), strict=True):
+                one = {"half_life": half_life, "model": name, "seed": seed}
+                for step, n in enumerate(of_seed, start=1):
+                    numbers.append({**one, "tick": step * STEP, "delivered": n})
+                row = {"half-life, model": f"{half_life:g} {name}", "deliveries": of_seed[-1]}
+                summary.append({**row, "difference": of_seed[-1] - base})
 
     def draw(axes):
-        for name, counts in found.items():
-            model_script.band(axes, np.arange(STEP, TICKS + 1, STEP), counts, name)
+        for (half_life, name), counts in found.items():
+            if half_life == HALF_LIVES[0]:
+                model_script.band(axes, np.arange(STEP, TICKS + 1, STEP), counts, name)
         axes.set(xlabel="tick", ylabel="food items delivered", ylim=(0, None))
 
-    title = "Deliveries on a decision tree, with and without a no-entry pheromone"
+    title = "Deliveries on a decision tree, by where a no-entry pheromone is laid"
     return model_script.Results(numbers, summary, title, draw)
 
 

@@ -44,9 +44,25 @@ def bounded_power(x, y):
     return power(x, ti.min(y, ti.f64(1000.0)))
 
 
+@ti.func
+def picked(weights, random):
+    """Return an index by weights: f64 (n,), f64 -> i32; see `taichi_ants.rules.pick`."""
+    counted, total = weights, ti.f64(0.0)
+    for i in ti.static(range(weights.n)):
+        weight = ti.min(weights[i], ti.f64(1e300))
+        counted[i] = ti.select(weights[i] >= ti.f64(1e-300), weight, ti.f64(0.0))
+        total += counted[i]
+    index, below = -1, ti.f64(0.0)
+    for i in ti.static(range(weights.n)):
+        if (counted[i] > ti.f64(0.0)) & ((index < 0) | (below <= random * total)):
+            index = i
+        below += counted[i]
+    return index
+
+
 _NAMES = {
     **{"ti": ti, "modulo": modulo, "min_": smaller, "max_": larger, "abs_": ti.abs},
-    **{"exp_": exponential, "log_": logarithm, "power_": bounded_power},
+    **{"exp_": exponential, "log_": logarithm, "power_": bounded_power, "pick_": picked},
 }
 
 

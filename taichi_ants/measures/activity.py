@@ -33,11 +33,11 @@ def synchrony(values: np.ndarray, snapshot: Snapshot) -> float:
     """Return how much more the `activity` varies over time than that of independent ants.
 
     It is n v / (m (1 - m)), the binomial index of dispersion, for n living ants. The mean m and the
-    variance v are those of the activity in the rows of the episode so far. The variance is divided
-    by the number of rows. Independent ants with equal, constant activity give about 1. Ants that
-    all move or rest together give n. Studies of activity cycles in ants, such as Cole [1]_, look at
-    the same series, the share of active ants. The value is nan with fewer than two rows, without
-    ants, and if m is 0 or 1.
+    variance v are those of the activity in the rows of the episode so far, without rows in which no
+    ant lives. The variance is divided by their number. Independent ants with equal, constant
+    activity give about 1. Ants that all move or rest together give n. Studies of activity cycles
+    in ants, such as Cole [1]_, look at the same series, the share of active ants. The value is nan
+    with fewer than two such rows, without ants, and if m is 0 or 1.
 
     .. [1] B. J. Cole (1991), Short-term activity cycles in ants: generation of periodicity by
        worker interaction, American Naturalist 137, 244-259.

@@ -44,10 +44,10 @@ def choose_by_rule(
     is_open = [code in (SEES_EMPTY, SEES_LURE) for code in codes]
     nearer = [code == SEES_LURE and world.has_compass(ant) for code in codes]
     for side, cell in enumerate(cells):
-        shared = task.traffic.shared and side - 1 not in ant.misread
-        if shared and nestmate(world, ant, cell):
-            is_open[side] = ant.carries or task.traffic.follow
+        if cell in world.ants and side - 1 not in ant.misread:
             nearer[side] = world.has_compass(ant) and is_better(world, ant, cell)
+            if task.traffic.shared and nestmate(world, ant, cell):
+                is_open[side] = ant.carries or task.traffic.follow
     inputs = {
         "values": lambda: list(values),
         "codes": lambda: codes,

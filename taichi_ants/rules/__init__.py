@@ -3,8 +3,8 @@
 See `docs/rules.md`, and `register` for the form of a rule.
 """
 
-from taichi_ants.rules.functions import exp, log, power
+from taichi_ants.rules.functions import exp, log, pick, power
 from taichi_ants.rules.registry import KINDS, Parameters, Rule, get, names, register
 
-__all__ = ["KINDS", "Parameters", "Rule", "exp", "get", "log", "names", "power", "register"]
+__all__ = ["KINDS", "Parameters", "Rule", "exp", "get", "log", "names", "pick", "power", "register"]
 __dir__ = __all__.copy  # completion lists only public names

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
 
 
 def exp(x: float) -> float:
@@ -49,3 +50,24 @@ def power(x: float, y: float) -> float:
     if y.is_integer():
         return math.prod([x] * int(y), start=1.0)
     return exp(y * log(x))
+
+
+def pick(weights: Sequence[float], random: float) -> int:
+    """Return an index, drawn with probabilities proportional to weights; -1 if none counts.
+
+    A weight counts if it is at least 1e-300, and as 1e300 if it is larger. An entry whose weight
+    does not count, such as 0, a negative number or NaN, is never returned, for any `random`.
+
+    Args:
+        weights: The weights of the entries.
+        random: A random number from 0 to less than 1; the index never falls as it rises.
+    """
+    counted, total = [min(one, 1e300) if one >= 1e-300 else 0.0 for one in weights], 0.0
+    for one in counted:
+        total += one  # not `sum`, whose rounding differs between versions of Python
+    index, below = -1, 0.0
+    for i, one in enumerate(counted):
+        if one and (index < 0 or below <= random * total):
+            index = i
+        below += one
+    return index

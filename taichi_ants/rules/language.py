@@ -1,9 +1,12 @@
 """The language of rules: a part of Python that means the same in Python and in kernels.
 
 All numbers are 64-bit floating-point numbers, whole numbers too. A rule computes with + - * / // %,
-comparisons, `and`, `or`, `not`, conditional expressions, and `exp`, `log`, `power`, `min`, `max`
-and `abs`. Statements are assignments, `if`, and `for` over a `range` of literal numbers. The only
-`return` is the last line. So a rule always ends, and reads nothing but its arguments.
+comparisons, `and`, `or`, `not`, conditional expressions, and `exp`, `log`, `power`, `pick`, `min`,
+`max` and `abs`. Statements are assignments, `if`, and `for` over a `range` of literal numbers.
+The only `return` is the last line. So a rule always ends, and reads nothing but its arguments.
+
+A list, `[a, b]` or `[... for k in range(3)]`, is a vector like the inputs with several entries.
+Vectors never change: a name is assigned lists of one length only, and entries are not assigned.
 
 `kernel_source` translates a rule into source text for Taichi. Python types a variable at each
 assignment, Taichi at the first one; the translation removes this and other differences.
@@ -13,11 +16,13 @@ from __future__ import annotations
 
 import ast
 import inspect
+import math
 from collections.abc import Callable, Iterator, Mapping
 from textwrap import dedent
 from typing import Any
 
-FUNCTIONS = {"exp": 1, "log": 1, "power": 2, "min": 2, "max": 2, "abs": 1}  # numbers of arguments
+# Numbers of arguments; the first argument of `pick` is a vector.
+FUNCTIONS = {"exp": 1, "log": 1, "power": 2, "pick": 2, "min": 2, "max": 2, "abs": 1}
 _MOST_REPEATS = 256  # of the body of the innermost loop
 _OPERATORS = {ast.Add: "{} + {}", ast.Sub: "{} - {}", ast.Mult: "{} * {}", ast.Div: "{} / {}"}
 _OPERATORS |= {ast.FloorDiv: "ti.floor({} / {})", ast.Mod: "modulo({}, {})"}
@@ -57,8 +62,9 @@ class _Translation:
         self, function: Callable[..., Any], tree: ast.FunctionDef, lengths: Mapping[str, int]
     ) -> None:
         closure = inspect.getclosurevars(function)
-        self._outside = {**closure.builtins, **closure.globals, **closure.nonlocals}
-        self._tree, self._lengths = tree, lengths
+        # Python before 3.12 does not list the globals that only a list names.
+        self._outside = {**closure.builtins, **function.__globals__, **closure.nonlocals}
+        self._tree, self._arguments, self._lengths = tree, lengths, dict(lengths)
         self._first_line = tree.lineno - len(tree.decorator_list)
         self._loops: list[tuple[str, int]] = []  # variables and repetitions of the present loops
         assigned = (
@@ -66,11 +72,17 @@ class _Translation:
             for one in ast.walk(tree)
             if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)
         )
-        self._numbers = dict.fromkeys([*(n for n in lengths if not lengths[n]), *assigned])
+        self._vectors = {
+            ast.unparse(one.targets[0])
+            for one in ast.walk(tree)
+            if isinstance(one, ast.Assign) and isinstance(one.value, (ast.List, ast.ListComp))
+        }
+        numbers = [*(n for n in lengths if not lengths[n]), *assigned]
+        self._numbers = dict.fromkeys(n for n in numbers if n not in self._vectors)
         self._loop_variables = {
             one.target.id
             for one in ast.walk(tree)
-            if isinstance(one, ast.For) and isinstance(one.target, ast.Name)
+            if isinstance(one, (ast.For, ast.comprehension)) and isinstance(one.target, ast.Name)
         }
 
     def source(self) -> str:
@@ -83,16 +95,16 @@ class _Translation:
             raise LanguageError("its last line, and no other, must be a return")
         if returns[0].value is None:
             raise LanguageError("its return has no value")
-        lines = [f"def rule({', '.join(f'a_{name}' for name in self._lengths)}):"]
-        lines += [f"    u_{name} = ti.cast(a_{name}, ti.f64)" for name in self._lengths]
-        inner = [name for name in self._numbers if name not in self._lengths]
-        lines += [
-            f"    u_{name} = ti.f64(0.0)" for name in inner if name not in self._loop_variables
-        ]
-        for statement in body[:-1]:
-            lines += self._statement(statement, "    ")
-        result = self._number(returns[0].value)
-        return "\n".join([*lines, f"    return ti.cast({result}, ti.f64)", ""])
+        inner = [line for one in body[:-1] for line in self._statement(one, "    ")]
+        inner += [f"    return ti.cast({self._number(returns[0].value)}, ti.f64)", ""]
+        lines = [f"def rule({', '.join(f'a_{name}' for name in self._arguments)}):"]
+        lines += [f"    u_{name} = ti.cast(a_{name}, ti.f64)" for name in self._arguments]
+        for name in dict.fromkeys([*self._numbers, *self._lengths]):
+            if name not in self._arguments and name not in self._loop_variables:
+                n = self._lengths.get(name)
+                zero = f"ti.Vector([ti.f64(0.0)] * {n})" if n else "ti.f64(0.0)"
+                lines.append(f"    u_{name} = {zero}")
+        return "\n".join([*lines, *inner])
 
     def _refuse(self, node: ast.AST, why: str = "is not allowed") -> LanguageError:
         line = getattr(node, "lineno", 1) - self._first_line + 1
@@ -102,7 +114,7 @@ class _Translation:
 
     def _statement(self, node: ast.stmt, indent: str) -> Iterator[str]:
         if isinstance(node, ast.Assign) and len(node.targets) == 1:
-            yield f"{indent}{self._target(node.targets[0])} = {self._cast(node.value)}"
+            yield f"{indent}{self._target(node.targets[0])} = {self._assigned(node)}"
         elif isinstance(node, ast.AugAssign):
             read = ast.copy_location(ast.Name(getattr(node.target, "id", ""), ast.Load()), node)
             whole = ast.copy_location(ast.BinOp(read, node.op, node.value), node)
@@ -125,12 +137,28 @@ class _Translation:
     def _target(self, node: ast.expr) -> str:
         if not isinstance(node, ast.Name):
             raise self._refuse(node, "is not allowed; assign to one name at a time")
-        if node.id in self._loop_variables or self._lengths.get(node.id):
+        is_input = self._arguments.get(node.id) or {node.id} & self._vectors & {*self._arguments}
+        if node.id in self._loop_variables or is_input:
             raise self._refuse(node, "cannot be assigned; choose another name")
         return f"u_{node.id}"
 
+    def _assigned(self, node: ast.Assign) -> str:
+        name = getattr(node.targets[0], "id", "")
+        if name not in self._vectors:
+            return self._cast(node.value)
+        vector, length = self._vector(node.value)
+        if self._lengths.setdefault(name, length) != length:
+            raise self._refuse(node, f"must have {self._lengths[name]} entries, as before")
+        return vector
+
     def _loop(self, node: ast.For, indent: str) -> Iterator[str]:
-        over, variable = node.iter, node.target
+        yield f"{indent}{self._enter(node.iter, node.target)}:"
+        for statement in node.body:
+            yield from self._statement(statement, indent + "    ")
+        self._loops.pop()
+
+    def _enter(self, over: ast.expr, variable: ast.expr) -> str:
+        """Return the head of a loop, which is then the innermost one of the present loops."""
         is_range = isinstance(over, ast.Call) and ast.unparse(over.func) == "range"
         if not is_range or not isinstance(variable, ast.Name) or variable.id in self._lengths:
             raise self._refuse(
@@ -141,15 +169,31 @@ class _Translation:
         except (TypeError, ValueError):
             raise self._refuse(over, "must have literal whole numbers") from None
         self._loops.append((variable.id, len(repeats)))
-        total = 1
-        for _, n in self._loops:
-            total *= max(1, n)
+        self._check_repeats(over)
+        return f"for u_{variable.id} in ti.static({ast.unparse(over)})"
+
+    def _check_repeats(self, node: ast.expr, n: int = 1) -> None:
+        total = math.prod((max(1, one) for _, one in self._loops), start=n)
         if total > _MOST_REPEATS:
-            raise self._refuse(over, f"repeats {total} times; at most {_MOST_REPEATS} are allowed")
-        yield f"{indent}for u_{variable.id} in ti.static({ast.unparse(over)}):"
-        for statement in node.body:
-            yield from self._statement(statement, indent + "    ")
-        self._loops.pop()
+            raise self._refuse(node, f"repeats {total} times; at most {_MOST_REPEATS} are allowed")
+
+    def _vector(self, node: ast.expr) -> tuple[str, int]:
+        """Return an expression of a vector, f64, and its length."""
+        source, length = "", 0
+        if isinstance(node, ast.Name):
+            source, length = f"u_{node.id}", self._lengths.get(node.id, 0)
+        elif isinstance(node, ast.List):
+            length = len(node.elts)
+            source = f"ti.Vector([{', '.join(map(self._cast, node.elts))}])"
+        elif isinstance(node, ast.ListComp) and len(node.generators) == 1:
+            (one,) = node.generators
+            if not one.ifs and not one.is_async:
+                head = self._enter(one.iter, one.target)
+                source, length = f"ti.Vector([{self._cast(node.elt)} {head}])", self._loops.pop()[1]
+        if not length:
+            raise self._refuse(node, "is not a vector, for example `[0.2 * k for k in range(3)]`")
+        self._check_repeats(node, length)
+        return source, length
 
     def _cast(self, node: ast.expr) -> str:
         return f"ti.cast({self._number(node)}, ti.f64)"
@@ -221,6 +265,8 @@ class _Translation:
             return f"u_{name}[{place.value}]"
         if isinstance(place, ast.Name) and any(place.id == one for one, _ in self._loops):
             return f"u_{name}[u_{place.id}]"
+        if name in self._vectors:
+            raise self._refuse(node, "must have a literal number or the name of a loop as index")
         index = f"ti.cast({self._number(place)}, ti.i32)"
         return f"u_{name}[ti.max(ti.min({index}, {length - 1}), 0)]"
 
@@ -228,7 +274,9 @@ class _Translation:
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS or name in self._numbers:
             raise self._refuse(node, f"calls another function than {', '.join(FUNCTIONS)}")
-        wanted, given = FUNCTIONS[name], [self._number(one) for one in node.args]
+        wanted, of_vector = FUNCTIONS[name], name == "pick"
+        given = [self._vector(one)[0] for one in node.args[:of_vector]]
+        given += [self._number(one) for one in node.args[of_vector:]]
         several = name in ("min", "max") and len(given) >= wanted
         if node.keywords or not (len(given) == wanted or several):
             raise self._refuse(node, f"must have {wanted} arguments")

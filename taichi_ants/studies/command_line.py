@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 EXIT_BAD_INPUT = 2
 MOST_SHARDS = 100_000
 # Help for options that several commands have.
-PLUGIN = "Python file that registers learners, observations, worlds or measures"
+PLUGIN = "Python file that registers learners, observations, worlds, measures or rules"
 THREADS = "number of CPU threads (default: all)"
 # Names of worlds, because an import of their registry would import NumPy.
 WORLDS = (

@@ -483,7 +483,7 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
     )
     assert done.stdout.endswith("heavy: []\n")
     assert "\n  FILE " in done.stdout
-    assert "learners, observations, worlds or measures" in " ".join(done.stdout.split())
+    assert "learners, observations, worlds, measures or rules" in " ".join(done.stdout.split())
 
 
 def test_the_script_of_observations_takes_the_options_of_a_sweep(tmp_path):

@@ -12,6 +12,7 @@ import pytest
 from command_lines import ROOT, run
 
 from taichi_ants import files
+from taichi_ants.rules import registry
 
 MODELS = ROOT / "experiments" / "models"
 
@@ -87,8 +88,54 @@ def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
     done = run("models/no_entry", ["--seeds", 2, "--out", tmp_path], kernels, tmp_path)
     assert done.returncode == 0, done.stderr
     rows = files.read_csv(tmp_path / "no_entry.csv")
-    assert len(rows) == 2 * 2 * 30
+    assert len(rows) == 2 * 4 * 2 * 30
     last = [row["delivered"] for row in rows if row["tick"] == 3000]
     assert min(last) > 0
     assert len(set(last)) > 1
     assert (tmp_path / "no_entry.png").stat().st_size > 10_000
+
+
+@pytest.fixture
+def rules_of_scripts(monkeypatch):
+    """Forget the rules that a script registers."""
+    monkeypatch.setattr(registry, "_RULES", dict(registry._RULES))
+
+
+def test_rules_of_the_no_entry_model(rules_of_scripts):
+    runpy.run_path(str(MODELS / "no_entry.py"))
+    mark = registry.get("no_entry").function
+    for level, carried, expected in ((0, 60, 0), (0, 61, 100), (50, 1000, 100), (200, 61, 200)):
+        assert mark(level, carried) == expected
+    wary = registry.get("wary").function
+    empty, food, free, none = (0, 0, 0), (0, 3, 0), (1, 1, 1), (0, 0, 0)
+    last = 1 - 2**-32
+    cases = (  # codes, levels, repellent, open, nearer, carries, random; action
+        ((empty, none, none, free, none, 0, 0.3), 0),  # three equal cells
+        ((empty, none, none, free, none, 0, 0.34), 1),
+        ((empty, none, none, free, none, 0, last), 2),
+        ((empty, (20, 0, 0), none, free, none, 0, 0.66), 0),  # weights 1600, 400, 400
+        ((empty, (20, 0, 0), none, free, none, 0, 0.67), 1),
+        ((empty, none, (100, 0, 0), (1, 1, 0), none, 0, 0.01), 1),  # weights 400 / 201, 400
+        ((empty, none, (100, 0, 0), (1, 1, 0), none, 1, 0.49), 0),  # carriers ignore it
+        ((empty, (0, 400, 0), none, (1, 0, 1), none, 0, 0.5), 2),  # the closed cell is not chosen
+        ((empty, none, none, (1, 1, 0), none, 0, last), 1),
+        ((empty, none, none, free, (0, 0, 1), 1, 0.0), 2),  # the compass of an ant with food
+        ((empty, none, none, (1, 1, 0), (0, 0, 1), 1, 0.0), 0),  # the nearer cell is closed
+        ((empty, none, none, none, none, 0, 0.49), 0),
+        ((empty, none, none, none, none, 0, 0.5), 2),
+        ((food, none, none, free, none, 0, 0.0), 3),
+        ((food, none, none, free, none, 1, 0.0), 4),
+    )
+    for given, action in cases:
+        assert wary(*given) == action, given
+
+
+@pytest.mark.slow
+def test_controls_of_the_no_entry_model(rules_of_scripts):
+    """Marks that nobody reads do not matter; those on wrong branches, placed by us, do."""
+    over_time = runpy.run_path(str(MODELS / "no_entry.py"))["deliveries_over_time"]
+    seeds = list(range(8))
+    without = over_time(seeds, "without repellent")
+    for model in ("after a search in vain", "at dead ends", "on wrong branches"):
+        assert np.array_equal(over_time(seeds, model, fear=0.0), without)
+    assert (over_time(seeds, "on wrong branches")[:, -1] > 1.5 * without[:, -1]).all()

@@ -17,12 +17,14 @@ from taichi_ants import (
     Task,
     TrainingConfig,
     rules,
+    runtime,
     train,
     worlds,
 )
+from taichi_ants.engines import own_rules as own_rules_of_kernels
 from taichi_ants.interventions import TaskNumbers
 from taichi_ants.reference import own_observations
-from taichi_ants.rules import exp, log, power, registry
+from taichi_ants.rules import exp, log, pick, power, registry
 from taichi_ants.rules.inputs import KINDS
 from taichi_ants.task import Choice, Observation, observations
 from taichi_ants.task.observations import registry as seen
@@ -56,6 +58,91 @@ def test_functions_of_rules_equal_the_real_ones():
         assert exp(x) == pytest.approx(np.exp(x), rel=1e-12)
         assert log(x) == pytest.approx(np.log(x), rel=1e-12, abs=1e-15)
         assert power(x, 1.7) == pytest.approx(x**1.7, rel=1e-12)
+
+
+INF, NAN, LAST = float("inf"), float("nan"), 1 - 2**-32  # LAST is the largest input `random`
+PICKS = [  # weights, random number, index
+    ((1, 1, 2), 0, 0),
+    ((1, 1, 2), 0.2499, 0),
+    ((1, 1, 2), 0.25, 1),
+    ((1, 1, 2), 0.5, 2),
+    ((1, 1, 2), LAST, 2),
+    ((0, 1, 0), 0, 1),  # closed cells on both sides
+    ((0, 1, 0), LAST, 1),
+    ((1, 0, 1), 0.5, 2),  # the closed cell lies between
+    ((1, 0, 0), LAST, 0),
+    ((1, 0, 0), 1, 0),  # as after rounding
+    ((1, 1, 0), 1, 1),
+    ((0, 1, 1), -1, 1),
+    ((0.1, 0.2, 0), 1 - 2**-53, 1),
+    ((1e16, 1, 0), LAST, 0),
+    ((0, 0, 0), 0.3, -1),
+    ((-5, NAN, 0), 0.3, -1),
+    ((-5, 2, NAN), LAST, 1),
+    ((1e-301, 1e-300, 0), 0, 1),
+    ((1, INF, 1), 0.3, 1),
+    ((INF, 0, INF), 0.5, 2),
+    ((1e308, 1e308, 1e308), 0.4, 1),
+    ((1, 1, 1), NAN, 0),
+]
+
+
+def picks(levels, random):
+    return pick(levels, random) + 1
+
+
+def test_pick_draws_by_weights_and_never_what_is_closed(clean):
+    for weights, random, index in PICKS:
+        assert pick(weights, random) == index, (weights, random)
+    runtime.start()
+    rules.register("choice")(picks)
+    rows = np.array([[*weights, random] for weights, random, _ in PICKS], np.float64)
+    in_kernels = own_rules_of_kernels._results(rules.get("picks"), rows, [3, 0]) - 1
+    assert in_kernels.tolist() == [index for *_, index in PICKS]
+    rng = np.random.default_rng(0)
+    drawn = np.bincount([pick((1, 0, 3), one) for one in rng.random(10_000)], minlength=3)
+    assert drawn[1] == 0
+    assert abs(drawn[2] - 7500) < 5 * np.sqrt(10_000 * 0.75 * 0.25)
+
+
+def births(level):
+    return max(level, 4)
+
+
+def test_rules_of_evaporation_leave_rocks_and_the_outside_alone(clean):
+    rules.register("evaporation")(births)
+    check = check_rule("births", 10)
+    assert (check.difference, check.ticks) == ("", 360)
+
+
+def homeward(nearer, codes, carries, random):
+    action = pick([1, 1, 1], random)
+    if carries:
+        action = 1 if nearer[1] else 2 * pick([1, 1], random)
+    for k in range(3):
+        if codes[k] == 3:
+            action = 3 + carries
+    return action
+
+
+@pytest.mark.parametrize("traffic", ["blocking", "following"])
+def test_a_cell_with_an_ant_is_as_near_as_without_it(traffic, clean):
+    rules.register("choice")(homeward)
+    world = worlds.open_world(1, ranges=(7, 7, 7))
+    task = Task(choice="homeward", traffic=traffic).but(life={"regrowth": 0})
+    colony = Colony(world, task, None, 0, 50, sharing="frozen")
+    colony.begin_episode()
+    far, occupied = colony.grid.distances((0, 0, 0)), 0  # from the queen, by cell
+    for _ in range(60):
+        cells, headings = colony.cells[0].copy(), colony.headings[0].copy()
+        carries = colony.carrying[0].copy()
+        colony.tick()
+        for ant in np.flatnonzero(carries & (colony.actions[0] < 3)):
+            ahead = cells[ant] + colony.grid.offsets[headings[ant]]
+            if ahead in cells:
+                occupied += 1
+                assert (colony.actions[0, ant] == 1) == (far[ahead] < far[cells[ant]])
+    assert occupied > 30
 
 
 def no_return(level):
@@ -185,6 +272,44 @@ def half(random):
     return random * 4
 
 
+def picks_a_number(level):
+    return pick(level, 0.5)
+
+
+def filtered(level):
+    return 1 + pick([k for k in range(3) if k], level)
+
+
+def lengthens(level):
+    weights = [level, 1]
+    weights = [level, 1, 2]
+    return 1 + pick(weights, 0.5)
+
+
+def changes(random):
+    weights = [1, 1, 1]
+    weights[1] = 0
+    return pick(weights, random)
+
+
+def replaces_an_input(levels, random):
+    levels = [1, 1, 1]
+    return pick(levels, random)
+
+
+def any_entry(random):
+    weights = [1, 1, 1]
+    return weights[random * 3 // 1]
+
+
+def long_list(random):
+    return min(pick([1 for _i in range(257)], random), 4)
+
+
+def nothing_open(is_open, random):
+    return pick(is_open, random)
+
+
 WRONG = [
     ("evaporation", no_return, "its last line, and no other, must be a return"),
     ("evaporation", two_returns, "its last line, and no other, must be a return"),
@@ -195,7 +320,7 @@ WRONG = [
     ("evaporation", too_large, "but must return the level of a cell after the tick"),
     ("evaporation", negative, "a number from 0 to 1000000000"),
     ("evaporation", unknown_input, "has the argument 'levl', which is not an input"),
-    ("evaporation", calls, "calls another function than exp, log, power, min, max, abs"),
+    ("evaporation", calls, "calls another function than exp, log, power, pick, min, max, abs"),
     ("evaporation", imports, "`import math`, is not allowed"),
     ("evaporation", writes, "assign to one name at a time"),
     ("evaporation", text, "`'level'`, is not a number"),
@@ -210,6 +335,14 @@ WRONG = [
     ("choice", far_entry, "IndexError: there is no entry 3"),
     ("evaporation", square, r"`level ** 2`, is not allowed; write power(x, y), of"),
     ("choice", half, "an action, a whole number from 0 to 4"),
+    ("deposit", picks_a_number, "`level`, is not a vector, for example `[0.2 * k for"),
+    ("deposit", filtered, "if k]`, is not a vector"),
+    ("deposit", lengthens, "`weights = [level, 1, 2]`, must have 2 entries, as before"),
+    ("choice", changes, "`weights[1]`, is not allowed; assign to one name at a time"),
+    ("choice", replaces_an_input, "`levels`, cannot be assigned; choose another name"),
+    ("choice", any_entry, "must have a literal number or the name of a loop as index"),
+    ("choice", long_list, "repeats 257 times; at most 256 are allowed"),
+    ("choice", nothing_open, "it returns -1 for is_open=(0.0, 0.0, 0.0), random="),
     ("evaporation", tuples, "assign to one name at a time"),
     ("deposit", starred, "use plain arguments"),
     ("deposit", bad_default, "declare a whole number (int) or a number (float)"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from taichi_ants import rules
-from taichi_ants.rules import exp, log, power
+from taichi_ants.rules import exp, log, pick, power
 from taichi_ants.settings import Is
 from taichi_ants.task.events import Event
 
@@ -72,24 +72,13 @@ def weber(
     exponent: Annotated[float, Is("exponent of the attraction", least=0, most=5)] = 1.5,
 ):
     """Return an action without action values."""
-    total = 0
-    best = 0
-    for i in range(3):
-        if is_open[i] and (nearer[i] or not carries):
-            total += power(k + abs(levels[i] - level / 2), exponent)
+    weights = [power(k + abs(levels[i] - level / 2), exponent) for i in range(3)]
+    weights = [weights[i] if is_open[i] and (nearer[i] or not carries) else 0 for i in range(3)]
+    best = pick(weights, random)
     if codes[0] == 3 or codes[1] == 3 or codes[2] == 3:
         best = 4 if carries else 3
-    elif total == 0:
-        best = 0 if random < 0.5 else 2
-    else:
-        drawn = random * total
-        total = 0
-        for i in range(3):
-            if is_open[i] and (nearer[i] or not carries):
-                total += power(k + abs(levels[i] - level / 2), exponent)
-                if total <= drawn:
-                    best = i + 1
-        best = min(best, 2)
+    elif best < 0:
+        best = 2 * pick([1, 1], random)
     return best
 
 

@@ -405,12 +405,13 @@ def cell_ahead(
     is_true = code == vision.code_in_view(percept, i)
     opens = ti.cast(is_open(code), ti.i32)
     nears = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(cues.has_compass))
-    if ti.static(v.traffic.shared):
-        place = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
-        if is_true & holds_nestmate(c, v, ant, place):
-            nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
-            opens = 1 if ti.static(v.traffic.follow) else carries
-            nears = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(cues.has_compass))
+    place = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
+    if is_true & (c.ground[place] >> 4 != 0):  # an ant stands there
+        nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
+        nears = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(cues.has_compass))
+        if ti.static(v.traffic.shared):
+            if holds_nestmate(c, v, ant, place):
+                opens = 1 if ti.static(v.traffic.follow) else carries
     return code, ti.cast(is_true, ti.i32), opens, nears
 
 

@@ -13,7 +13,7 @@ import taichi as ti
 
 from taichi_ants.engines.colony.layout import array_of
 from taichi_ants.engines.colony.own_rules import OwnRule
-from taichi_ants.task.constants import EMPTY, PICK_UP
+from taichi_ants.task.constants import EMPTY, OBSTACLE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import Occasion
 from taichi_ants.task.rules import pheromone, vision
@@ -166,8 +166,9 @@ def evaporate(c: ti.template(), v: ti.template(), place, tick):
     """Evaporate the dense pheromones of a cell for one tick."""
     for field in ti.static(v.dense_fields(c)):
         if ti.static(field.has_own_evaporation):
-            left = field.own_evaporation(level=field.levels[place], tick=tick)
-            field.levels[place] = ti.cast(left, ti.f32)
+            if c.ground[place] != OBSTACLE:  # rocks and the outside hold no trail
+                left = field.own_evaporation(level=field.levels[place], tick=tick)
+                field.levels[place] = ti.cast(left, ti.f32)
         else:
             field.levels[place] = pheromone.evaporated(field.levels[place], field.decay)
 
