@@ -32,7 +32,7 @@ def test_the_ten_lines_print_their_number(capsys):
     exec(compile(code, "README.md", "exec"), {})
     assert capsys.readouterr().out == f"{promised}\n"
     exec(compile(code.replace("queueing", "paper"), "README.md", "exec"), {})
-    assert f"The same ants deliver {capsys.readouterr().out.strip()}." in WORDS
+    assert f"in the same world, {capsys.readouterr().out.strip()}." in WORDS
     exec(compile(other, "README.md", "exec"), {})
 
 
@@ -66,7 +66,7 @@ def test_the_third_finding_is_the_table_of_the_guide():
     learned, fixed = zip(*by_rules.values(), strict=True)
     assert f"deliver {learned[0]} food items in 1000 ticks" in WORDS
     assert f"they deliver {learned[1]}, and with rules for queues {learned[2]}" in WORDS
-    assert f"under the same rules: {fixed[0]}, {fixed[1]} and {fixed[2]}" in WORDS
+    assert f"by hand gain as much: {fixed[0]}, {fixed[1]} and {fixed[2]}" in WORDS
     pairs = [f"{one} and {other}" for one, other in by_rules.values()]
     assert f"paper's rules {pairs[0]}, three rules {pairs[1]}, queues {pairs[2]}" in WORDS
 
@@ -83,13 +83,13 @@ def test_the_first_two_findings_and_the_printed_table(tmp_path, capsys):
     walk, circle = behaviours[WALKS], behaviours[CIRCLES]
     assert behaviours[DELIVERS] == 0
     assert walk + circle == 100
-    assert f"None of the 100 final policies delivers: {walk} walk to and fro" in WORDS
+    assert f"None of the 100 final policies delivers: {walk} walk back and forth" in WORDS
     assert f"and {circle} circle with the food" in WORDS
     assert f"{walk} walk the trail, {circle} circle at the queen, and none delivers" in WORDS
     assert Counter(findings.policies(folder, "truncates").tolist()) == {DELIVERS: 100}
     with np.load(folder / "runs.npz") as runs:
         best = runs["policy_returns"][runs["behaviours"] == WALKS].max()
-    assert f"up to {best} in 600 steps" in WORDS
+    assert f"earn {best} in 600 steps" in WORDS
 
     q, sarsa, dyna_3, dyna_5 = 100 * findings.winners(folder)
     wins = f"Q-learning in {q:.0f} % of the repetitions, Dyna-Q in {dyna_3 + dyna_5:.0f} %"

@@ -146,8 +146,8 @@ def headlines(audit: Audit) -> Table:
     """Return a table of the findings on the main claims, a column for each delivery setting."""
     claims = {claim.id: claim for claim in audit}
     rows = [
-        [claims[name].statement, *(_cell(one) for one in audit[claims[name]].values())]
-        for name in HEADLINES
+        [f"{claim.statement}\n({claim.quantity.words})", *map(_cell, audit[claim].values())]
+        for claim in (claims[name] for name in HEADLINES)
     ]
     note = (
         "Below the verdict: the difference that decides, its interquartile mean (IQM) over seeds "
