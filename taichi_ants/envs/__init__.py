@@ -17,5 +17,6 @@ register(
 )
 register(
     "taichi_ants/HexColony-v0",
+    entry_point="taichi_ants.envs.colony:single",
     vector_entry_point="taichi_ants.envs.colony:HexColonyVectorEnv",
 )

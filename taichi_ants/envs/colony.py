@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -287,3 +287,11 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
                 'begins in the step of its delivery; use "SameStep", or a task with delivery '
                 '"truncates".'
             )
+
+
+def single(**_: Any) -> NoReturn:
+    """Refuse `gymnasium.make`: AntsError, because a colony has several ants."""
+    raise AntsError(
+        "taichi_ants/HexColony-v0 has an environment for each ant of a colony; use "
+        "gymnasium.make_vec, for example with num_envs=64 and ants=64."
+    )

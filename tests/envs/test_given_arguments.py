@@ -167,3 +167,8 @@ def test_paths_where_paths_are_allowed(tmp_path: Path) -> None:
     first = env.rollout(path, 3, seed=1).actions
     env.reset(seed=0)
     assert np.array_equal(env.rollout(str(path), 3, seed=1).actions, first)
+
+
+def test_a_colony_is_no_single_environment() -> None:
+    with pytest.raises(AntsError, match=r"use gymnasium\.make_vec"):
+        gymnasium.make("taichi_ants/HexColony-v0")
