@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from command_lines import EXPERIMENTS
+from matplotlib.figure import Figure
 
 from taichi_ants import Colony, TrainingConfig, World, task, train
 from taichi_ants.baselines.ant_system import Search, search
@@ -94,14 +95,21 @@ def test_a_home_trail_that_nobody_follows_does_not_matter(script):
 
 
 def test_shares_of_two_nests_by_hand(script):
+    """Before the first delivery of a colony, its share is not known, and no mean is drawn."""
     found = script("models/two_nests", DISTANCES=((1, 2),), TICKS=40)
-    given = np.array([[[1, 1], [3, 1]], [[0, 0], [0, 5]]])  # (seeds, times, nests)
+    given = np.array(
+        [[[1, 1], [3, 1]], [[0, 0], [0, 5]], [[0, 0], [4, 4]]]
+    )  # (seeds, times, nests)
     found["deliveries_over_time"] = lambda seeds, near, far: given
-    results = found["measure"]([4, 7])
+    results = found["measure"]([4, 7, 8])
     columns = ("share of the first nest", "loads of both")
-    assert table(results.summary, *columns) == [(0.75, 4), (0.0, 5)]
+    assert table(results.summary, *columns) == [(0.75, 4), (0.0, 5), (0.5, 8)]
     rows = table(results.numbers, "seed", "tick", "first", "second")
-    assert rows == [(4, 20, 1, 1), (4, 40, 3, 1), (7, 20, 0, 0), (7, 40, 0, 5)]
+    assert rows[:4] == [(4, 20, 1, 1), (4, 40, 3, 1), (7, 20, 0, 0), (7, 40, 0, 5)]
+    axes = Figure().subplots()
+    results.draw(axes)
+    (x,), (y,) = axes.lines[0].get_data()
+    assert (x, y) == (40, 1.25 / 3)
 
 
 def test_the_order_of_two_nests_does_not_matter_and_their_distance_does(script):
