@@ -76,6 +76,7 @@ def test_home_trail_averages_the_last_five_episodes(script):
     assert len(rows) == 3 * 2 * 6
 
 
+@pytest.mark.slow
 def test_a_home_trail_that_nobody_follows_does_not_matter(script):
     found = script("models/home_trail")
     models = {
@@ -167,6 +168,7 @@ def test_deliveries_of_ants_that_misread_by_hand(script, ticks, delivered, expec
     assert found["deliveries"](found["FORAGING"], 0.1, 2, 1, ticks).tolist() == expected
 
 
+@pytest.mark.slow
 def test_a_rate_of_no_misread_cells_does_not_matter_and_a_rate_of_all_does(script):
     found = script("models/misreading")
     small = found["FORAGING"], 3, 6, 300  # rules; seeds, episodes, ticks
@@ -410,6 +412,7 @@ def test_the_study_of_fixed_rules_by_hand(script, tmp_path):
     }
 
 
+@pytest.mark.slow
 def test_learning_rates_do_not_matter_to_fixed_rules_and_exploration_does(script):
     found = script("fixed_rules", EPISODES=2, TICKS=200)
     training = found["TrainingConfig"]
@@ -496,6 +499,7 @@ def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, large
     assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
 
 
+@pytest.mark.slow
 def test_patience_of_one_is_q_learning_and_another_is_not(script, tmp_path):
     text = (EXPERIMENTS / "plugins" / "hysteretic.py").read_text("utf-8")
     patient = tmp_path / "patient.py"
