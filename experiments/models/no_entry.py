@@ -124,11 +124,15 @@ def task(mark: Field, half_life: float, fear: float = FEAR) -> Task:
 
 
 def deliveries_over_time(
-    seeds: list[int], model: str, half_life: float = HALF_LIVES[0], fear: float = FEAR
+    seeds: list[int],
+    model: str,
+    half_life: float = HALF_LIVES[0],
+    fear: float = FEAR,
+    ants: int = ANTS,
 ) -> np.ndarray:
     """Return the deliveries so far, every STEP ticks, (seeds, times)."""
     worlds, rules_of_all = [decision_tree()] * len(seeds), task(MARKS[model], half_life, fear)
-    colony = Colony(worlds, rules_of_all, None, seeds, ANTS, sharing="frozen")
+    colony = Colony(worlds, rules_of_all, None, seeds, ants, sharing="frozen")
     colony.begin_episode()
     if model == PLACED:
         Interventions(colony).lay_trail("wrong", AMOUNT, "no_entry")

@@ -42,14 +42,17 @@ def measure(seeds):
             for step, (first, second) in enumerate(of_seed, start=1):
                 row = {"near": near, "far": far, "seed": seed, "tick": step * STEP}
                 numbers.append({**row, "first": first, "second": second})
-            both = max(1, first + second)
-            row = {"distances": case, "share of the first nest": first / both}
-            summary.append({**row, "loads of both": both})
-        shares[case] = deliveries[..., 0] / np.maximum(1, deliveries.sum(axis=2))
+        both = deliveries.sum(axis=2)
+        with np.errstate(invalid="ignore"):  # before the first delivery, the share is not known
+            shares[case] = deliveries[..., 0] / both
+        for share, loads in zip(shares[case][:, -1], both[:, -1], strict=True):
+            row = {"distances": case, "share of the first nest": share}
+            summary.append({**row, "loads of both": loads})
 
     def draw(axes):
         for case, share in shares.items():
-            model_script.band(axes, np.arange(STEP, TICKS + 1, STEP), share, case)
+            known = np.isfinite(share).all(axis=0)  # in all colonies
+            model_script.band(axes, np.arange(STEP, TICKS + 1, STEP)[known], share[:, known], case)
         axes.axhline(0.5, color="0.6", linewidth=0.8)
         axes.set(xlabel="tick", ylabel="share of the first nest", ylim=(0, 1))
 

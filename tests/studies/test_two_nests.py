@@ -20,7 +20,8 @@ def test_two_nests_share_a_pile(tmp_path, capsys, monkeypatch):
     with open(tmp_path / "two_nests.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 3 * 3 * 25
-    last = [row for row in rows if row["tick"] == "2000"]
+    last = [row for row in rows if row["tick"] == "500"]
+    assert len(last) == 9
     assert all(0 < int(row["first"]) + int(row["second"]) <= 140 for row in last)
     assert (tmp_path / "two_nests.png").read_bytes().startswith(b"\x89PNG")
     assert capsys.readouterr().out.startswith("distances")
