@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import argparse
+import ast
 import importlib.util
 import os
 import re
+import site
 import sys
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager, suppress
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
@@ -272,6 +276,44 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     sys.exit(status)
 
 
+_beside: dict[str, ModuleSpec | None] = {}  # files that plugins import from their folders, by name
+_finder: Any = SimpleNamespace(find_spec=lambda name, *_: _beside.get(name))  # see `sys.meta_path`
+
+
+def read_plugin(path: str | None) -> dict[str, bytes]:
+    """Return the contents of a plugin and of the files beside it that it imports, by path.
+
+    The plugin is first; for None, there are no files.
+
+    Raises:
+        AntsError: A file cannot be read, or has the name of an installed module.
+    """
+    found, paths = dict[str, bytes](), [] if path is None else [path]
+    installed = [*site.getsitepackages(), site.getusersitepackages()]
+    for one in paths:
+        nodes, imported = list[ast.AST](), list[str]()
+        try:
+            found[one] = Path(one).read_bytes()
+        except (OSError, ValueError) as error:
+            raise AntsError(f"cannot read the plugin {one!r}; name a Python file (.py).") from error
+        with suppress(SyntaxError, ValueError):  # which are reported when the file runs
+            nodes += ast.walk(ast.parse(found[one]))
+        for node in nodes:
+            imported += [name.name for name in node.names] if isinstance(node, ast.Import) else []
+            imported += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        for name in imported:
+            place = Path(one).with_name(f"{name}.py")
+            if str(place) in paths or not place.is_file():
+                continue
+            if name in sys.stdlib_module_names or PathFinder.find_spec(name, installed):
+                raise AntsError(
+                    f"{one!r} imports {name!r}, which is an installed module and also the file "
+                    f"{str(place)!r}; rename the file."
+                )
+            paths.append(str(place))
+    return found
+
+
 def load_plugin(path: str | None) -> None:
     """Run a Python file that registers learners, observations or worlds; do nothing for None.
 
@@ -280,9 +322,16 @@ def load_plugin(path: str | None) -> None:
     """
     if path is None:
         return
+    _, *beside = read_plugin(path)
     spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
-    if spec is None or spec.loader is None or not Path(path).is_file():
+    if spec is None or spec.loader is None:
         raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")
+    for place in beside:
+        name = Path(place).stem
+        _beside[name] = importlib.util.spec_from_file_location(name, place)
+        sys.modules.pop(name, None)  # that of another plugin
+    if _finder not in sys.meta_path:
+        sys.meta_path.insert(0, _finder)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
     try:
@@ -291,7 +340,9 @@ def load_plugin(path: str | None) -> None:
         raise
     except (Exception, SystemExit) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".splitlines())
-        raise AntsError(f"the plugin {path!r} failed with {reason}; correct the file.") from error
+        lacks = isinstance(error, ModuleNotFoundError)
+        remedy = "install it or save it beside the plugin" if lacks else "correct the file"
+        raise AntsError(f"the plugin {path!r} failed with {reason}; {remedy}.") from error
 
 
 @contextmanager

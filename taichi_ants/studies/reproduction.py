@@ -112,9 +112,10 @@ this command with the name of this archive:
 
 
 def plugins_of(manifest: Mapping[str, Any]) -> list[str]:
-    """Return the names in a bundle of the plugins, which are code that its study runs."""
-    path = manifest["asked"]["options"].get("plugin")
-    return [RESULTS + manifest["inputs"][path]] if path else []
+    """Return the names in a bundle of the plugin and the files beside it, code that it can run."""
+    plugin = manifest["asked"]["options"].get("plugin")
+    code = {p: n for p, n in manifest["inputs"].items() if p == plugin or n.endswith(".py")}
+    return [RESULTS + name for name in code.values()] if plugin else []
 
 
 def manifest_of(bundle: bundles.Bundle) -> dict[str, Any]:
@@ -161,8 +162,9 @@ def unpacked(bundle: bundles.Bundle, manifest: Mapping[str, Any]) -> Iterator[di
     with ExitStack() as stack:
         place = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         copies = {
-            path: bundle.unpack(RESULTS + name, place / str(number) / Path(name).name)
+            path: bundle.unpack(RESULTS + name, place / folder / Path(name).name)
             for number, (path, name) in enumerate(manifest["inputs"].items())
+            for folder in ["code" if name.endswith(".py") else str(number)]
         }
         if options.get("plugin"):  # worker processes read it too
             options["plugin"] = str(copies.pop(options["plugin"]))
