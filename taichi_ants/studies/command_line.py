@@ -7,7 +7,6 @@ import ast
 import importlib.util
 import os
 import re
-import site
 import sys
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager, suppress
@@ -289,7 +288,7 @@ def read_plugin(path: str | None) -> dict[str, bytes]:
         AntsError: A file cannot be read, or has the name of an installed module.
     """
     found, paths = dict[str, bytes](), [] if path is None else [path]
-    installed = [*site.getsitepackages(), site.getusersitepackages()]
+    installed = [one for one in sys.path if one.endswith(("site-packages", "dist-packages"))]
     for one in paths:
         nodes, imported = list[ast.AST](), list[str]()
         try:
@@ -341,7 +340,7 @@ def load_plugin(path: str | None) -> None:
     except (Exception, SystemExit) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".splitlines())
         lacks = isinstance(error, ModuleNotFoundError)
-        remedy = "install it or save it beside the plugin" if lacks else "correct the file"
+        remedy = "install it, or save its file beside the plugin" if lacks else "correct the file"
         raise AntsError(f"the plugin {path!r} failed with {reason}; {remedy}.") from error
 
 
