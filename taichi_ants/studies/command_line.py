@@ -280,35 +280,28 @@ _finder: Any = SimpleNamespace(find_spec=lambda name, *_: _beside.get(name))  # 
 
 
 def read_plugin(path: str | None) -> dict[str, bytes]:
-    """Return the contents of a plugin and of the files beside it that it imports, by path.
-
-    The plugin is first; for None, there are no files.
+    """Return the contents of a plugin, if any, and then of files beside it, which it imports.
 
     Raises:
         AntsError: A file cannot be read, or has the name of an installed module.
+        SyntaxError: A file is not Python.
     """
     found, paths = dict[str, bytes](), [] if path is None else [path]
     installed = [one for one in sys.path if one.endswith(("site-packages", "dist-packages"))]
     for one in paths:
-        nodes, imported = list[ast.AST](), list[str]()
         try:
             found[one] = Path(one).read_bytes()
         except (OSError, ValueError) as error:
             raise AntsError(f"cannot read the plugin {one!r}; name a Python file (.py).") from error
-        with suppress(SyntaxError, ValueError):  # which are reported when the file runs
-            nodes += ast.walk(ast.parse(found[one]))
-        for node in nodes:
-            imported += [name.name for name in node.names] if isinstance(node, ast.Import) else []
-            imported += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+        nodes = [*ast.walk(ast.parse(found[one], one))]
+        imported = [name.name for n in nodes if isinstance(n, ast.Import) for name in n.names]
+        imported += [n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)]
         for name in imported:
             place = Path(one).with_name(f"{name}.py")
             if str(place) in paths or not place.is_file():
                 continue
             if name in sys.stdlib_module_names or PathFinder.find_spec(name, installed):
-                raise AntsError(
-                    f"{one!r} imports {name!r}, which is an installed module and also the file "
-                    f"{str(place)!r}; rename the file."
-                )
+                raise AntsError(f"{str(place)!r} has the name of an installed module; rename it.")
             paths.append(str(place))
     return found
 
@@ -321,19 +314,17 @@ def load_plugin(path: str | None) -> None:
     """
     if path is None:
         return
-    _, *beside = read_plugin(path)
     spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
     if spec is None or spec.loader is None:
         raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")
-    for place in beside:
-        name = Path(place).stem
-        _beside[name] = importlib.util.spec_from_file_location(name, place)
-        sys.modules.pop(name, None)  # that of another plugin
     if _finder not in sys.meta_path:
         sys.meta_path.insert(0, _finder)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
     try:
+        for name, place in [(Path(one).stem, one) for one in read_plugin(path)][1:]:
+            _beside[name] = importlib.util.spec_from_file_location(name, place)
+            sys.modules.pop(name, None)  # that of another plugin
         spec.loader.exec_module(module)
     except AntsError:
         raise

@@ -262,8 +262,8 @@ def test_a_plugin_imports_files_beside_it(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("import random", "'random', which is an installed module and also the file "),
-        ("from numpy import pi", "'numpy', which is an installed module and also the file "),
+        ("import random", r"random\.py' has the name of an installed module; rename it"),
+        ("from numpy import pi", r"numpy\.py' has the name of an installed module; rename it"),
         ("import not_there", "'not_there'; install it, or save its file beside the plugin."),
         ("import inner", "'inner'; install it, or save its file beside the plugin."),
         ("import broken", "SyntaxError: .*broken.py"),
