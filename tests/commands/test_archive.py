@@ -356,6 +356,23 @@ pheromone.half_life = 20
 """
 
 
+def test_a_changed_file_beside_the_plugin_changes_the_study(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("my_plugin.py").write_text(PLUGIN)
+    Path("ants_halved.py").write_text(BESIDE)
+    sweep = SWEEP.replace("MAP", "paper").replace('"old/rule.npz", ', "").partition("[[at]]")[0]
+    Path("my.toml").write_text(sweep)
+    given = ["my.toml", "--plugin", "my_plugin.py", "--out", "a", "--no-figures"]
+    assert call("sweep", given, capsys)[0] == 0
+    assert "already has these results" in call("sweep", given, capsys)[1]
+    assert "half\n" in Path("a/runs.csv").read_text()
+    assert Path("a/runs.csv").read_text().endswith(",1.5\n")
+    Path("ants_halved.py").write_text(BESIDE.replace("/ 2", "* 100"))
+    assert "(not the same plugin)" in refused("sweep", given, capsys)
+    assert call("sweep", [*given, "--force", "--workers", 1], capsys)[0] == 0
+    assert Path("a/runs.csv").read_text().endswith(",300.0\n")
+
+
 def test_a_search_is_archived_and_reproduced(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("my.toml").write_text(SEARCH)
