@@ -275,12 +275,12 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     sys.exit(status)
 
 
-_beside: dict[str, ModuleSpec | None] = {}  # files that plugins import from their folders, by name
-_finder: Any = SimpleNamespace(find_spec=lambda name, *_: _beside.get(name))  # see `sys.meta_path`
+_imports: dict[str, ModuleSpec | None] = {}  # files that plugins import from their folders
+_finder: Any = SimpleNamespace(find_spec=lambda name, *_: _imports.get(name))  # see `sys.meta_path`
 
 
 def read_plugin(path: str | None) -> dict[str, bytes]:
-    """Return the contents of a plugin, if any, and then of files beside it, which it imports.
+    """Return the contents of a plugin, if any, and then of the files in its folder that it imports.
 
     Raises:
         AntsError: A file cannot be read, or has the name of an installed module.
@@ -323,7 +323,7 @@ def load_plugin(path: str | None) -> None:
     sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
     try:
         for name, place in [(Path(one).stem, one) for one in read_plugin(path)][1:]:
-            _beside[name] = importlib.util.spec_from_file_location(name, place)
+            _imports[name] = importlib.util.spec_from_file_location(name, place)
             sys.modules.pop(name, None)  # that of another plugin
         spec.loader.exec_module(module)
     except AntsError:
@@ -331,7 +331,7 @@ def load_plugin(path: str | None) -> None:
     except (Exception, SystemExit) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".splitlines())
         lacks = isinstance(error, ModuleNotFoundError)
-        remedy = "install it, or save its file beside the plugin" if lacks else "correct the file"
+        remedy = "install it, or save it in the plugin's folder" if lacks else "correct the file"
         raise AntsError(f"the plugin {path!r} failed with {reason}; {remedy}.") from error
 
 

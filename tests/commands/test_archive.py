@@ -356,7 +356,7 @@ pheromone.half_life = 20
 """
 
 
-def test_a_changed_file_beside_the_plugin_changes_the_study(tmp_path, capsys, monkeypatch):
+def test_a_changed_import_of_the_plugin_changes_the_study(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("my_plugin.py").write_text(PLUGIN)
     Path("ants_halved.py").write_text(BESIDE)

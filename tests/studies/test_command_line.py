@@ -238,7 +238,7 @@ def test_plugins_that_fail(text, says, tmp_path):
     assert says in str(caught.value)
 
 
-def test_a_plugin_imports_files_beside_it(tmp_path, monkeypatch):
+def test_a_plugin_imports_files_of_its_folder(tmp_path, monkeypatch):
     (tmp_path / "own.py").write_text("def late():\n    import third_file\n\nimport second_file\n")
     (tmp_path / "second_file.py").write_text("import third_file\nVALUE = third_file.VALUE\n")
     (tmp_path / "third_file.py").write_text("VALUE = 1\n")
@@ -264,8 +264,8 @@ def test_a_plugin_imports_files_beside_it(tmp_path, monkeypatch):
     [
         ("import random", r"random\.py' has the name of an installed module; rename it"),
         ("from numpy import pi", r"numpy\.py' has the name of an installed module; rename it"),
-        ("import not_there", "'not_there'; install it, or save its file beside the plugin."),
-        ("import inner", "'inner'; install it, or save its file beside the plugin."),
+        ("import not_there", "'not_there'; install it, or save it in the plugin's folder."),
+        ("import inner", "'inner'; install it, or save it in the plugin's folder."),
         ("import broken", "SyntaxError: .*broken.py"),
     ],
 )
