@@ -33,6 +33,8 @@ WORLDS = (
     "setting of the world"
 )
 AGAIN = "Stopped; finished parts are saved. Run the same command again to resume."
+_imports: dict[str, ModuleSpec | None] = {}  # files that plugins import from their folders
+_finder: Any = SimpleNamespace(find_spec=lambda name, *_: _imports.get(name))  # see `sys.meta_path`
 
 
 class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
@@ -275,10 +277,6 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
     sys.exit(status)
 
 
-_imports: dict[str, ModuleSpec | None] = {}  # files that plugins import from their folders
-_finder: Any = SimpleNamespace(find_spec=lambda name, *_: _imports.get(name))  # see `sys.meta_path`
-
-
 def read_plugin(path: str | None) -> dict[str, bytes]:
     """Return the contents of a plugin, if any, and then of the files in its folder that it imports.
 
@@ -298,11 +296,10 @@ def read_plugin(path: str | None) -> dict[str, bytes]:
         imported += [n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)]
         for name in imported:
             place = Path(one).with_name(f"{name}.py")
-            if str(place) in paths or not place.is_file():
-                continue
-            if name in sys.stdlib_module_names or PathFinder.find_spec(name, installed):
-                raise AntsError(f"{str(place)!r} has the name of an installed module; rename it.")
-            paths.append(str(place))
+            if str(place) not in paths and place.is_file():
+                if name in sys.stdlib_module_names or PathFinder.find_spec(name, installed):
+                    raise AntsError(f"{str(place)!r} has an installed module's name; rename it.")
+                paths.append(str(place))
     return found
 
 

@@ -113,9 +113,8 @@ this command with the name of this archive:
 
 def plugins_of(manifest: Mapping[str, Any]) -> list[str]:
     """Return the names in a bundle of the plugin and its imports, which its study runs."""
-    plugin = manifest["asked"]["options"].get("plugin")
-    code = {p: n for p, n in manifest["inputs"].items() if p == plugin or n.endswith(".py")}
-    return [RESULTS + name for name in code.values()] if plugin else []
+    plugin, given = manifest["asked"]["options"].get("plugin"), manifest["inputs"].items()
+    return [RESULTS + n for p, n in given if plugin and (p == plugin or n.endswith(".py"))]
 
 
 def manifest_of(bundle: bundles.Bundle) -> dict[str, Any]:

@@ -262,8 +262,8 @@ def test_a_plugin_imports_files_of_its_folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("import random", r"random\.py' has the name of an installed module; rename it"),
-        ("from numpy import pi", r"numpy\.py' has the name of an installed module; rename it"),
+        ("import random", r"random\.py' has an installed module's name; rename it"),
+        ("from numpy import pi", r"numpy\.py' has an installed module's name; rename it"),
         ("import not_there", "'not_there'; install it, or save it in the plugin's folder."),
         ("import inner", "'inner'; install it, or save it in the plugin's folder."),
         ("import broken", "SyntaxError: .*broken.py"),
