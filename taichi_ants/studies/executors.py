@@ -23,18 +23,18 @@ from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from taichi_ants import __version__, files
+from taichi_ants import __version__
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.studies.command_line import load_plugin
+from taichi_ants.studies.command_line import read_plugin as read_plugin
 from taichi_ants.studies.compilation import compile_once
 from taichi_ants.studies.interruption import stop_if_noted
 
@@ -42,7 +42,7 @@ TRIES = 3  # of a block, before it counts as failed
 RESUME = "finished parts are saved, so run the same command again to resume"  # ends messages
 _LOOK_EVERY = 0.5  # seconds between looks for Ctrl-C
 
-Plugin = tuple[str, str]  # the name and the text of a plugin file, which travel to the workers
+Plugin = Mapping[str, bytes]  # the files of a plugin, which travel to the workers
 Piece = TypeVar("Piece", bound=Hashable)
 # (points, seeds, outcome) -> what is kept of the outcome; arrays (points, seeds, ...)
 Reduce = Callable[[Sequence[Any], Sequence[int], Outcome], Outcome]
@@ -86,11 +86,6 @@ class Work:
         return self.reduce(self.points, self.seeds, outcome) if self.reduce else outcome
 
 
-def read_plugin(path: str | Path) -> Plugin:
-    """Return the plugin in a file; AntsError if it cannot be read."""
-    return Path(path).name, files.read_text(path)
-
-
 def versions() -> tuple[str, str]:
     """Return the versions of this package and of Python, which all workers must have."""
     return __version__, ".".join(platform.python_version_tuple()[:2])
@@ -113,8 +108,8 @@ def do(of_study: tuple[str, str], plugins: Sequence[Plugin], pickled: bytes) -> 
     """
     check_versions(of_study, versions(), "a worker")
     with _ONE_AT_A_TIME:
-        for name, text in plugins:
-            _load(name, text)
+        for plugin in plugins:
+            _load(plugin)
         work: Work = pickle.loads(pickled)  # after the plugins, which can define its classes
         compile_once(work, *plugins)
         return work.do()
@@ -122,23 +117,21 @@ def do(of_study: tuple[str, str], plugins: Sequence[Plugin], pickled: bytes) -> 
 
 # Taichi serves one thread of a process; workers of an executor can be threads.
 _ONE_AT_A_TIME = threading.Lock()
-_loaded: dict[str, str] = {}  # texts of plugins by name
+_loaded: dict[str, list[bytes]] = {}  # contents of plugins by name
+_folders: list[tempfile.TemporaryDirectory[str]] = []  # of loaded plugins, until this process ends
 
 
-def _load(name: str, text: str) -> None:
-    """Load the text of a plugin, unless this process has loaded it; AntsError if that failed."""
-    if _loaded.setdefault(name, text) != text:
+def _load(plugin: Plugin) -> None:
+    """Load the files of a plugin, unless this process has loaded it; AntsError if that failed."""
+    name, contents = Path(next(iter(plugin))).name, [*plugin.values()]
+    if _loaded.setdefault(name, contents) != contents:
         raise AntsError(f"a worker has loaded another plugin {name!r}; start new workers.")
     if f"plugin_{Path(name).stem}" in sys.modules:
         return
-    path = Path(_folder_of_plugins().name, name)
-    path.write_text(text, "utf-8")  # because Taichi reads the source of functions
-    load_plugin(str(path))
-
-
-@cache
-def _folder_of_plugins() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory()  # until this process ends
+    _folders.append(tempfile.TemporaryDirectory())
+    for one, content in plugin.items():  # in files, because Taichi reads the source of functions
+        Path(_folders[-1].name, Path(one).name).write_bytes(content)
+    load_plugin(str(Path(_folders[-1].name, name)))
 
 
 def completed(

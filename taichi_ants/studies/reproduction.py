@@ -112,9 +112,9 @@ this command with the name of this archive:
 
 
 def plugins_of(manifest: Mapping[str, Any]) -> list[str]:
-    """Return the names in a bundle of the plugins, which are code that its study runs."""
-    path = manifest["asked"]["options"].get("plugin")
-    return [RESULTS + manifest["inputs"][path]] if path else []
+    """Return the names in a bundle of the plugin and its imports, which its study runs."""
+    plugin, given = manifest["asked"]["options"].get("plugin"), manifest["inputs"].items()
+    return [RESULTS + n for p, n in given if plugin and (p == plugin or n.endswith(".py"))]
 
 
 def manifest_of(bundle: bundles.Bundle) -> dict[str, Any]:
@@ -161,8 +161,9 @@ def unpacked(bundle: bundles.Bundle, manifest: Mapping[str, Any]) -> Iterator[di
     with ExitStack() as stack:
         place = Path(stack.enter_context(tempfile.TemporaryDirectory()))
         copies = {
-            path: bundle.unpack(RESULTS + name, place / str(number) / Path(name).name)
+            path: bundle.unpack(RESULTS + name, place / folder / Path(name).name)
             for number, (path, name) in enumerate(manifest["inputs"].items())
+            for folder in ["code" if name.endswith(".py") else str(number)]
         }
         if options.get("plugin"):  # worker processes read it too
             options["plugin"] = str(copies.pop(options["plugin"]))

@@ -28,6 +28,7 @@ from taichi_ants.files.results import (
     seeds_by_point,
 )
 from taichi_ants.studies.blocks import Blocks
+from taichi_ants.studies.command_line import read_plugin
 from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.runner import FailedBlocksError, Study
 
@@ -68,8 +69,10 @@ def work_or_show(
         as_parquet: A function that writes Parquet files from the tables in a folder of results to
             another folder, for the command's option `parquet`.
     """
-    given = {**(inputs or {}), **_given(settings)}
-    plugin = hashlib.sha256(given[settings.plugin]).hexdigest() if settings.plugin else None
+    code, text = read_plugin(settings.plugin), getattr(settings, "text", None)
+    sweep = {} if text is None else {str(settings.file): text.encode()}
+    given = {**(inputs or {}), **sweep, **code}
+    plugin = hashlib.sha256(b"\0".join(code.values())).hexdigest() if code else None
     facts = {**determines, "arch": settings.arch, "plugin": plugin}
     shard = getattr(settings, "shard", None)
     runs = study.runs(shard or (1, 1)) if study else None
@@ -134,17 +137,6 @@ def _again(settings: Namespace) -> dict[str, Any]:
     asked = _asked(settings)
     options = {n: value for n, value in asked["options"].items() if n not in _OF_THE_RUN}
     return {**asked, "options": options}
-
-
-def _given(settings: Namespace) -> dict[str, bytes]:
-    """Return the contents of the plugin and of the sweep file, by path."""
-    found = {}
-    if getattr(settings, "text", None) is not None:
-        found[str(settings.file)] = settings.text.encode()
-    if settings.plugin:
-        with files.opened(settings.plugin) as file:
-            found[settings.plugin] = file.read()
-    return found
 
 
 def _copied(inputs: Mapping[str, bytes], folder: Path) -> dict[str, str]:

@@ -25,7 +25,7 @@ class Choice(Settings, path="task.choice"):
     - "deneubourg" needs no action values. The ant gives at the queen, picks up food in view, and
       otherwise enters an open cell ahead with a probability proportional to (k + level)^exponent,
       after Deneubourg et al. (1990). See `docs/colony.md`. Only colonies support it. Levels are
-      those of the outbound cue or, for ants with food, of the pheromone `carriers_follow`.
+      those of the outbound cue; for ants with food, of `carriers_follow` or a homing pheromone.
     - Other names are those of your rules, see `taichi_ants.rules`. Only colonies support them.
 
     With "greedy" and "softmax", ants also explore: with probability epsilon, any action is taken.
@@ -51,7 +51,7 @@ class Choice(Settings, path="task.choice"):
     ] = None
     carriers_follow: Annotated[
         str | None,
-        Is("pheromone whose levels ants with food compare; none: the outbound cue"),
+        Is("pheromone whose levels ants with food and a compass compare; none: the outbound cue"),
         Is(only=("rule", "deneubourg")),
     ] = None
 

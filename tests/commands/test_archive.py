@@ -16,19 +16,18 @@ from taichi_ants.files import bundles
 from taichi_ants.files.results import ResultFolder, checksum_of, read_manifest
 from taichi_ants.studies import reproduction
 
-PLUGIN = '''
+PLUGIN = """
 from pathlib import Path
+from ants_halved import half
 from taichi_ants import measures
 
 Path("ran").touch()
-
-
+measures.register("half", half, "ants", "half of the ants")
+"""
+BESIDE = '''
 def half(snapshot):
     """Return half the number of ants."""
     return len(snapshot.ant_cells) / 2
-
-
-measures.register("half", half, "ants", "half of the ants")
 '''
 SWEEP = """
 kind = "colony"
@@ -61,6 +60,7 @@ def study(tmp_path_factory):
         shutil.copy(ROOT / "experiments/policies/foraging.npz", "old/rule.npz")
         shutil.copy(ROOT / "experiments/maps/garden.txt", "old/garden.txt")
         Path("old/my_plugin.py").write_text(PLUGIN)
+        Path("old/ants_halved.py").write_text(BESIDE)
         Path("my.toml").write_text(SWEEP.replace("MAP", str(place / "old/garden.txt")))
         for name, arguments in {
             "sweep": ["my.toml", "--plugin", "old/my_plugin.py", "--out", "done", "--no-figures"],
@@ -95,7 +95,7 @@ def test_an_archive_has_all_that_repeats_the_study(here):
         for name in own:
             assert bundle.read(name) == (here / "done" / name.removeprefix("results/")).read_bytes()
         lock = bundle.read("requirements.txt").decode()
-    inputs = ("my.toml", "my_plugin.py", "rule.npz", "garden.txt")
+    inputs = ("my.toml", "my_plugin.py", "ants_halved.py", "rule.npz", "garden.txt")
     assert {f"results/inputs/{name}" for name in inputs} <= own
     manifest = json.loads((here / "done/manifest.json").read_text())
     assert {"taichi", "numpy", "kiwisolver", "taichi_ants"} <= manifest["packages"].keys()
@@ -115,7 +115,8 @@ def test_equal_results_give_equal_archives(here, capsys):
 
 def test_an_archive_repeats_itself_without_the_files_that_the_study_read(here, capsys):
     err = refused("reproduce", [here / "done.zip"], capsys)
-    assert "'results/inputs/my_plugin.py' (13 lines, SHA-256 " in err
+    assert "'results/inputs/my_plugin.py' (7 lines, SHA-256 " in err
+    assert "'results/inputs/ants_halved.py' (4 lines, SHA-256 " in err
     assert "give --trust-plugins to run it" in err
     assert not list(Path().iterdir())
     status, out, err = call("reproduce", [here / "done.zip", "--trust-plugins"], capsys)
@@ -154,7 +155,7 @@ def test_a_difference_is_named_with_its_place(copy, capsys, monkeypatch):
     assert status == 1
     assert f"DIFFERENT  runs.csv (first difference at byte {at}, line 2)" in out
     assert "DIFFERENT  more.txt (is only in the archive)" in out
-    assert "2 of 9 files differ: the study is not reproduced.\n" in out
+    assert "2 of 10 files differ: the study is not reproduced.\n" in out
     versions = f"numpy 0 instead of {known['numpy']}, scipy None instead of {known['scipy']}"
     assert f"These versions differ from those of the archive: {versions}.\n" in err
 
@@ -286,7 +287,7 @@ def test_an_archive_without_a_new_option_uses_its_default(copy, capsys):
     status, out, _ = call("reproduce", ["copy.zip", "--trust-plugins"], capsys)
     assert status == 1
     assert "DIFFERENT  figures/deliveries.png (is not in the archive)\n" in out
-    assert "1 of 9 files differ" in out
+    assert "1 of 10 files differ" in out
 
 
 @pytest.mark.parametrize(
@@ -353,6 +354,23 @@ vary.task.pheromone.view = ["half", "strongest"]
 pheromone.evaporation = "exponential"
 pheromone.half_life = 20
 """
+
+
+def test_a_changed_import_of_the_plugin_changes_the_study(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("my_plugin.py").write_text(PLUGIN)
+    Path("ants_halved.py").write_text(BESIDE)
+    sweep = SWEEP.replace("MAP", "paper").replace('"old/rule.npz", ', "").partition("[[at]]")[0]
+    Path("my.toml").write_text(sweep)
+    given = ["my.toml", "--plugin", "my_plugin.py", "--out", "a", "--no-figures"]
+    assert call("sweep", given, capsys)[0] == 0
+    assert "already has these results" in call("sweep", given, capsys)[1]
+    assert "half\n" in Path("a/runs.csv").read_text()
+    assert Path("a/runs.csv").read_text().endswith(",1.5\n")
+    Path("ants_halved.py").write_text(BESIDE.replace("/ 2", "* 100"))
+    assert "(not the same plugin)" in refused("sweep", given, capsys)
+    assert call("sweep", [*given, "--force", "--workers", 1], capsys)[0] == 0
+    assert Path("a/runs.csv").read_text().endswith(",300.0\n")
 
 
 def test_a_search_is_archived_and_reproduced(tmp_path, capsys, monkeypatch):

@@ -145,6 +145,47 @@ def test_a_cell_with_an_ant_is_as_near_as_without_it(traffic, clean):
     assert occupied > 30
 
 
+def straight(is_open, codes, carries, random):
+    action = 1 if is_open[1] else 2 * pick([1, 1], random)
+    for k in range(3):
+        if codes[k] == 3:
+            action = 3 + carries
+    return action
+
+
+@pytest.mark.parametrize("cue", ["compass", "trail"])
+@pytest.mark.parametrize("traffic", ["blocking", "right_of_way", "following"])
+def test_a_cell_with_an_ant_is_open_by_traffic_with_and_without_a_compass(traffic, cue, clean):
+    rules.register("choice")(straight)
+    world = worlds.open_world(1, ranges=(7, 7, 7))
+    task = Task(choice="straight", traffic=traffic, homing_cue=cue).but(life={"regrowth": 0})
+    colony, seen = Colony(world, task, None, 0, 50, sharing="frozen"), {False: 0, True: 0}
+    colony.begin_episode()
+    for _ in range(60):
+        cells, carries = colony.cells[0].copy(), colony.carrying[0].copy()
+        ahead = cells + colony.grid.offsets[colony.headings[0]]
+        colony.tick()
+        for ant in np.flatnonzero(np.isin(ahead, cells) & (colony.actions[0] < 3)):
+            seen[bool(carries[ant])] += 1
+            enters = traffic == "following" or (traffic == "right_of_way" and carries[ant])
+            assert (colony.actions[0, ant] == 1) == enters
+    assert min(seen.values()) > 5
+
+
+def test_nothing_is_nearer_without_a_compass(clean):
+    rules.register("choice")(homeward)
+    world = worlds.open_world(1, ranges=(7, 7, 7))
+    task = Task(choice="homeward", homing_cue="trail").but(life={"regrowth": 0})
+    colony, moves = Colony(world, task, None, 0, 50, sharing="frozen"), 0
+    colony.begin_episode()
+    for _ in range(60):
+        carries = colony.carrying[0].copy()
+        colony.tick()
+        moves += np.count_nonzero(carries & (colony.actions[0] < 3))
+        assert not (carries & (colony.actions[0] == 1)).any()
+    assert moves > 30
+
+
 def no_return(level):
     level = level + 1
 

@@ -18,6 +18,7 @@ from taichi_ants.studies.command_line import (
     Parser,
     load_plugin,
     progress_bar,
+    read_plugin,
     run_command,
     whole_number,
 )
@@ -235,6 +236,47 @@ def test_plugins_that_fail(text, says, tmp_path):
     with pytest.raises(AntsError, match=r"own\.py") as caught:
         load_plugin(str(file))
     assert says in str(caught.value)
+
+
+def test_a_plugin_imports_files_of_its_folder(tmp_path, monkeypatch):
+    (tmp_path / "own.py").write_text("def late():\n    import third_file\n\nimport second_file\n")
+    (tmp_path / "second_file.py").write_text("import third_file\nVALUE = third_file.VALUE\n")
+    (tmp_path / "third_file.py").write_text("VALUE = 1\n")
+    (tmp_path / "fourth_file.py").write_text("")
+    files = [str(tmp_path / f"{one}.py") for one in ("own", "third_file", "second_file")]
+    assert sorted(read_plugin(files[0])) == sorted(files)
+    assert next(iter(read_plugin(files[0]))) == files[0]
+    assert read_plugin(files[0])[files[1]] == b"VALUE = 1\n"
+    assert read_plugin(None) == {}
+    load_plugin(files[0])
+    assert sys.modules["second_file"].VALUE == 1
+    other = tmp_path / "other"  # another plugin, whose file has the same name
+    other.mkdir()
+    (other / "own.py").write_text("import second_file\n")
+    (other / "second_file.py").write_text("VALUE = 22\n")
+    monkeypatch.chdir(other)
+    load_plugin("own.py")
+    assert sys.modules["second_file"].VALUE == 22
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("import random", r"random\.py' has an installed module's name; rename it"),
+        ("from numpy import pi", r"numpy\.py' has an installed module's name; rename it"),
+        ("import not_there", "'not_there'; install it, or save it in the plugin's folder."),
+        ("import inner", "'inner'; install it, or save it in the plugin's folder."),
+        ("import broken", "SyntaxError: .*broken.py"),
+    ],
+)
+def test_files_that_a_plugin_cannot_import(text, says, tmp_path):
+    for name in ("random", "numpy", "broken"):
+        (tmp_path / f"{name}.py").write_text("(")
+    (tmp_path / "inner").mkdir()
+    (tmp_path / "inner/__init__.py").write_text("")
+    (tmp_path / "own.py").write_text(text)
+    with pytest.raises(AntsError, match=says):
+        load_plugin(str(tmp_path / "own.py"))
 
 
 def test_what_a_plugin_says_itself_is_passed_on(tmp_path):

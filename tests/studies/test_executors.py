@@ -250,10 +250,10 @@ def test_workers_of_another_version_are_refused():
 
 def test_a_plugin_travels_as_text(tmp_path, monkeypatch):
     monkeypatch.setattr(executors, "_loaded", {})
-    text = "from pathlib import Path\nPath(__file__).with_name('ran').touch()\n"
-    plugin = ("plugin_that_travels.py", text)
+    text = b"import beside_it, pathlib\npathlib.Path(__file__).with_name('ran').touch()\n"
+    plugin = {"here/plugin_that_travels.py": text, "here/beside_it.py": b"VALUE = 1\n"}
     work = pickle.dumps(Work(RUNS.points[:1], (0,), None, None, {}))
     do(executors.versions(), (plugin,), work)
-    assert Path(executors._folder_of_plugins().name, "ran").exists()
+    assert Path(executors._folders[-1].name, "ran").exists()
     with pytest.raises(AntsError, match=r"another plugin 'plugin_that_travels\.py'"):
-        do(executors.versions(), ((plugin[0], text + "\n"),), work)
+        do(executors.versions(), ({**plugin, "here/beside_it.py": b"VALUE = 2\n"},), work)

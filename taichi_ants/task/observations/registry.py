@@ -55,7 +55,7 @@ class Observation:
     - `NAME` (k), for each NAME in `reads`: The level of this field, like `levels`; `own_NAME`: that
       of the ant's own cell.
 
-    Trails and levels are those of the outbound cue of the task. If the homing cue is a field, those
+    Trails and levels are those of the task's outbound cue. If the homing cue is a pheromone, those
     of ants with food are its levels, and `nearer` is 1 if the level exceeds `own_level`.
 
     Attributes:
@@ -63,7 +63,7 @@ class Observation:
         n_states: The number of states, at least 1.
         encode: A function of the view that returns the state index, from 0 to n_states - 1. It is
             compiled for the kernels. It computes with whole numbers: arithmetic, comparisons, `if`,
-            and `for` over a `range`, without imports and calls. Its only `return` is its last line.
+            `for` over a `range`, `min`, `max` and `abs`. Its only `return` is its last line.
         reads: The names of fields to read, or "trail"; the task must have these fields.
         cells: The cells in view, as headings relative to the ant's, each from -2 to 3. They must
             include -1, 0 and 1, the cells ahead.

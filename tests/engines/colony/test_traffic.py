@@ -50,11 +50,13 @@ def after_a_tick(
     foods: tuple[tuple[int, int, int], ...] = (),
     trails: tuple[tuple[tuple[int, int, int], int], ...] = (),
     rewards: Rewards = Rewards(empty=0, failed=-1, shaping=1),  # noqa: B008
+    homing_cue: str = "compass",
 ) -> list[After]:
     """The ants after one tick, which is the same in both simulators."""
     starts = [((one.x, 3, 0), one.heading) for one in row]
     world = World((12, 8, 1), queen, foods=foods, trails=trails, ants=starts)
-    task = Task(traffic=traffic, rewards=rewards, pheromone=Pheromone(deposit="none"))
+    pheromone = Pheromone(deposit="none")
+    task = Task(traffic=traffic, rewards=rewards, pheromone=pheromone, homing_cue=homing_cue)
     given = (world, task, TRAINING, 0, len(row))
     options = {"sharing": "frozen", "q_values": random_policy()}
     kernels = Colony(world, task, None, 0, len(row), sharing="frozen")
@@ -96,6 +98,15 @@ def test_an_ant_with_food_changes_places_with_one_without():
 def test_a_step_away_from_the_queen_pays_as_on_an_empty_cell():
     row = [Standing(3, food=True), Standing(4, GIVE)]
     assert after_a_tick(RIGHT_OF_WAY, row, BEHIND) == [After(4, 0), After(3, 0)]
+
+
+@pytest.mark.parametrize("queen", [BEYOND, BEHIND])
+@pytest.mark.parametrize(("stronger", "pay"), [(4, 1), (3, 0)])
+def test_without_a_compass_a_push_pays_by_the_homing_cue(queen, stronger, pay):
+    row = [Standing(3, food=True), Standing(4, GIVE)]
+    trails = (((stronger, 3, 0), 9), ((7 - stronger, 3, 0), 8))
+    found = after_a_tick(RIGHT_OF_WAY, row, queen, trails=trails, homing_cue="trail")
+    assert found == [After(4, pay), After(3, 0)]
 
 
 def test_a_pushed_ant_is_paid_as_for_an_empty_cell():
