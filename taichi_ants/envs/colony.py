@@ -106,8 +106,10 @@ class ColonyWorlds(Ants):
     def _count(self) -> None:
         """Count the deliveries of the last tick, if they are not counted yet."""
         ticks = self.colony.episode_ticks
+        if (ticks == self._counted).all():
+            return
         counted = self.deliveries + (self.colony.events == Event.DELIVERED)
-        counted = np.where(self.acted, counted, 0)  # a newborn ant starts at 0 in a free slot
+        counted *= self.acted  # a newborn ant starts at 0 in a slot that was free
         self.deliveries = np.where((ticks > self._counted)[:, None], counted, self.deliveries)
         self._counted = ticks.copy()
 

@@ -254,7 +254,8 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
 
     @property
     def _over(self) -> bool:
-        return not self._begun or bool(self._ants.over()[0])
+        arrays = self._arrays
+        return not self._begun or bool(arrays["terminations"][0] or arrays["truncations"][0])
 
     def _seen(self) -> tuple[Any, dict[str, Any]]:
         arrays = self._arrays
