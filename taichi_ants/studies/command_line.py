@@ -317,11 +317,11 @@ def load_plugin(path: str | None) -> None:
     if _finder not in sys.meta_path:
         sys.meta_path.insert(0, _finder)
     module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
     try:
         for name, place in [(Path(one).stem, one) for one in read_plugin(path)][1:]:
             _imports[name] = importlib.util.spec_from_file_location(name, place)
             sys.modules.pop(name, None)  # that of another plugin
+        sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
         spec.loader.exec_module(module)
     except AntsError:
         raise

@@ -31,11 +31,11 @@ def test_the_main_claims_come_first_with_their_verdicts(page: str) -> None:
     rows = tables(answer)[""][1:]
     by_id = {claim.id: (claim, findings) for claim, findings in results().audit.items()}
     expected = [
-        [by_id[name][0].statement, *(one.verdict.value for one in by_id[name][1].values())]
-        for name in HEADLINES
+        [claim.statement, claim.quantity.words, *(one.verdict.value for one in findings.values())]
+        for claim, findings in (by_id[name] for name in HEADLINES)
     ]
-    for cells, (statement, *verdicts) in zip(rows, expected, strict=True):
-        assert cells[0] == statement
+    for cells, (statement, scope, *verdicts) in zip(rows, expected, strict=True):
+        assert cells[0] == f"{statement} ({scope})"
         for cell, verdict in zip(cells[1:], verdicts, strict=True):
             assert cell.startswith(verdict)
     assert f"World: {results().comparison.world}." in unescape(answer)
