@@ -120,6 +120,7 @@ def test_the_film_shows_the_run_closest_to_the_median():
     assert hero.most_typical(course) == 2  # third of five in both
 
 
+@pytest.mark.slow
 def test_a_colony_is_filmed_as_it_was_measured():
     together = hero.run([15, 16])
     alone = hero.run([16], after=3, keep=True)

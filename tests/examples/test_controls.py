@@ -113,6 +113,7 @@ def test_shares_of_two_nests_by_hand(script):
     assert (x, y) == (40, 1.25 / 3)
 
 
+@pytest.mark.slow
 def test_the_order_of_two_nests_does_not_matter_and_their_distance_does(script):
     over_time = script("models/two_nests", TICKS=300)["deliveries_over_time"]
     near, far = (over_time(range(20), *one)[:, -1] for one in ((6, 14), (14, 6)))
@@ -268,6 +269,7 @@ def test_equal_thresholds_do_not_divide_labour_and_different_ones_do(script):
     assert abs(difference.mean()) < 0.1
 
 
+@pytest.mark.slow
 def test_the_share_of_foragers_is_demand_by_relief_whatever_the_thresholds(script):
     """The closed form of Bonabeau et al. (1996): of thresholds of ratio 8, a third is active."""
     # Three ants, each in the only cell between the queen and a food, deliver equally often.

@@ -154,7 +154,10 @@ def straight(is_open, codes, carries, random):
 
 
 @pytest.mark.parametrize("cue", ["compass", "trail"])
-@pytest.mark.parametrize("traffic", ["blocking", "right_of_way", "following"])
+@pytest.mark.parametrize(
+    "traffic",
+    ["right_of_way", *(pytest.param(t, marks=pytest.mark.slow) for t in ("blocking", "following"))],
+)
 def test_a_cell_with_an_ant_is_open_by_traffic_with_and_without_a_compass(traffic, cue, clean):
     rules.register("choice")(straight)
     world = worlds.open_world(1, ranges=(7, 7, 7))
