@@ -52,15 +52,16 @@ def styled() -> AbstractContextManager:
 
 
 @contextmanager
-def all_or_none(folder: Path) -> Iterator[None]:
-    """Yield while figures are drawn into a folder; if one fails, remove it and report the error.
+def all_or_none(*folders: Path) -> Iterator[None]:
+    """Yield while figures are drawn into folders; if one fails, remove them and report the error.
 
     So a figure that fails does not cost the tables, which must have been written before.
     """
     try:
         yield
     except Exception as error:
-        shutil.rmtree(folder, ignore_errors=True)
+        for folder in folders:
+            shutil.rmtree(folder, ignore_errors=True)
         reason = " ".join(f"{type(error).__name__}: {error}".split()).rstrip(".")
         print(f"warning: there are no figures, because one failed with {reason}.", file=sys.stderr)
 

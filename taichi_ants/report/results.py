@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import io
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -98,10 +99,16 @@ def do_comparison(
     with progress_bar("statistics and pictures") as progress:
         results = Results.of(comparison, baselines)
         write_tables(ready, results)
-        with style.all_or_none(ready / FIGURES):
+        with style.all_or_none(ready / FIGURES, ready / RENDERS):
             for number, wait in enumerate(waits, start=1):
                 progress(number / (len(waits) + 1))
-                wait()
+                try:
+                    wait()
+                except Exception:
+                    for other in waits[number:]:  # the worker process still writes them
+                        with contextlib.suppress(Exception):
+                            other()
+                    raise
             return results, seen()
     return results, Seen()
 

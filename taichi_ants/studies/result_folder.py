@@ -193,6 +193,6 @@ def _show(settings: Namespace, folder: ResultFolder, page: Pages[Results] | None
     if folder.has_other_work():
         print(f"It also has unfinished work of other settings, in {settings.out / UNFINISHED}/.")
     if not (settings.no_figures or manifest["figures"]):
-        print("They have no figures because of --no-figures; use --force to draw figures.")
+        print("They have no figures; use --force to draw figures.")
     if page and is_missing:
         print(f"{PAGE} was missing and has been written again from the other files.")

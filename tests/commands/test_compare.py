@@ -406,6 +406,22 @@ def test_force_runs_again_and_leaves_no_old_pictures(copy, compare):
     assert all(again[name] == before[name] for name in FIGURES)
 
 
+@pytest.mark.slow  # the worker process draws animations meanwhile
+def test_a_figure_that_fails_costs_no_results_and_is_drawn_later(tmp_path, compare, monkeypatch):
+    def fails(*given):
+        raise RuntimeError("no font")
+
+    arguments = [*SMALL, "--out", tmp_path / "out"]
+    with monkeypatch.context() as patch:
+        patch.setattr(results, "draw_figures", fails)
+        status, _, err = compare(*arguments)
+    assert status == 0
+    assert "there are no figures, because one failed with RuntimeError: no font." in err
+    assert set(contents(tmp_path / "out")) == FILES - FIGURES - RENDERS
+    assert compare(*arguments)[0] == 0
+    assert set(contents(tmp_path / "out")) == FILES
+
+
 GONE = [
     ("summary.csv", None),
     (POLICY, b""),
