@@ -246,8 +246,9 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
         "# ODD description of the model",
         "The headings are those of the ODD protocol (Overview, Design concepts, Details) of "
         "[Grimm et al. (2020)](https://www.jasss.org/23/2/7.html). The tables were generated from "
-        f"the settings of this study: `{command}`. They leave out most settings that are off or have "
-        "no effect in it, and defaults of the world and of the capacity. The text is yours to write.",
+        f"the settings of this study: `{command}`. They leave out most settings that are off or "
+        "have no effect in it, and defaults of the world and of the capacity. The text is yours to "
+        "write.",
         *("## 1. Purpose and patterns", _AUTHOR),
         *("## 2. Entities, state variables and scales", _AUTHOR),
         _table(("Entity", "Number in a world"), model.entities()),
