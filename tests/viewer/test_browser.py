@@ -522,10 +522,10 @@ def test_light_and_dark(browser, episode):
       return [...viewer.stage.context.getImageData(x * r, y * r, 1, 1).data.slice(0, 3)]; }"""
     empty = [int(worlds.paper().grid.index((5, 5, 0)))]
     assert dark.read(look) == "dark"
-    assert dark.read(pixel, empty) == [0x24, 0x2B, 0x33]
+    assert dark.read(pixel, empty) == [0x1E, 0x24, 0x2B]
     dark.click("#theme")
     assert dark.read(look) == "light"
-    assert dark.read(pixel, empty) == [0xE9, 0xEC, 0xEF]
+    assert dark.read(pixel, empty) == [0xEA, 0xEE, 0xF4]
     dark.press("t")
     assert dark.read(look) == "dark"
     dark.close()
