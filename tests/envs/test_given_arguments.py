@@ -1,4 +1,4 @@
-"""What all environments accept and count: paths, dicts, specs as JSON, options, deliveries."""
+"""All environments accept paths, dicts and specs as JSON, check options, and count deliveries."""
 
 from __future__ import annotations
 
