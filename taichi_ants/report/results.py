@@ -41,10 +41,9 @@ from taichi_ants.report.comparison import (
 from taichi_ants.report.page import made_facts, setting_facts
 from taichi_ants.studies.blocks import Blocks, Outcome
 from taichi_ants.studies.command_line import given_settings, load_plugin, progress_bar
-from taichi_ants.studies.executors import Work
 from taichi_ants.studies.machines import chosen
 from taichi_ants.studies.points import RunPoint
-from taichi_ants.studies.runner import VALUE, Study
+from taichi_ants.studies.runner import VALUE, Study, Work
 from taichi_ants.studies.worker_process import WorkerProcess
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.viewer import record_colony
