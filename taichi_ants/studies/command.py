@@ -72,7 +72,7 @@ def planned(module: str, options: Mapping[str, Any], plugin: str | None, arch: s
     Raises:
         AntsError: A file cannot be read or run, or an option is not allowed.
     """
-    code, places, salt = list[Code](), dict[str, bytes](), list[str]()
+    code, places, salt = list[Code](), dict[str, bytes](), [module]
     codes = {"plugin": plugin, "study": module if module.endswith(".py") else None}
     for name, path in codes.items():
         if path is not None:
@@ -89,11 +89,11 @@ def planned(module: str, options: Mapping[str, Any], plugin: str | None, arch: s
         names = (f"{INPUTS}/{f'{n}-' if n > 1 else ''}{base}" for n in itertools.count(1))
         copies[path] = next(name for name in names if name not in copies.values())
         places[copies[path]] = content
-    if plugin:
-        salt.append(f"plugin {checksum_of(code[0])}")
     if codes["study"]:
         version = getattr(loaded, "VERSION", None)
-        salt.append(f"study {Path(module).stem} {version or checksum_of(code[-1])}")
+        salt = [f"study {Path(module).stem} {version or checksum_of(code[-1])}"]
+    if plugin:
+        salt.append(f"plugin {checksum_of(code[0])}")
     if arch != "cpu":  # whose last bits differ
         salt.append(arch)
     study = replace(getattr(own, "study", own), salt=tuple(salt))

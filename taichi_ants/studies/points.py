@@ -63,6 +63,9 @@ class Drawn:
         cls, preset: str, first: int = 0, regions: Mapping[str, Any] | None = None, **settings: Any
     ) -> Drawn:
         """Return the worlds that `worlds.build(preset, first + seed, **settings)` draws."""
+        for one in worlds.settings_of(preset) if preset in worlds.names() else ():
+            if one.name in settings:  # so that equal numbers of other types are equal
+                settings[one.name] = one.checked(settings[one.name])
         return cls(json.dumps([preset, first, settings, regions or {}], sort_keys=True))
 
     def of(self, seed: int) -> World:

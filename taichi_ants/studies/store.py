@@ -94,7 +94,7 @@ class Store:
 
     def add(self, points: Sequence[str], seeds: Sequence[int], arrays: Arrays) -> None:
         """Write a block of runs; AntsError if it cannot be written."""
-        header = json.dumps([list(points), list(seeds), sorted(arrays)])
+        header = json.dumps([list(points), list(seeds), list(arrays)])
         path = self.folder / f"{hashlib.sha256(header.encode()).hexdigest()[:32]}.npz"
         part = self.folder / f".{secrets.token_hex(8)}.part"
         content: Mapping[str, np.ndarray] = {_ABOUT: np.array(header), **arrays}
@@ -106,7 +106,7 @@ class Store:
                 os.replace(part, path)
             finally:
                 part.unlink(missing_ok=True)
-        self._held[path.name] = Held(path, tuple(points), tuple(seeds), tuple(sorted(arrays)))
+        self._held[path.name] = Held(path, tuple(points), tuple(seeds), tuple(arrays))
 
     def read(
         self, points: Sequence[str], seeds: Sequence[int], arrays: Sequence[str], part: bool = False
