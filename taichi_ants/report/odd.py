@@ -17,6 +17,7 @@ from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
 from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
 from taichi_ants.settings import Setting, declared, flat
+from taichi_ants.studies.folder import INPUTS, asked_in, checksum_of
 from taichi_ants.studies.sweep_file import declaration_of, measure_of
 from taichi_ants.task import observations
 
@@ -209,10 +210,14 @@ class Model:
 
 def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the ODD description of finished results, as Markdown."""
-    inputs, sums = manifest["inputs"], manifest["files"]
-    name = inputs.get(str(manifest["asked"]["options"].get("file")))
+    asked = asked_in(folder) or {"inputs": {}, "options": {}}
+    inputs = asked["inputs"]
+    name = inputs.get(str(asked["options"].get("file")))
     sweep = files.tomllib.loads(files.read_text(folder / name)) if name else {}
-    sources = [(f"`{one}`", f"`{sums[one][:16]}`") for one in inputs.values()]
+    every = sorted(one for one in (folder / INPUTS).rglob("*") if one.is_file())
+    sources = [
+        (f"`{one.relative_to(folder).as_posix()}`", f"`{checksum_of(one)[:16]}`") for one in every
+    ]
     return described(Model(manifest["settings"], sweep), manifest["command"], sources)
 
 

@@ -65,6 +65,10 @@ class Planned:
     inputs: Mapping[str, bytes]
     facts: Mapping[str, Any]
 
+    def asked(self) -> dict[str, Any]:
+        """Return what the study asks for, as folders of results have it."""
+        return folder.asked_of(self.study, self.facts)
+
 
 def planned(module: str, options: Mapping[str, Any], plugin: str | None, arch: str) -> Planned:
     """Return the study of a module, a name or the path of a file, for some options.
@@ -118,6 +122,7 @@ def opened(place: Path) -> Iterator[Planned]:
         module = str(place / INPUTS / "study" / Path(module).name)
     with replaced({path: place / name for path, name in asked["inputs"].items()}):
         found = planned(module, asked["options"], plugin, asked["arch"])
+        found = replace(found, facts={name: asked[name] for name in found.facts})
         if list(found.study.keys) != asked["points"]:
             raise AntsError(
                 f"this version plans other runs than {files.named(place)} has, which are of "
@@ -139,7 +144,7 @@ def run_study(settings: Namespace, module: str) -> None:
     options = {name: value for name, value in vars(settings).items() if name not in _OF_ALL}
     options = json.loads(files.to_json(options))
     found = planned(module, options, settings.plugin, settings.arch)
-    asked, figures = folder.asked_of(found.study, found.facts), not settings.no_figures
+    asked, figures = found.asked(), not settings.no_figures
     parquet = getattr(settings, "parquet", False)
     if not settings.force and folder.is_finished(place, asked, figures, parquet):
         print(files.read_text(place / REPORT))
@@ -149,7 +154,7 @@ def run_study(settings: Namespace, module: str) -> None:
         manifest = folder.manifest_in(place) or {}
         figures |= manifest.get("figures", False)
         parquet |= manifest.get("parquet", False)
-        if not _computed(settings, found, place, figures, parquet):
+        if not compute(settings, found, place, figures, parquet):
             print(_unfinished(place, settings.shard))
             return
         seconds = time.perf_counter() - began
@@ -166,9 +171,7 @@ def _unfinished(place: Path, shard: tuple[int, int] | None) -> str:
     )
 
 
-def _computed(
-    settings: Namespace, found: Planned, place: Path, figures: bool, parquet: bool
-) -> bool:
+def compute(settings: Namespace, found: Planned, place: Path, figures: bool, parquet: bool) -> bool:
     """Compute missing runs, and write the tables; return whether all runs are there."""
     shard = settings.shard or (1, 1)
     while True:

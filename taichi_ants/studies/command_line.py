@@ -138,8 +138,8 @@ def add_machines(parser: argparse.ArgumentParser) -> None:
     )
     add("--ray", nargs="?", const=True, type=_address, metavar="HOST:PORT", help=ray)
     shard = (
-        "compute only the I-th of N equal parts, for example of a job array; "
-        "`taichi-ants merge` joins the parts"
+        "compute only the I-th of N equal parts, for example of a job array; the last part to "
+        "finish in a folder writes the tables"
     )
     add("--shard", type=_shard, metavar="I/N", help=shard)
 
@@ -168,7 +168,7 @@ def _shard(text: str) -> tuple[int, int]:
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """Return the settings with a folder for the results, which --quick and --shard change.
+    """Return the settings with a folder for the results, which --quick changes.
 
     Raises:
         AntsError: Options of `add_machines` exclude each other.
@@ -180,8 +180,6 @@ def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
                 "work; leave one of them out."
             )
     name = f"{name}-quick" if getattr(settings, "quick", False) else name
-    if shard := getattr(settings, "shard", None):
-        name = f"{name}-shard-{shard[0]}-of-{shard[1]}"
     settings.out = settings.out or Path("results", name)
     return settings
 

@@ -414,29 +414,43 @@ class ColonyPoint:
         `learned` has the tables of the point `after`, from which learning starts.
         """
         (point,) = points
-        world: Any = point.world
-        world = [world.of(seed) for seed in seeds] if isinstance(world, Drawn) else world
         share = point.episodes / (point.episodes + point.rollouts)
-        tables: Any = point.policy.q_values if point.policy else learned
-        if point.episodes:
-            places = point.places(seeds)
-            learning = point.colony(places[0] if places else world, seeds, learned, True, **where)
-            part, protocol = part_of(progress, 0.0, share), point.events(learns=True)
-            learning.run(point.episodes, point.ticks, part, places, protocol=protocol)
-            tables = learning.q_values
-        colony = point.colony(world, seeds, tables, False, **where)
-        part, protocol = part_of(progress, share, 1 - share), point.events(learns=False)
+        tables = point.tables(seeds, learned, part_of(progress, 0.0, share), where)
+        colony = point.colony(point.worlds(seeds), seeds, tables, False, **where)
         episodes = colony.run(
-            *(point.rollouts, point.ticks, part),
+            *(point.rollouts, point.ticks, part_of(progress, share, 1 - share)),
             measures=point.measures,
             every=point.measure_every,
-            protocol=protocol,
+            protocol=point.events(learns=False),
         )
         outcome = {name: small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
         outcome |= _series_of(episodes, point)
         if point.episodes and point.sharing == "shared":
             outcome["q_values"] = tables
         return {name: array[None] for name, array in outcome.items()}
+
+    def tables(
+        self, seeds: Sequence[int], learned: Any, progress: Progress, where: Mapping[str, Any]
+    ) -> Any:
+        """Return the action values that ants follow in the evaluation; train them if necessary.
+
+        `learned` has the tables of the point `after`, from which learning starts.
+        """
+        if not self.episodes:
+            return self.policy.q_values if self.policy else learned
+        places = self.places(seeds)
+        learning = self.colony(
+            places[0] if places else self.worlds(seeds), seeds, learned, True, **where
+        )
+        protocol = self.events(learns=True)
+        learning.run(self.episodes, self.ticks, progress, places, protocol=protocol)
+        return learning.q_values
+
+    def worlds(self, seeds: Sequence[int]) -> Any:
+        """Return the world, or those of some seeds."""
+        return (
+            [self.world.of(one) for one in seeds] if isinstance(self.world, Drawn) else self.world
+        )
 
 
 def _series_of(episodes: ColonyEpisodes, point: ColonyPoint) -> Outcome:
