@@ -114,7 +114,7 @@ def test_help_lists_the_commands_in_a_line_each(arguments, tmp_path):
     "arguments",
     [
         *COMMANDS,
-        *("colony study", "colony live"),
+        "colony live",
         *("render episode", "render colony", "render learning", "render sheet"),
     ],
 )
@@ -146,14 +146,13 @@ def test_the_version(tmp_path):
 
 def test_a_command_by_its_name(kernels, tmp_path):
     """What it works with lies in the package: it runs in a folder of its own."""
-    tiny = [
-        *("--seeds", "1", "--episodes", "2", "--max-steps", "30", "--learners", "q_learning"),
-        *("--learning-rates", "0.1", "--discounts", "0.9", "--epsilons", "0.3"),
-        *("--epsilon-decays", "0.9", "--delivery", "terminates", "--no-figures"),
-    ]
-    done = call(["compare", *tiny], tmp_path, kernels=kernels)
+    Path(tmp_path, "tiny.toml").write_text(
+        'kind = "runs"\nseeds = 1\nepisodes = 60\nmeasures = ["return_last50"]\n'
+        "vary.training.epsilon = [0.1, 0.3]\n"
+    )
+    done = call(["sweep", "tiny.toml", "--no-figures"], tmp_path, kernels=kernels)
     assert (done.returncode, done.stderr) == (0, "")
     (folder,) = Path(tmp_path, "results").iterdir()
-    assert folder.name == "compare"
+    assert folder.name == "sweep-tiny"
     assert (folder / "summary.csv").exists()
     assert '"command": "' in (folder / "manifest.json").read_text()

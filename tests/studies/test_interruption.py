@@ -155,7 +155,7 @@ STARTS = {
     [("argparse", "script"), ("numpy", "module"), ("taichi._lib.core.taichi_python", "script")],
 )
 def test_while_a_command_is_imported(module, start, tmp_path):
-    arguments = ["compare.py"] if start == "script" else ["taichi-ants", "compare"]
+    arguments = ["compare.py"] if start == "script" else ["taichi-ants", "sweep"]
     script = SCRIPT.format(module=module, arguments=arguments, start=STARTS[start])
     done = subprocess.run(
         [sys.executable, "-c", script],

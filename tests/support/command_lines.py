@@ -75,9 +75,12 @@ def start(
     )
 
 
+STUDIES = ("compare", "colony", "bridge")  # scripts with studies, not starters of commands
+
+
 def load(name: str) -> ModuleType:
-    """Return the module of a command."""
-    return importlib.import_module(f"taichi_ants.commands.{name}")
+    """Return the module of a command, or of a script with a study."""
+    return importlib.import_module(name if name in STUDIES else f"taichi_ants.commands.{name}")
 
 
 Outcome = tuple[int, str, str]
