@@ -18,7 +18,7 @@ import taichi_ants
 
 # From the ground up: a part imports parts of lower layers only. Each part stands here.
 LAYERS = (
-    {"errors", "environment", "physics", "subnormals"},
+    {"errors", "environment", "subnormals"},
     {"files", "grid", "settings"},
     {"rules"},
     {"task"},

@@ -22,9 +22,8 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
-from taichi_ants import __version__
+from taichi_ants import PHYSICS, __version__
 from taichi_ants.errors import AntsError, checked_whole
-from taichi_ants.physics import PHYSICS
 from taichi_ants.runtime import available_threads
 from taichi_ants.studies.interruption import stop_if_noted
 from taichi_ants.studies.plugins import Code, load_code

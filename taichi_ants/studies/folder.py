@@ -26,9 +26,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import __version__, files
+from taichi_ants import PHYSICS, __version__, files
 from taichi_ants.errors import AntsError, count, shown
-from taichi_ants.physics import PHYSICS
 from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.store import BLOCKS, Arrays, Store
 from taichi_ants.studies.study import FailedBlocksError, Study, share_of, varied

@@ -16,12 +16,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from taichi_ants import __version__, checks, files, learners, measures, worlds
+from taichi_ants import PHYSICS, __version__, checks, files, learners, measures, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder, stops
-from taichi_ants.physics import PHYSICS
 from taichi_ants.protocol import Event, When, check_queen, check_room, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.task import Task
