@@ -210,7 +210,8 @@ class Model:
 
 def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the ODD description of finished results, as Markdown."""
-    asked = asked_in(folder) or {"inputs": {}, "options": {}}
+    asked = asked_in(folder)
+    assert asked is not None  # because the results are finished
     inputs = asked["inputs"]
     name = inputs.get(str(asked["options"].get("file")))
     sweep = files.tomllib.loads(files.read_text(folder / name)) if name else {}
@@ -218,7 +219,7 @@ def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     sources = [
         (f"`{one.relative_to(folder).as_posix()}`", f"`{checksum_of(one)[:16]}`") for one in every
     ]
-    return described(Model(manifest["settings"], sweep), manifest["command"], sources)
+    return described(Model(asked["settings"], sweep), manifest["command"], sources)
 
 
 def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:

@@ -6,7 +6,7 @@ A study is a module of this package or a file (.py), which the folder of its res
     tables(planned, results) -> str, which writes tables and figures, and returns the report
 
 `options` are the command's own ones, as JSON has them. `planned` can have a method `facts`, whose
-result the manifest of the results contains. A file that does not change the meaning of its arrays
+result adds to the settings in study.json. A file that does not change the meaning of its arrays
 without raising its `VERSION` has that number; otherwise its text is a part of the keys of its runs.
 """
 
@@ -102,6 +102,7 @@ def planned(module: str, options: Mapping[str, Any], plugin: str | None, arch: s
         salt.append(arch)
     study = replace(getattr(own, "study", own), salt=tuple(salt))
     facts = {"module": module, "options": options, "plugin": plugin, "arch": arch, "inputs": copies}
+    facts["settings"] = settings_of(study.points, study.seeds) | getattr(own, "facts", dict)()
     return Planned(loaded, own, study, code, places, facts)
 
 
@@ -209,8 +210,6 @@ def write_tables(
         results = Results(found.study, ready, store, made, figures, parquet, part)
         files.write_text(ready / REPORT, found.module.tables(found.own, results))
         made |= {"figures": figures, "parquet": parquet}
-        made["settings"] = settings_of(found.study.points, found.study.seeds)
-        made["settings"] |= getattr(found.own, "facts", dict)()
         folder.publish(place, ready, None if part else made)
 
 

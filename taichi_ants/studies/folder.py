@@ -1,6 +1,6 @@
 """Folders of results: what a study asks for, who has computed it, its tables, and what is missing.
 
-    study.json    what is asked for: the module of the study with its options, and all runs
+    study.json    what is asked for: the module of the study with its options, settings, all runs
     inputs/       copies of the files that the study has read
     blocks/       the runs, see `studies.store`
     sessions/     the command, versions and machine of each process that has computed, a file each
@@ -36,6 +36,7 @@ STUDY, MANIFEST, REPORT, PAGE = "study.json", "manifest.json", "report.txt", "re
 INPUTS, SESSIONS = "inputs", "sessions"
 _OF_ALL = (STUDY, INPUTS, BLOCKS, SESSIONS)
 _SHOWN = 3  # values of a setting, at most, in a message
+_MANY = 20  # lost values of a setting, which a design has drawn
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def asked_of(study: Study, facts: Mapping[str, Any]) -> dict[str, Any]:
         **{"version": __version__, "physics": PHYSICS, **facts},
         **{"points": study.keys, "seeds": study.seeds, "arrays": study.arrays},
         **{"seconds": study.seconds[:, 0], "families": study.families},
-        "settings": varied(study.points),
+        "varied": varied(study.points),
     }
     return json.loads(files.to_json(own))
 
@@ -145,37 +146,44 @@ def _check_grows(folder: Path, before: Mapping[str, Any], asked: Mapping[str, An
     seeds = [one for one in before["seeds"] if one not in {*asked["seeds"]}]
     if not points and not seeds:
         return
-    if before["physics"] != asked["physics"]:
-        raise AntsError(
-            f"{files.named(folder)} has results of version {before['version']}, physics "
-            f"{before['physics']}, and this is version {__version__}, physics {PHYSICS}, whose "
-            "results differ; choose another --out, or give --force to replace them."
-        )
-    lost = {"seed": seeds, **_lost(before, asked, points)}
-    words = [f"{name} {_few(values)}" for name, values in lost.items() if values]
-    which = ", ".join(words) or count(len(points), "point")
+    which = f"that this study lacks ({_lost(before, asked, points, seeds)}); add them,"
+    if not {*before["points"]} & {*asked["points"]}:
+        which = f"of other settings ({_differences(before, asked)});"
     raise AntsError(
-        f"{files.named(folder)} contains results that this study lacks ({which}); add them, choose "
-        "another --out, or give --force to replace them."
+        f"{files.named(folder)} contains results {which} choose another --out, or give --force to "
+        "replace them."
     )
 
 
 def _lost(
-    before: Mapping[str, Any], asked: Mapping[str, Any], points: Sequence[int]
-) -> dict[str, list[Any]]:
-    """Return by setting the values of lost points that no point of a study has."""
-    found: dict[str, list[Any]] = {}
-    for name in before["settings"][0] if {*before["points"]} & {*asked["points"]} else ():
-        here = [one.get(name) for one in asked["settings"]]
-        lost = (before["settings"][n][name] for n in points)
-        found[name] = list(dict.fromkeys(map(files.to_json, lost)))
-        found[name] = [one for one in map(json.loads, found[name]) if one not in here]
-    return found
+    before: Mapping[str, Any], asked: Mapping[str, Any], points: Sequence[int], seeds: Sequence[int]
+) -> str:
+    """Return in words the seeds that a study lacks, and the values of settings that vary."""
+    lost = {"seed": [*map(files.to_json, seeds)]}
+    for name in before["varied"][0]:
+        here = {files.to_json(one.get(name)) for one in asked["varied"]}
+        texts = dict.fromkeys(files.to_json(before["varied"][n][name]) for n in points)
+        lost[name] = [text for text in texts if text not in here]
+    words = [
+        f"{name} {', '.join(texts[:_SHOWN])}{' ...' * (len(texts) > _SHOWN)}"
+        for name, texts in lost.items()
+        if texts and len(texts) < _MANY
+    ]
+    return ", ".join(words) or count(len(points), "point")
 
 
-def _few(values: Sequence[Any]) -> str:
-    more = " ..." if len(values) > _SHOWN else ""
-    return ", ".join(map(shown, values[:_SHOWN])) + more
+def _differences(before: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
+    """Return in words how the settings of a folder differ from those of a study."""
+    there, here = ({**one, **one["options"], **one["settings"]} for one in (before, asked))
+    names = ("physics", "version", "plugin", "arch", *before["settings"], *asked["settings"])
+    said, others = [], []
+    for name in dict.fromkeys(names):
+        one, other = there.get(name), here.get(name)
+        if one != other and not {type(one), type(other)} & {list, dict}:
+            said.append(f"{name} is {shown(one)} instead of {shown(other)}")
+        elif one != other:
+            others.append(name)
+    return ", ".join([*said, *([f"not the same {', '.join(others)}"] if others else [])])
 
 
 @contextmanager

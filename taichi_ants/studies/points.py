@@ -176,7 +176,7 @@ class RunPoint:
 class FixedPolicy:
     """A policy that ants follow without learning: its name or file, and its action values."""
 
-    name: str
+    name: str = field(compare=False)
     sha256: str
     q_values: np.ndarray = field(compare=False, repr=False)
 
