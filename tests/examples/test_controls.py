@@ -16,10 +16,10 @@ import pytest
 from command_lines import EXPERIMENTS
 from matplotlib.figure import Figure
 
+from experiments.ant_system import Search, search
+from experiments.goss import choices
+from experiments.utility import Foraging
 from taichi_ants import Colony, TrainingConfig, World, task, train
-from taichi_ants.baselines.ant_system import Search, search
-from taichi_ants.baselines.goss import choices
-from taichi_ants.baselines.utility import Foraging
 from taichi_ants.learners import registry as learners
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies.bridge import crossings
