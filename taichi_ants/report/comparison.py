@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from experiments.policy_sheet import policy_sheet
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.drawings import Drawing, drawings
@@ -22,7 +23,7 @@ from taichi_ants.analysis.paper.table2 import example_name, examples
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
 from taichi_ants.learners.policies import load_policy
-from taichi_ants.rendering import Episode, policy_sheet
+from taichi_ants.rendering import Episode
 from taichi_ants.report.page import Picture, Player, Shown, Statement, Statements, fill
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.studies.runner import Study
