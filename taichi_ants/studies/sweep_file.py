@@ -33,7 +33,7 @@ from taichi_ants.task import Task
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = (  # keys that are not settings of points
     *("kind", "seeds", "measures", "measure_every"),
-    *("margin", "against", "vary", "search", *design.KEYS),
+    *("margin", "against", "vary", *design.KEYS),
 )
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
