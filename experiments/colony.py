@@ -132,7 +132,7 @@ POOL, FIRST_OF_POOL = 64, 1 << 20  # number of worlds for training, and the firs
 EXPLORING = 0.7  # the share of training episodes in which epsilon and the learning rate decrease
 OPTIMISM = 10.0  # the initial action value, above most true values
 # Kinds of world in which food moves or takes time to grow back.
-LIVES = {"moving": Life(regrowth=0, wander=100), "slow": Life(regrowth=100)}
+LIVES = {"moving": Life(regrowth=0, pile_move_interval=100), "slow": Life(regrowth=100)}
 RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
 _PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # number of piles; there is no other food
 SHOWN_TICKS, MOST_SHOWN = 240, 1000  # of recordings: ticks, and ants at most
@@ -344,7 +344,7 @@ def measured(
         bound, of_point = np.broadcast_to(np.array(most), seeds), values[point]
         share = of_point["deliveries"] / np.where(bound > 0, bound, np.nan)
         calm = values[greedy(point)]["deliveries"]
-        found[condition] = {**of_point, "greedy": calm, "bound": bound, "of_bound": share}
+        found[condition] = {**of_point, "greedy": calm, "bound": bound, "bound_share": share}
     return found
 
 
@@ -515,7 +515,7 @@ def study(settings: argparse.Namespace) -> None:
     command_line.load_plugin(settings.plugin)
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     lengths = settings.episodes, settings.ticks, settings.rollouts
-    training = learning().but(**command_line.given_settings(settings).get("training", {}))
+    training = learning().replace(**command_line.given_settings(settings).get("training", {}))
     conditions = plan(settings.world_kinds, settings.sizes, seeds, training, *lengths)
     asked = study_of(conditions, seeds)
 
