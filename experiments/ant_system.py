@@ -21,7 +21,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.checks import checked_world
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
     from taichi_ants.grid.randomness import stream_state
-    from taichi_ants.settings import Count, Is, Seed, checked_arguments
+    from taichi_ants.settings import Count, Seed, Setting, checked_arguments
     from taichi_ants.studies.command_line import (
         THREADS,
         Parser,
@@ -191,13 +191,13 @@ class Search:
 @checked_arguments
 def search(
     world: World,
-    method: Annotated[Method, Is()] = "max_min",
+    method: Annotated[Method, Setting()] = "max_min",
     *,
     iterations: Count = 200,
     ants: Count = 32,
     colonies: Count = 20,
-    alpha: Annotated[int, Is(least=1, most=8)] = 1,
-    evaporation: Annotated[float | None, Is(above=0, most=1)] = None,
+    alpha: Annotated[int, Setting(least=1, most=8)] = 1,
+    evaporation: Annotated[float | None, Setting(above=0, most=1)] = None,
     max_steps: Count = 100_000,
     seed: Seed = 0,
     threads: int | None = None,

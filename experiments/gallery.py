@@ -112,7 +112,7 @@ def drawing(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
     """Return the module that draws a picture, and its settings."""
     if arguments[0] in ("episode", "colony"):
         return render, render.parse_arguments(arguments)
-    script = import_module(f"experiments.{arguments[0]}")
+    script = import_module(arguments[0])
     return script, script.parse_arguments(arguments[1:])
 
 
@@ -158,12 +158,12 @@ def make_viewer(folder: Path, browser: Any) -> None:
 def make_live(folder: Path, browser: Any) -> None:
     """Take a picture of the live page, after ants have learned and a wall has been drawn."""
     from taichi_ants.live.choices import Choices
-    from taichi_ants.live.server import Room
+    from taichi_ants.live.server import SessionServer
     from taichi_ants.live.session import Session
 
     choices = Choices(watch.policies([]))
     session = Session(choices.setup(watch.START))
-    room = Room(session, choices)
+    room = SessionServer(session, choices)
     thread = threading.Thread(target=room.run, daemon=True)
     thread.start()
     page = opened(browser, room.url, _LIVE_WINDOW)
@@ -215,15 +215,18 @@ def make_figures(folder: Path) -> None:
 
     They have 256 colours, so that their history in Git stays small.
     """
+    import bridge
+    import colony
+    import compare
     from PIL import Image
 
-    from taichi_ants.commands import bridge, colony, compare
+    from taichi_ants.commands import colony as command
 
     results = ROOT / "results"
     compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
     colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
-    colony.live(colony.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
-    bridge.bridge(bridge.parse_arguments(["--out", str(results / "bridge")]))
+    command.live(command.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
+    bridge.study(bridge.parse_arguments(["--out", str(results / "bridge")]))
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

@@ -19,7 +19,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.errors import AntsError, checked_whole, count
     from taichi_ants.grid.constants import STREAM_BRIDGE
     from taichi_ants.grid.randomness import stream_state
-    from taichi_ants.settings import Count, Is, Seed, checked_arguments
+    from taichi_ants.settings import Count, Seed, Setting, checked_arguments
     from taichi_ants.studies.command_line import THREADS, Parser, run_command, whole_number
     from taichi_ants.task.rules.numbers import power
     from taichi_ants.task.rules.random_bits import advance, bits_of, high_word, low_word
@@ -91,8 +91,8 @@ def choices(
     colonies: Count = 10_000,
     *,
     ants: Count = AS_PUBLISHED,
-    k: Annotated[float, Is(above=0, most=1e9)] = 20.0,
-    n: Annotated[int, Is(least=1, most=8)] = 2,
+    k: Annotated[float, Setting(above=0, most=1e9)] = 20.0,
+    n: Annotated[int, Setting(least=1, most=8)] = 2,
     opens: int = 0,
     seed: Seed = 0,
     threads: int | None = None,

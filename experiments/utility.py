@@ -20,14 +20,14 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import numpy as np
     import taichi as ti
+    from ant_system import open_cells
     from taichi.math import popcnt
 
-    from experiments.ant_system import open_cells
     from taichi_ants import World, runtime, worlds
     from taichi_ants.analysis.statistics import bootstrap_interval
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
     from taichi_ants.grid.randomness import stream_state
-    from taichi_ants.settings import Count, Is, Seed, Share, checked_arguments
+    from taichi_ants.settings import Count, Seed, Setting, Share, checked_arguments
     from taichi_ants.studies.command_line import (
         THREADS,
         Parser,
@@ -207,7 +207,7 @@ def forage(
     ants: Count = 64,
     colonies: Count = 20,
     capacity: Count = 10,
-    discount: Annotated[float, Is(above=0, most=math.nextafter(1, 0))] = 0.9,
+    discount: Annotated[float, Setting(above=0, most=math.nextafter(1, 0))] = 0.9,
     evaporation: Share = 0.001,
     exploration: Share = 0.1,
     momentum: Share = 0.8,

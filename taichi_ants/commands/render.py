@@ -225,12 +225,12 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
 
 def given_task(settings: argparse.Namespace) -> Task:
     """Return the task with the given options."""
-    return TASK.but(**given_settings(settings).get("task", {}))
+    return TASK.replace(**given_settings(settings).get("task", {}))
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
     """Return the training configuration with the given options."""
-    return TRAINING.but(**given_settings(settings).get("training", {}))
+    return TRAINING.replace(**given_settings(settings).get("training", {}))
 
 
 def _save_snapshots(

@@ -9,13 +9,13 @@ import sys
 import time
 from pathlib import Path
 
+import gallery
 import numpy as np
 import pytest
 from command_lines import EXPERIMENTS, ROOT, assert_one_sentence, call, environment, start
 from command_lines import run as process
 from PIL import Image
 
-from experiments import gallery
 from taichi_ants import AntsError, commands
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower

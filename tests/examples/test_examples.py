@@ -15,7 +15,7 @@ from taichi_ants import load_policy, task
 
 EXAMPLES = ROOT / "examples"
 NEEDS = {
-    **{"ppo": "torch", "shared_policy": "torch"},
+    **{"ppo": "torch", "shared_policy": "torch", "search": "optuna"},
     **{"sb3_ppo": "stable_baselines3", "minari_data": "minari"},
 }
 
@@ -56,6 +56,15 @@ def test_minari_data_learns_from_what_it_has_written(
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "data"))
     said = run("minari_data", [], kernels, tmp_path)
     assert said == "58652 transitions; 20 of 20 rollouts deliver\n"
+
+
+@pytest.mark.slow
+def test_a_search_resumes_and_ends_with_held_out_seeds(kernels: Path, tmp_path: Path) -> None:
+    run("search", ["--trials", 2, "--journal", "stopped"], kernels, tmp_path)
+    resumed = run("search", ["--trials", 3, "--journal", "stopped"], kernels, tmp_path)
+    assert resumed == run("search", ["--trials", 3], kernels, tmp_path)
+    assert re.match(r"best of 3 trials: {'half_life': \d", resumed)
+    assert re.search(r"held-out seeds: \d+ .* against \d+, difference .* \[.*\]$", resumed)
 
 
 @pytest.mark.slow

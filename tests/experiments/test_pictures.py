@@ -6,21 +6,22 @@ import re
 from functools import cache
 from pathlib import Path
 
+import gallery
+import learning
 import numpy as np
 import pytest
 from command_lines import ROOT, assert_one_sentence, call_script
-from named_states import parse_state
-from PIL import Image
-
-from experiments import gallery, learning
-from experiments.learning import (
+from learning import (
     Checkpoint,
     learning_checkpoints,
     learning_frames,
     noted_checkpoints,
     typical_seed,
 )
-from experiments.policy_sheet import clarity, learned, policy_sheet, usual_spread
+from named_states import parse_state
+from PIL import Image
+from policy_sheet import clarity, learned, policy_sheet, usual_spread
+
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
 from taichi_ants.rendering import Episode, save_animation, text
