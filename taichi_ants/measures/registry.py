@@ -10,9 +10,10 @@ import inspect
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from taichi_ants.errors import AntsError, check_new_name, expect, shown
+from taichi_ants.errors import AntsError, expect, shown
 from taichi_ants.measures import activity, ants, deliveries, paths, trails
 from taichi_ants.measures.measure import Measure
+from taichi_ants.registry import Registry
 from taichi_ants.task.field import TRAIL
 
 if TYPE_CHECKING:
@@ -53,7 +54,8 @@ _PARTS: dict[str, Callable[[World, Task], tuple[str, ...]]] = {
     "entropy": lambda world, task: (TRAIL, *task.fields),
     "regions": lambda world, task: tuple(ants.regions_of(world)),
 }
-_YOURS: dict[str, Measure] = {}
+MEASURES: Registry[Measure] = Registry("measure", "taichi_ants.measures.register", BUILT_IN)
+names = MEASURES.names
 
 
 def register(
@@ -78,7 +80,7 @@ def register(
         AntsError: The name is not a word or belongs to a built-in measure, `function` does not take
             these arguments, or `of` is not a measure of the snapshot alone.
     """
-    check_new_name("measure", name, BUILT_IN)
+    MEASURES.check_new(name)
     for what, text in (("unit", unit), ("summary", summary)):
         expect(what, text, str)
     if of is not None and get(of).of is not None:
@@ -91,8 +93,7 @@ def register(
             f"the function of the measure {name!r} is {shown(function)}; it must be a function of "
             f"({', '.join(arguments)})."
         ) from error
-    _YOURS[name] = Measure(name, function, unit, summary, of)
-    return _YOURS[name]
+    return MEASURES.add(name, Measure(name, function, unit, summary, of))
 
 
 def get(name: str | Measure) -> Measure:
@@ -106,14 +107,8 @@ def get(name: str | Measure) -> Measure:
     """
     if isinstance(name, Measure):
         return name
-    expect("the measure", name, str)
-    whole, _, part = name.partition(".")
-    measure = BUILT_IN.get(whole) or _YOURS.get(whole)
-    if measure is None:
-        raise AntsError(
-            f"there is no measure {shown(name)}; choose one of {', '.join(names())}, or register "
-            "it with measures.register."
-        )
+    whole, _, part = name.partition(".") if isinstance(name, str) else (name, "", "")
+    measure = MEASURES.get(whole)
     return measure.select(part) if part else measure
 
 
@@ -134,8 +129,3 @@ def check_part(name: str, world: World, task: Task, single: bool = False) -> Non
         raise AntsError(f"{name!r} has {len(parts)} parts; name one of {allowed}.")
     if single and whole in ARRAYS:
         raise AntsError(f"{name!r} is an array; choose a measure that is a number.")
-
-
-def names() -> tuple[str, ...]:
-    """Return the names of all registered measures, in the order of registration."""
-    return (*BUILT_IN, *_YOURS)

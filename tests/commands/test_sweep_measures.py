@@ -47,7 +47,7 @@ FROZEN = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 def sweep(tmp_path, capsys, monkeypatch):
     """Calls the command on a file of this text, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry, "_YOURS", {})
+    monkeypatch.setattr(registry.MEASURES, "yours", {})
 
     def called(text, *more):
         Path("my.toml").write_text(text, "utf-8")
@@ -176,7 +176,7 @@ def test_policies_can_vary(sweep):
 
 
 def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
-    monkeypatch.setattr(rules.registry, "_RULES", dict(rules.registry._RULES))
+    monkeypatch.setattr(rules.registry.RULES, "yours", dict(rules.registry.RULES.yours))
     rules.register("evaporation")(weaker)
     text = FILE.replace("[vary]", '[task]\npheromone.evaporation = "weaker"\n\n[vary]')
     text += "task.rules.weaker.rate = [0.1, 0.5]\n"

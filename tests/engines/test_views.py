@@ -16,7 +16,7 @@ CONFIG = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.97)
 
 @pytest.fixture(autouse=True)
 def _no_observation_stays(monkeypatch):
-    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
 
 
 def of_five_cells(view):

@@ -18,7 +18,7 @@ TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
 
 @pytest.fixture(autouse=True)
 def forget_others(monkeypatch):
-    monkeypatch.setattr(registry, "_YOURS", {})
+    monkeypatch.setattr(registry.MEASURES, "yours", {})
 
 
 def colony(world=None, ants=5, seeds=(0, 1, 2)) -> Colony:
@@ -98,7 +98,7 @@ def test_wrong_measures_are_refused(name, function, more, message):
     [
         ({"measures": ["deliveries", "deliverys"]}, "there is no measure 'deliverys'"),
         ({"measures": 3}, "give a list of names"),
-        ({"measures": [3]}, "the measure is 3"),
+        ({"measures": [3]}, "there is no measure 3"),
         ({"measures": ["living", "living"]}, "'living' more than once"),
         ({"measures": ["living"], "every": 0}, "every is 0"),
         ({"every": 10}, "measures is empty"),
