@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from taichi_ants.errors import AntsError, checked_whole, entries_of, shown
-from taichi_ants.measures.measure import Measure, Value
+from taichi_ants.measures.measure import RUN, Measure, Value
 from taichi_ants.measures.registry import get
 
 
@@ -100,16 +100,23 @@ class Recorder:
         listed = [measures] if single else entries_of(measures)
         if listed is None:
             raise AntsError(f"measures is {shown(measures)}; give a list of names of measures.")
-        self.measures = [get(one) for one in listed]
-        names = [one.name for one in self.measures]
+        self.measures = [get(name) for name in listed]
+        names = [measure.name for measure in self.measures]
         for name in names:
             if names.count(name) > 1:
                 raise AntsError(f"measures has {name!r} more than once; remove one of them.")
         self.every = None if every is None else checked_whole("every", every)
         if self.every is not None and not self.measures:
             raise AntsError(f"every is {every}, but measures is empty; name at least one measure.")
+        for measure in self.measures:
+            if measure.of == RUN:
+                measure.check_single_state("measures")
         # Measures whose values the series of others need.
-        self._sources = {one.of: get(one.of) for one in self.measures if one.of is not None}
+        self._sources = {
+            str(measure.of): get(str(measure.of))
+            for measure in self.measures
+            if measure.reads_series
+        }
         self._rows: list[Row] = []
         self._units: dict[str, str] = {}
         self._episode = 0
@@ -140,12 +147,10 @@ class Recorder:
             for name, source in self._sources.items():
                 self._earlier.setdefault((world, name), []).append(source(snapshot))
             for measure in self.measures:
-                given: list[Any] = [snapshot]
-                if measure.of is not None:
-                    given.insert(0, np.array(self._earlier[world, measure.of]))
-                value = measure.value(*given)
-                for name, one in _named(measure.name, value):
-                    found[name], self._units[name] = one, measure.unit
+                earlier = self._earlier.get((world, str(measure.of)))
+                value = measure.read(snapshot, None if earlier is None else np.array(earlier))
+                for name, number in _named(measure.name, value):
+                    found[name], self._units[name] = number, measure.unit
             self._rows.append(Row(world, self._episode, tick, found))
 
     def series(self) -> Series | None:

@@ -1,10 +1,9 @@
-"""Results as tidy rows, one value a row, for pandas, Parquet, CSV, summaries and figures."""
+"""Results as tidy rows, one value a row, for pandas, Parquet and CSV."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +12,7 @@ from taichi_ants import files
 from taichi_ants.errors import AntsError, imported
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import pandas
-    from matplotlib.figure import Figure
-
-    from taichi_ants.analysis.results import Summary
 
 
 @dataclass(frozen=True)
@@ -97,20 +91,6 @@ class Tidy:
         table = arrow.table(columns)
         files.write_atomically(path, lambda file: parquet.write_table(table, file))
 
-    def summary(self, last: int | None = None) -> Summary:
-        """Return means over seeds with 95 % intervals, for each configuration and measure.
-
-        The value of a seed is its mean over episodes, at the last tick of each.
-
-        Args:
-            last: The number of episodes to use, from the last one; None uses all.
-        """
-        return _presentation().summary(self, last)
-
-    def plot(self, *measures: str, path: str | Path | None = None) -> Figure:
-        """Return a figure of means over seeds with 95 % intervals; see `taichi_ants.plot`."""
-        return _presentation().plot(self, *measures, path=path)
-
 
 def seed_array(seeds: Any) -> np.ndarray:
     """Return seeds as int64, or as Python integers if one does not fit."""
@@ -151,10 +131,3 @@ def last_rows(table: Measured) -> np.ndarray:
     last = np.zeros(len(ticks), ticks.dtype)
     np.maximum.at(last, which.ravel(), ticks)
     return ticks == last[which.ravel()]
-
-
-def _presentation() -> Any:
-    """Return the module of figures and intervals."""
-    import taichi_ants  # here, because `analysis` builds on the results that use this module
-
-    return import_module(".results", taichi_ants.analysis.__name__)

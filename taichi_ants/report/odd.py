@@ -13,12 +13,12 @@ from typing import Any
 
 from taichi_ants import files, learners
 from taichi_ants.analysis.colony.study import OF_STUDY
-from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
 from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
+from taichi_ants.measures import finished
 from taichi_ants.settings import Setting, declared, flat
 from taichi_ants.studies.design import axes_of
-from taichi_ants.studies.sweep_file import declaration_of, measure_of
+from taichi_ants.studies.sweep_file import declaration_of
 from taichi_ants.task import observations
 
 Row = tuple[str, ...]
@@ -209,11 +209,11 @@ class Model:
     def measures(self) -> Iterator[Row]:
         """Yield the names and meanings of the measures."""
         if "measures" not in self.settings:
-            several = OF_STUDY if self.of_colony else {n: one.words for n, one in OF_RUNS.items()}
+            several = OF_STUDY if self.of_colony else {n: m.label for n, m in finished.LONE.items()}
             yield from ((f"`{name}`", words) for name, words in several.items())
         for name in _list_of(self.settings.get("measures", [])):
             try:
-                words = measure_of("colony" if self.of_colony else "runs", name).words
+                words = finished.of_runs("colony" if self.of_colony else "runs", name).label
             except AntsError:
                 words = "of a plugin"
             yield f"`{name}`", words

@@ -23,6 +23,7 @@ from taichi_ants.analysis import searches, style, sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, imported, shown
 from taichi_ants.files.results import REPORT, ROWS
+from taichi_ants.measures import finished
 from taichi_ants.settings import flat, nested, not_a_setting
 from taichi_ants.studies import design, sweep
 from taichi_ants.studies.blocks import Blocks
@@ -36,7 +37,6 @@ from taichi_ants.studies.sweep_file import (
     axes_of,
     check_training,
     contents,
-    measure_of,
 )
 
 if TYPE_CHECKING:
@@ -342,7 +342,7 @@ class Search:
         files.write_text(folder / BEST, self.best_file(found))
         files.write_text(folder / REPORT, self._report(found, rows))
         if draws:
-            words = measure_of(self.base.kind, self.measure).words
+            words = finished.of_runs(self.base.kind, self.measure).label
             names, logs = list(design.varying(self.axes)), design.logarithmic(self.axes)
             path = folder / sweep.FIGURES / "search.png"
             files.check_writable_folder(path.parent)
