@@ -38,7 +38,7 @@ Counts = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Run:
-    """What measures of finished runs read.
+    """The counts of finished runs, which measures of runs read.
 
     Attributes:
         training: The counts of each training episode of lone ants by name, integer (..., episodes):

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Any
 
-from taichi_ants.errors import AntsError, check_one_of, expect, shown, unusable
-from taichi_ants.rules.inputs import KINDS, Input, input_of
-from taichi_ants.rules.language import LanguageError, kernel_source
-from taichi_ants.rules.rule import BUILT_IN, RULES, Parameters, Rule, try_in_python
-from taichi_ants.settings import Is
+from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.rules.inputs import KINDS
+from taichi_ants.rules.rule import BUILT_IN, RULES, Rule, rule_of, try_in_python
 
 get = RULES.get
 
@@ -52,7 +49,7 @@ def register(
                 f"{called!r} is the name of a rule of the kind {RULES.yours[called].kind!r}; "
                 "choose another name."
             )
-        rule = _rule(called, kind, function, twin, summary)
+        rule = rule_of(called, kind, function, twin, summary)
         try_in_python(rule)
         RULES.add(called, rule)
         return function
@@ -73,64 +70,3 @@ def names(kind: str | None = None) -> tuple[str, ...]:
 def words(kind: str) -> tuple[str, ...]:
     """Return all words that name a rule of a kind: the built-in ones, then yours."""
     return (*BUILT_IN[kind], *names(kind))
-
-
-def _rule(
-    name: str,
-    kind: str,
-    function: Callable[..., Any],
-    twin: Callable[..., Any] | None,
-    summary: str,
-) -> Rule:
-    inputs: dict[str, Input] = {}
-    arguments = inspect.signature(function).parameters
-    for argument in arguments.values():
-        if argument.kind is not argument.POSITIONAL_OR_KEYWORD:
-            raise AntsError(f"the rule {name!r} has the argument {argument}; use plain arguments.")
-        if argument.default is argument.empty:
-            read = input_of(kind, argument.name)
-            if read is None:
-                more = "".join(f", {start}FIELD" for start in KINDS[kind].of_fields)
-                raise AntsError(
-                    f"the rule {name!r} has the argument {argument.name!r}, which is not an input "
-                    f"of the kind {kind!r}; choose from {', '.join(KINDS[kind].inputs)}{more}, or "
-                    "give it a default, which makes it a parameter."
-                )
-            inputs[argument.name] = read
-    if twin is not None and list(inspect.signature(twin).parameters) != list(arguments):
-        raise AntsError(
-            f"twin of the rule {name!r} is {shown(twin)}; it must have the same arguments in the "
-            "same order."
-        )
-    settings = _settings(name, function)
-    rule = Rule(name, kind, function, twin or function, inputs, settings, "", summary)
-    lengths = {a: inputs[a].length if a in inputs else 0 for a in arguments}
-    try:
-        return replace(rule, source=kernel_source(function, lengths))
-    except LanguageError as error:
-        raise unusable(rule, error) from None
-
-
-def _settings(name: str, function: Callable[..., Any]) -> type[Parameters]:
-    """Return a class of settings for the arguments of a function with defaults."""
-    hints, parameters = get_type_hints(function, include_extras=True), {}
-    for argument in inspect.signature(function).parameters.values():
-        if argument.default is not argument.empty:
-            hint = hints.get(argument.name, type(argument.default))
-            if get_origin(hint) is not Annotated:
-                hint = Annotated[hint, Is("parameter")]
-            if get_args(hint)[0] not in (int, float):
-                raise AntsError(
-                    f"the parameter {argument.name!r} of the rule {name!r} is "
-                    f"{argument.default!r}; declare a whole number (int) or a number (float)."
-                )
-            parameters[argument.name] = hint, argument.default
-    body = {
-        "__doc__": f"The parameters of the rule {name!r}.",
-        "__annotations__": {parameter: hint for parameter, (hint, _) in parameters.items()},
-        **{parameter: default for parameter, (_, default) in parameters.items()},
-    }
-    subclass: Any = type(name, (Parameters,), body, path=f"task.rules.{name}")
-    settings = dataclass(frozen=True)(subclass)
-    settings()  # checks the defaults
-    return settings

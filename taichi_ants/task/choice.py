@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from taichi_ants.rules.registry import BUILT_IN, Rule, own, words
+from taichi_ants.rules.registry import own, words
+from taichi_ants.rules.rule import BUILT_IN, Rule
 from taichi_ants.settings import Is, Settings, Share
 
 if TYPE_CHECKING:

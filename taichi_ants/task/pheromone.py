@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Literal, TypeVar, get_args
 
-from taichi_ants.rules.registry import BUILT_IN, Rule, own, words
+from taichi_ants.rules.registry import own, words
+from taichi_ants.rules.rule import BUILT_IN, Rule
 from taichi_ants.settings import Is, Settings
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 

@@ -11,7 +11,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.rules.inputs import LABOUR
-from taichi_ants.rules.registry import Parameters, Rule, own, words
+from taichi_ants.rules.registry import own, words
+from taichi_ants.rules.rule import Parameters, Rule
 from taichi_ants.settings import Is, Named, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in

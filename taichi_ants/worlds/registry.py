@@ -43,7 +43,7 @@ def register(name: str, builder: Builder) -> None:
         raise AntsError(
             f"the builder of {shown(name)} is {shown(builder)}; it must be a function of a seed."
         )
-    for argument in inspect.signature(builder).parameters.values():
+    for argument in _arguments(builder).values():
         if argument.default is argument.empty and argument.name != "seed":
             raise AntsError(
                 f"the argument {argument.name} of the builder of {name!r} has no default; give it "
@@ -54,8 +54,11 @@ def register(name: str, builder: Builder) -> None:
 
 def is_drawn(name_or_path: str | os.PathLike[str]) -> bool:
     """Return whether a world depends on a seed; the paper's, bridges and map files do not."""
-    is_named = name_or_path in names()
-    return is_named and "seed" in inspect.signature(WORLDS.get(str(name_or_path))).parameters
+    return name_or_path in names() and "seed" in _arguments(WORLDS.get(str(name_or_path)))
+
+
+def _arguments(builder: Builder) -> dict[str, inspect.Parameter]:
+    return dict(inspect.signature(builder).parameters)
 
 
 def settings_of(name: str) -> tuple[Setting, ...]:
@@ -82,7 +85,7 @@ def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) 
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)
     builder = WORLDS.get(name_or_path) if name_or_path in names() else None
-    allowed = {*inspect.signature(builder).parameters} - {"seed"} if builder else set()
+    allowed = _arguments(builder).keys() - {"seed"} if builder else set()
     for name in settings:
         if name not in allowed:
             of = f"the world {shown(name_or_path)}"
