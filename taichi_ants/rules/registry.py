@@ -57,7 +57,7 @@ def register(
     return add
 
 
-def own(kind: str, name: str) -> Rule | None:
+def registered(kind: str, name: str) -> Rule | None:
     """Return your rule of this name; None for the built-in rules of a kind."""
     return None if name in BUILT_IN[kind] else get(name)
 
