@@ -204,7 +204,7 @@ def plot(
     named = results if isinstance(results, Mapping) else {"result": results}
     _check_results(named)
     table = _together({name: result.measured() for name, result in named.items()})
-    names = [part for name in measures for part in parts_of(table, name)] or list(table.usual)
+    names = [part for name in measures for part in parts_of(table, name)] or list(table.plotted)
     if not names:
         raise AntsError(_NO_NUMBERS)
     if len(table.groups) > _MOST_LINES:
@@ -268,7 +268,7 @@ def _together(tables: Mapping[str, Measured]) -> Measured:
         of_group=np.concatenate(of_group),
         seeds=first.seeds,
         groups=tuple(groups),
-        usual=tuple(name for name in first.usual if name in common),
+        plotted=tuple(name for name in first.plotted if name in common),
         units=first.units,
     )
 

@@ -222,8 +222,8 @@ def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
     stray = np.flatnonzero(grids != grid)
     if len(stray):
         raise AntsError(
-            f"{drawn[stray[0]].described(source)}, which is between two cells; place the cells of a "
-            "line four columns apart, and offset neighbouring lines by two columns."
+            f"{drawn[stray[0]].described(source)}, which is between two cells; place the cells of "
+            "a line four columns apart, and offset neighbouring lines by two columns."
         )
     return np.stack([(r - rows + grid % 2) // 2, r], axis=1)
 

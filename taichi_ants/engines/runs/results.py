@@ -267,7 +267,7 @@ def _measured(
         of_group=configurations,
         seeds=seeds,
         groups=groups,
-        usual=("returns", "deliveries", "steps"),
+        plotted=("returns", "deliveries", "steps"),
         units={"steps": "ticks", **{name: measures.get(name).unit for name in read}},
     )
 
