@@ -17,7 +17,7 @@ def register(
     kind: str,
     *,
     name: str | None = None,
-    twin: Callable[..., Any] | None = None,
+    reference: Callable[..., Any] | None = None,
     summary: str = "",
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return a decorator that registers a function as a rule and returns the function.
@@ -27,7 +27,7 @@ def register(
     Args:
         kind: "choice", "deposit", "evaporation" or "reward".
         name: The name of the rule, by default that of the function.
-        twin: Another function of the same arguments, which the reference calls instead.
+        reference: Another function of the same arguments, which the reference calls instead.
         summary: A short description.
 
     Raises:
@@ -49,7 +49,7 @@ def register(
                 f"{called!r} is the name of a rule of the kind {RULES.yours[called].kind!r}; "
                 "choose another name."
             )
-        rule = rule_of(called, kind, function, twin, summary)
+        rule = rule_of(called, kind, function, reference, summary)
         try_in_python(rule)
         RULES.add(called, rule)
         return function

@@ -12,7 +12,7 @@ from taichi_ants.errors import AntsError, shown, unusable
 from taichi_ants.registry import Registry
 from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of, values_shown
 from taichi_ants.rules.language import LanguageError, kernel_source
-from taichi_ants.settings import Is, Settings, declared
+from taichi_ants.settings import Setting, Settings, declared
 
 TRIES = 2000  # drawn sets of inputs with which `register` tries a rule
 BUILT_IN = {
@@ -49,7 +49,7 @@ class Rule:
             the field NAME in the three cells ahead, and `level_NAME` is that of the ant's own cell.
             In "deposit", `level_NAME` is that of the cell of the deposit.
             Arguments with a default are parameters, whole numbers or floats.
-        twin: The function that the reference calls; `function` itself unless another one is given.
+        reference: The Python function that the reference calls; by default, `function` itself.
         inputs: The inputs by name, in the order of the arguments.
         settings: The class of the parameters.
         source: The source of the function for kernels.
@@ -59,7 +59,7 @@ class Rule:
     name: str
     kind: str
     function: Callable[..., Any]
-    twin: Callable[..., Any]
+    reference: Callable[..., Any]
     inputs: Mapping[str, Input]
     settings: type[Parameters]
     source: str
@@ -76,12 +76,12 @@ class Rule:
         return tuple(dict.fromkeys(filter(None, map(field_of, self.inputs))))
 
     def result(self, inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> float:
-        """Return the result of the twin; it is limited to the range of the kind.
+        """Return the result of the Python function; it is limited to the range of the kind.
 
         Actions and rewards are rounded down. A result that is not a number counts as the smallest.
         """
         numbers = {name: float(value) for name, value in parameters.items()}
-        kind, result = KINDS[self.kind], float(self.twin(**inputs, **numbers))
+        kind, result = KINDS[self.kind], float(self.reference(**inputs, **numbers))
         result = min(max(result, kind.least), kind.most) if result == result else kind.least
         return math.floor(result) if kind.is_whole else result
 
@@ -101,7 +101,7 @@ def rule_of(
     name: str,
     kind: str,
     function: Callable[..., Any],
-    twin: Callable[..., Any] | None,
+    reference: Callable[..., Any] | None,
     summary: str,
 ) -> Rule:
     """Return a rule; AntsError if kernels cannot compute it, or an argument is not an input."""
@@ -120,13 +120,13 @@ def rule_of(
                     "give it a default, which makes it a parameter."
                 )
             inputs[argument.name] = read
-    if twin is not None and list(inspect.signature(twin).parameters) != list(arguments):
+    if reference is not None and list(inspect.signature(reference).parameters) != list(arguments):
         raise AntsError(
-            f"twin of the rule {name!r} is {shown(twin)}; it must have the same arguments in the "
-            "same order."
+            f"reference of the rule {name!r} is {shown(reference)}; it must have the same "
+            "arguments in the same order."
         )
     settings = _settings(name, function)
-    rule = Rule(name, kind, function, twin or function, inputs, settings, "", summary)
+    rule = Rule(name, kind, function, reference or function, inputs, settings, "", summary)
     lengths = {a: inputs[a].length if a in inputs else 0 for a in arguments}
     try:
         return replace(rule, source=kernel_source(function, lengths))
@@ -141,7 +141,7 @@ def _settings(name: str, function: Callable[..., Any]) -> type[Parameters]:
         if argument.default is not argument.empty:
             hint = hints.get(argument.name, type(argument.default))
             if get_origin(hint) is not Annotated:
-                hint = Annotated[hint, Is("parameter")]
+                hint = Annotated[hint, Setting("parameter")]
             if get_args(hint)[0] not in (int, float):
                 raise AntsError(
                     f"the parameter {argument.name!r} of the rule {name!r} is "

@@ -26,7 +26,7 @@ from taichi_ants.measures.series import stops
 from taichi_ants.settings import flat
 from taichi_ants.studies import design
 from taichi_ants.studies.blocks import Blocks, Outcome
-from taichi_ants.studies.design import GRID, Axis, Design
+from taichi_ants.studies.design import GRID, Axis, Design, Range
 from taichi_ants.studies.points import SERIES, Progress
 from taichi_ants.studies.runner import VALUE, Block, Study, values_in
 from taichi_ants.studies.sweep_file import (
@@ -44,6 +44,7 @@ SERIES_FILE, SENSITIVITY = "series.csv", "sensitivity.csv"
 _OF_SERIES = ("seed", "episode", "tick", "measure", "value")  # columns of SERIES_FILE
 _SHOW_EVERY = 100  # points
 _BYTES_OF_A_NUMBER = 20  # in a table
+_SHOWN_POINTS = 10  # of a design, in the report
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 
@@ -262,7 +263,7 @@ class Sweep:
         if self.design.kind == GRID:
             report = sweeps.report(self.settings, values, self.against, notes)
         else:
-            report = designs.first_rows(self.settings, values, f"the design {self.design.kind!r}")
+            report = self._report_on_first(values)
         indices = self.indices(values)
         if indices:
             report = f"{report}\n{sensitivity.report(indices, len(self.study.seeds))}"
@@ -277,6 +278,15 @@ class Sweep:
         if draws:
             with style.all_or_none(folder / FIGURES):
                 self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
+
+    def _report_on_first(self, values: dict[str, np.ndarray]) -> str:
+        """Return a report on the points of a design with the highest first measure."""
+        name, means = next(iter(values)), known_means(next(iter(values.values())))
+        order = np.argsort(-means, kind="stable")[:_SHOWN_POINTS]  # nan comes last
+        rows = {measure: array[order] for measure, array in values.items()}
+        table = sweeps.report([self.settings[p] for p in order], rows)
+        most = f"the {len(order)} with the highest {name}" if len(order) < len(means) else "all"
+        return f"{len(means)} points of the design {self.design.kind!r}; {most}:\n\n{table}"
 
     def indices(self, values: dict[str, np.ndarray]) -> dict[str, list[sensitivity.Index]]:
         """Return the sensitivity indices by measure, from values that `measured` returned.
@@ -298,21 +308,24 @@ class Sweep:
             if self.design.kind == GRID:
                 sweeps.draw(path, self.settings[some], values[some], words)
             else:
-                names, logs = list(design.varying(axes)), design.logarithmic(axes)
+                names = list(design.varying(axes))
+                logs = {n for n, axis in axes.items() if isinstance(axis, Range) and axis.log}
                 designs.draw(path, self.settings[some], names, logs, values[some], words)
         if indices:
             path = folder / f"sensitivity_{first}.png"
             sensitivity.draw(path, indices, words, values.shape[1])
 
 
-def read_sweep(path: Path) -> Sweep:
-    """Return the sweep of a file.
+def read_sweep(
+    path: Path, text: str | None = None, progress: Progress = lambda share: None
+) -> Sweep:
+    """Return the sweep of a file, or of its text; see `sweep_of` for `progress`.
 
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
-    with contents(path) as file:
-        return sweep_of(file)
+    with contents(path, text) as file:
+        return sweep_of(file, progress)
 
 
 def sweep_of(file: Settings, progress: Progress = lambda share: None) -> Sweep:

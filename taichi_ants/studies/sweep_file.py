@@ -17,7 +17,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
 from taichi_ants.measures.measure import RUN
 from taichi_ants.settings import (
-    Setting,
+    DeclaredSetting,
     all_of,
     declared,
     flat,
@@ -33,7 +33,7 @@ from taichi_ants.task import Task
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
 _OF_FILE = (  # keys that are not settings of points
     *("kind", "seeds", "measures", "measure_every"),
-    *("margin", "against", "vary", "search", *design.KEYS),
+    *("margin", "against", "vary", *design.KEYS),
 )
 # Attributes of points that are not settings.
 _PARTS = ("world", "task", "training", "after", "pool", "measures", "measure_every", "protocol")
@@ -229,7 +229,7 @@ def _check_amounts(name: str, values: Sequence[Any]) -> None:
         )
 
 
-def declaration_of(name: str, fixed: Settings) -> Setting | None:
+def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
     """Return the declaration of a setting; None if the task, training, world and events lack it.
 
     Also None for the short form of an intervention.
@@ -313,7 +313,7 @@ def _point(
     world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
     preset = task.pop("preset", "paper")
     check_one_of("task.preset", preset, tuple(Task.named()))
-    chosen = Task.named()[preset].but(**task)
+    chosen = Task.named()[preset].replace(**task)
     if "policy" in tree:
         key = f"{tree['policy']!r} {chosen.observation}"
         if key not in built:

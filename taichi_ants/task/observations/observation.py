@@ -1,6 +1,6 @@
 """The class of observations, which determine the state index of an ant.
 
-Actions and rewards do not depend on the observation, but on the percept, the paper's state.
+Actions and rewards do not depend on the observation, but on the paper's state.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ class Observation:
     The view of an ant has these whole numbers, except that levels are floats if trails evaporate
     exponentially or spread. Those marked (k) have an entry for each cell in `cells`.
 
-    - `carries`: 1 with food, else 0; `percept`: the paper's state, 0 to 127.
+    - `carries`: 1 with food, else 0; `paper_state`: the paper's state, 0 to 127.
     - `codes` (k): 0 E, 1 O, 2 T or S, 3 F or Q, relative to the strongest trail ahead.
     - `levels` (k): The trail level if the cell is empty or has an ant on it, else 0.
     - `ants` (k): 0 for no ant, 1 for an ant without food, 2 for an ant with food.
-    - `strangers` (k): 1 if an ant of another nest is on the cell, where `ants` is 0.
+    - `other_nest_ants` (k): 1 if an ant of another nest is on the cell, where `ants` is 0.
     - `nearer` (k): 1 if the cell is nearer to the queen than the ant's own.
     - `strongest`: The level of the strongest trail ahead; `own_level`: the ant's own cell.
     - `NAME` (k), for each NAME in `reads`: The level of this field, like `levels`; `own_NAME`: that

@@ -11,7 +11,7 @@ from typing import Any
 
 from taichi_ants.errors import expect, unusable, whole
 from taichi_ants.rules.inputs import Vector
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_CUE
 from taichi_ants.task.observations.observation import Observation
 
 _VIEWS = 3000  # the number of views, and of names of states, that a check tries
@@ -66,19 +66,19 @@ def _drawn_views(observation: Observation) -> Iterator[_View]:
         visible = trail * (ground[n] == EMPTY)
         strongest = visible[ahead].max()
         if carries[n]:
-            lure, codes = (ground[n] == EMPTY) & (nearer[n] == 1), ground[n] >> 2
+            shows_cue, codes = (ground[n] == EMPTY) & (nearer[n] == 1), ground[n] >> 2
         else:
-            lure, codes = 2 * visible >= max(strongest, 2), ground[n] & 3
-        codes[lure] = SEES_LURE
+            shows_cue, codes = 2 * visible >= max(strongest, 2), ground[n] & 3
+        codes[shows_cue] = SEES_CUE
         left, forward, right = codes[ahead]
         yield _View(
             carries=carries[n],
-            percept=carries[n] << 6 | left << 4 | forward << 2 | right,
+            paper_state=carries[n] << 6 | left << 4 | forward << 2 | right,
             codes=Vector(codes),
             levels=Vector(levels),
             strongest=strongest,
             ants=Vector(ants[n]),
-            strangers=Vector((ants[n] == 0) & (ground[n] == OBSTACLE) & (trails[n] > 1)),
+            other_nest_ants=Vector((ants[n] == 0) & (ground[n] == OBSTACLE) & (trails[n] > 1)),
             nearer=Vector(nearer[n]),
             own_level=trail[0],
             **{name: Vector(np.roll(levels, 1 + r)) for r, name in enumerate(observation.reads)},
