@@ -244,14 +244,17 @@ def names_of(kind: str) -> str:
     return ", ".join([*FINISHED[kind], *sorted(yours)]) + more
 
 
-def values_of(names: Iterable[str], run: Run) -> dict[str, np.ndarray]:
-    """Return measures of runs of lone ants by name, float64 (...) of arrays (..., episodes).
+def values_of(run: Run, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
+    """Return measures of finished runs by name, float64 (...); all those of the package for None.
 
-    If the runs have fewer episodes than a measure needs, it is nan.
+    If the runs have fewer episodes of training than a measure needs, it is nan.
     """
-    *shape, episodes = run.training["returns"].shape
-    measures = {name: of_runs("runs", name) for name in names}
+    kind = "runs" if run.ticks is None else "colony"
+    episodes = run.training["returns"].shape[-1] if run.training else 0
+    measures = {name: of_runs(kind, name) for name in names or FINISHED[kind]}
     return {
-        name: measure.computed(run) if episodes >= measure.episodes else np.full(shape, np.nan)
+        name: measure.computed(run)
+        if episodes >= measure.episodes
+        else np.full(run.evaluation["returns"].shape[:-1], np.nan)
         for name, measure in measures.items()
     }

@@ -386,7 +386,7 @@ def _measured(
 ) -> Outcome:
     """Return the measures of a block as `VALUE` arrays, and the series if they are asked for."""
     if kind == "runs":
-        columns = finished.values_of(wanted, Run.of_lone_ant(outcome))
+        columns = finished.values_of(Run.of_lone_ant(outcome), wanted)
         return {f"{VALUE}{name}": array for name, array in columns.items()}
     (point,) = points
     arrays, columns = {key: array[0] for key, array in outcome.items()}, {}
