@@ -165,7 +165,7 @@ def of(read: Read, measure: str, *variants: Variant) -> Quantity:
 
 def of_each(measure: str, variant: Variant, *reads: Read) -> Quantity:
     """Return the measure of a learner, computed in several ways."""
-    effects = {f"{variant.label}, {one.label}": _effect(one, measure, variant) for one in reads}
+    effects = {f"{variant.label}, {one.words}": _effect(one, measure, variant) for one in reads}
     return _quantity(ALL, measure, effects)
 
 
