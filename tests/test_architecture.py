@@ -19,7 +19,7 @@ import taichi_ants
 # From the ground up: a part imports parts of lower layers only. Each part stands here.
 LAYERS = (
     {"errors", "environment", "subnormals"},
-    {"files", "grid", "settings"},
+    {"files", "grid", "registry", "settings"},
     {"rules"},
     {"task"},
     {"runtime", "worlds", "learners"},

@@ -16,7 +16,7 @@ from taichi_ants import runtime
 from taichi_ants.engines.plugin_check import fault_apart, last_line
 from taichi_ants.errors import unusable
 from taichi_ants.rules.inputs import KINDS, values_shown
-from taichi_ants.rules.registry import TRIES, Rule, tries
+from taichi_ants.rules.rule import TRIES, Rule, tries
 from taichi_ants.task.rules.numbers import exponential, logarithm, power
 
 

@@ -33,7 +33,7 @@ CENTRE, RING = (0, 0, 0), [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)
 @pytest.fixture
 def script(monkeypatch):
     """Load a script, and return its names; changes to them hold for its functions."""
-    monkeypatch.setattr(learners, "_LEARNERS", dict(learners._LEARNERS))
+    monkeypatch.setattr(learners.LEARNERS, "yours", dict(learners.LEARNERS.yours))
 
     def load(name: str, **changes: Any) -> dict[str, Any]:
         names = runpy.run_path(str(EXPERIMENTS / f"{name}.py"))
