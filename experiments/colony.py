@@ -37,6 +37,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
         EVALUATION_EPSILON,
         FEW,
         JOINT,
+        OF_STUDY,
         PAPER,
         QUEUES,
         RULES,
@@ -80,7 +81,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.errors import count
     from taichi_ants.files.results import MANIFEST, REPORT
     from taichi_ants.learners.policies import load_policy, save_policy
-    from taichi_ants.measures.colonies import MEASURES, OF_STUDY, measures_of
+    from taichi_ants.measures.finished import COLONY, Run, values_of
     from taichi_ants.report.page import (
         Player,
         Shown,
@@ -132,7 +133,7 @@ POOL, FIRST_OF_POOL = 64, 1 << 20  # number of worlds for training, and the firs
 EXPLORING = 0.7  # the share of training episodes in which epsilon and the learning rate decrease
 OPTIMISM = 10.0  # the initial action value, above most true values
 # Kinds of world in which food moves or takes time to grow back.
-LIVES = {"moving": Life(regrowth=0, wander=100), "slow": Life(regrowth=100)}
+LIVES = {"moving": Life(regrowth=0, pile_move_interval=100), "slow": Life(regrowth=100)}
 RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
 _PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # number of piles; there is no other food
 SHOWN_TICKS, MOST_SHOWN = 240, 1000  # of recordings: ticks, and ants at most
@@ -296,7 +297,8 @@ def study_of(conditions: Plan, seeds: Sequence[int]) -> Study[ColonyPoint]:
 def with_measures(points: Sequence[ColonyPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
     """Return an outcome of one point with its measures."""
     (point,) = points
-    values = measures_of({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
+    run = Run.of_colony({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
+    values = values_of(run)
     return {**outcome, **{f"{VALUE}{name}": array[None] for name, array in values.items()}}
 
 
@@ -317,7 +319,7 @@ def take_results(
     for condition, several in rows.items():
         point = conditions[condition]
         columns = {name: np.array([float(row[name]) for row in several]) for name in OF_STUDY}
-        own = {name: columns[name] for name in MEASURES}
+        own = {name: columns[name] for name in COLONY}
         # Only this measure of ants that do not explore is in the results.
         calm = dict.fromkeys(own, np.full(len(several), np.nan))
         calm["deliveries"] = columns["greedy"]
@@ -344,7 +346,7 @@ def measured(
         bound, of_point = np.broadcast_to(np.array(most), seeds), values[point]
         share = of_point["deliveries"] / np.where(bound > 0, bound, np.nan)
         calm = values[greedy(point)]["deliveries"]
-        found[condition] = {**of_point, "greedy": calm, "bound": bound, "of_bound": share}
+        found[condition] = {**of_point, "greedy": calm, "bound": bound, "bound_share": share}
     return found
 
 
@@ -471,7 +473,7 @@ def colony_page(results: Results, **parts: Any) -> str:
 def _statements(judged: Judged) -> Statements:
     lines = []
     for (world_kind, series), by_sizes in judged.items():
-        unit = MEASURES[series.measure]
+        unit = COLONY[series.measure].label
         told = [
             Shown(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
             for (n, less), one in by_sizes.items()
@@ -515,7 +517,7 @@ def study(settings: argparse.Namespace) -> None:
     command_line.load_plugin(settings.plugin)
     seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
     lengths = settings.episodes, settings.ticks, settings.rollouts
-    training = learning().but(**command_line.given_settings(settings).get("training", {}))
+    training = learning().replace(**command_line.given_settings(settings).get("training", {}))
     conditions = plan(settings.world_kinds, settings.sizes, seeds, training, *lengths)
     asked = study_of(conditions, seeds)
 

@@ -37,13 +37,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
     from taichi_ants.analysis.bounds import baselines as bounds
     from taichi_ants.analysis.bounds.baselines import Baseline
-    from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, Made, trace_policies
+    from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, RolloutArguments, trace_policies
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.files import archives
     from taichi_ants.files.inputs import recorded
     from taichi_ants.files.results import MANIFEST, REPORT
     from taichi_ants.learners.policies import save_policy
-    from taichi_ants.measures.runs import MEASURES, measures_of_runs
+    from taichi_ants.measures.finished import LONE, Run, values_of
     from taichi_ants.rendering import PAUSE, Episode, colony_snapshots, frames, save_animation
     from taichi_ants.rendering.snapshots import colony_of_rollout
     from taichi_ants.report.page import made_facts, setting_facts
@@ -142,7 +142,7 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
     """Return the points of the grid, each once."""
     deliveries = DELIVERIES if settings.delivery == "both" else (settings.delivery,)
     given = given_settings(settings).get("task", {})
-    tasks = [Task().but(delivery=delivery, **given) for delivery in deliveries]
+    tasks = [Task().replace(delivery=delivery, **given) for delivery in deliveries]
     numbers = product(
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
     )
@@ -188,7 +188,7 @@ def measured(
 def with_measures(points: Sequence[RunPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
     """Return an outcome with the measures of its runs, and with what their policies do."""
     followed = what_policies_do(points[0], seeds, outcome["q_values"])
-    values = {**measures_of_runs(outcome), **followed}
+    values = {**values_of(Run.of_lone_ant(outcome)), **followed}
     return {**outcome, **{f"{VALUE}{name}": array for name, array in values.items()}}
 
 
@@ -227,7 +227,7 @@ def comparison_of(
     return Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
         seeds=study.seeds,
-        measures={name: arrays[name] for name in MEASURES},
+        measures={name: arrays[name] for name in LONE},
         behaviours=arrays["behaviours"],
         policy_returns=arrays["policy_returns"],
         episodes=first.episodes,
@@ -290,7 +290,7 @@ def do_comparison(
     """
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
     world, task, steps = first.world, first.task, first.max_steps
-    begin(rehearse, first, settings.plugin, where, settings.quick)
+    begin(warm_up, first, settings.plugin, where, settings.quick)
     discounts = tuple(dict.fromkeys(settings.discounts))
     exact = begin(bounds.bound_rows, world, task, discounts, steps)
     with chosen(settings) as how:
@@ -331,12 +331,12 @@ def do_comparison(
     return results, Seen()
 
 
-def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
+def warm_up(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
     """Compile and import all that a worker process needs to record and draw, in advance."""
     command_line.load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
-    colony = colony_of_rollout(Made(point.world, point.task, 0, 1, q_values=nothing))
+    colony = colony_of_rollout(RolloutArguments(point.world, point.task, 0, 1, q_values=nothing))
     next(frames(colony_snapshots(colony), SIZE))
     record_colony(colony, 1)
     for kind in ("png", "svg") if draws else ():

@@ -30,7 +30,7 @@ def promptly() -> float:
 
 def environment(kernels: Path, **changes: str | None) -> dict[str, str]:
     """Return environment variables that cache kernels in a folder; changes to None remove names."""
-    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    paths = [str(ROOT), str(EXPERIMENTS), *filter(None, [os.environ.get("PYTHONPATH")])]
     wanted = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(paths),
