@@ -51,11 +51,11 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies import command_line
     from taichi_ants.studies.blocks import Blocks, Outcome
     from taichi_ants.studies.command_line import given_settings, whole_number
-    from taichi_ants.studies.executors import LocalWorkers, Work
+    from taichi_ants.studies.executors import Workers
     from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.points import RunPoint
     from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.runner import VALUE, Study
+    from taichi_ants.studies.runner import VALUE, Study, Work
     from taichi_ants.task.constants import N_ACTIONS
     from taichi_ants.viewer import record_colony
 
@@ -431,7 +431,7 @@ def compare(settings: argparse.Namespace) -> None:
         study = build_study(settings)
     # A second process draws, because threads of one process would take turns.
     second = not settings.no_figures and settings.threads != 1 and runtime.available_threads() > 1
-    with LocalWorkers(1) if second else contextlib.nullcontext() as beside:
+    with Workers(1) if second else contextlib.nullcontext() as beside:
 
         def begin(call: Callable[..., Any], *given: Any, **named: Any) -> Callable[[], Any]:
             here = partial(call, *given, **named)

@@ -18,11 +18,12 @@ from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
-from taichi_ants import __version__, checks, files
-from taichi_ants.errors import AntsError, checked_whole, count, shown
+from taichi_ants import PHYSICS, checks, files
+from taichi_ants.errors import AntsError, count, shown
 from taichi_ants.studies.blocks import Blocks, Outcome
-from taichi_ants.studies.executors import Executor, Plugin, Reduce, Work, completed
+from taichi_ants.studies.executors import completed
 from taichi_ants.studies.interruption import stop_if_noted
+from taichi_ants.studies.plugins import Code
 from taichi_ants.studies.points import (
     ColonyPoint,
     PointKind,
@@ -38,6 +39,36 @@ from taichi_ants.studies.points import (
 _HOPELESS = 3  # blocks that fail, and none that succeeds: a study stops
 _NAMED = 3  # failed blocks, at most, in a message
 VALUE = "value_"  # begins the names of numbers of runs in outcomes, which functions `Reduce` make
+
+
+Reduce = Callable[[Sequence[Any], Sequence[int], Outcome], Outcome]
+
+
+@dataclass(frozen=True)
+class Work:
+    """A block as a value that can be pickled: everything that a worker needs to compute it.
+
+    Attributes:
+        points, seeds: The runs of the block; all points are `alike`.
+        learned: The tables of the point `after`, float32 (seeds, n_states, 5), or None.
+        reduce: What is kept of the outcome, a function at the top level of a module or a `partial`
+            of one; None keeps all.
+        where: The arguments `threads` and `arch` of `train`.
+    """
+
+    points: tuple[Any, ...]
+    seeds: tuple[int, ...]
+    learned: np.ndarray | None
+    reduce: Reduce | None
+    where: Mapping[str, Any]
+
+    def do(self, progress: Callable[[float], None] = lambda share: None) -> Outcome:
+        """Return the outcome, arrays (points, seeds, ...); call `progress` with shares of it."""
+        given = self.points, self.seeds, self.learned, progress, self.where
+        outcome = self.points[0].do(*given)
+        return self.reduce(self.points, self.seeds, outcome) if self.reduce else outcome
+
+    __call__ = do
 
 
 @dataclass(frozen=True)
@@ -109,7 +140,7 @@ class Study(Generic[PointKind]):
             return None if name == "world" and isinstance(value, tuple) else known[value]
 
         for point in self.in_order:
-            facts = {"version": __version__, **facts_of(point, number_of)}
+            facts = {"physics": PHYSICS, **facts_of(point, number_of)}
             known[point] = hashlib.sha256(files.to_json(facts).encode()).hexdigest()[:32]
         return tuple(known[point] for point in self.in_order)
 
@@ -149,7 +180,7 @@ class Study(Generic[PointKind]):
     @cached_property
     def weights(self) -> np.ndarray:
         """The approximate work of each run, float64 (points of `in_order`, seeds)."""
-        several = np.array([[float(one.weight)] for one in self.in_order])
+        several = np.array([[one.seconds] for one in self.in_order])
         return np.broadcast_to(several, (len(several), len(self.seeds)))
 
     def share(self, number: int, shards: int) -> np.ndarray:
@@ -246,7 +277,7 @@ class Study(Generic[PointKind]):
         rows = zip(self.keys, self.names, strict=True)
         has = np.array([[saved.has(key, name, array) for name in names] for key, names in rows])
         missing = runs & self.share(*shard) & ~has
-        total = max(self.weights[missing].sum(), 1.0)
+        total = max(self.weights[missing].sum(), 1e-9)
         for _ in self._computed(saved, missing, total, progress, **how):
             pass
 
@@ -259,9 +290,8 @@ class Study(Generic[PointKind]):
         *,
         reduce: Reduce | None = None,
         bytes_of_a_run: Callable[[Any], int] = lambda point: point.bytes_of_a_run,
-        executor: Executor | None = None,
-        in_flight: int | None = None,
-        plugins: Sequence[Plugin] = (),
+        executor: Any = None,
+        plugins: Sequence[Code] = (),
         **where: Any,
     ) -> Iterator[Block]:
         """Yield blocks of the missing runs, after they were computed and saved.
@@ -275,8 +305,6 @@ class Study(Generic[PointKind]):
             bytes_of_a_run: The upper bound on the bytes of a run of a point on disk.
             executor: The executor that computes blocks, see `studies.executors`; None computes them
                 in this process.
-            in_flight: The number of blocks that the executor has at the same time; None means
-                twice the number of its workers.
             plugins: The plugins that the workers of the executor need.
             where: The arguments `threads` and `arch` of `train`.
 
@@ -284,8 +312,6 @@ class Study(Generic[PointKind]):
             AntsError: The disk is too small for all blocks, or an argument is not allowed.
             FailedBlocksError: Some blocks cannot be computed; the others are finished.
         """
-        if in_flight is not None:
-            checked_whole("in_flight", in_flight)
         order, weights = self.in_order, self.weights
         place_of: dict[Any, int] = {point: place for place, point in enumerate(order)}
         after = [place_of.get(point.after, -1) for point in order]
@@ -321,7 +347,7 @@ class Study(Generic[PointKind]):
                 found = here(self.blocks(ready))
             else:
                 work_of = partial(self._work, saved=saved, reduce=reduce, where=where)
-                found = completed(self.blocks(ready), work_of, executor, in_flight, plugins)
+                found = completed(self.blocks(ready), work_of, executor, plugins)
             for piece, outcome in found:
                 if isinstance(outcome, Exception):
                     failed[piece] = outcome

@@ -14,7 +14,12 @@ from command_lines import ROOT, environment
 from taichi_ants import load_policy, task
 
 EXAMPLES = ROOT / "examples"
-NEEDS = {"ppo": "torch", "shared_policy": "torch", "sb3_ppo": "stable_baselines3"}
+NEEDS = {
+    "ppo": "torch",
+    "shared_policy": "torch",
+    "sb3_ppo": "stable_baselines3",
+    "search": "optuna",
+}
 
 
 def run(name: str, arguments: list[object], kernels: Path, folder: Path) -> str:
@@ -44,6 +49,15 @@ def test_q_learning_delivers_in_40_lines(kernels: Path, tmp_path: Path) -> None:
     said = run("q_learning", ["--seeds", 3], kernels, tmp_path)
     assert said == "seed 3: 50 of 50 rollouts deliver, 13.0 in 35.0 steps\n"
     assert len((EXAMPLES / "q_learning.py").read_text().splitlines()) <= 40
+
+
+@pytest.mark.slow
+def test_a_search_resumes_and_ends_with_held_out_seeds(kernels: Path, tmp_path: Path) -> None:
+    run("search", ["--trials", 2, "--journal", "stopped"], kernels, tmp_path)
+    resumed = run("search", ["--trials", 3, "--journal", "stopped"], kernels, tmp_path)
+    assert resumed == run("search", ["--trials", 3], kernels, tmp_path)
+    assert re.match(r"best of 3 trials: {'half_life': \d", resumed)
+    assert re.search(r"held-out seeds: \d+ .* against \d+, difference .* \[.*\]$", resumed)
 
 
 @pytest.mark.slow

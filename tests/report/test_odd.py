@@ -15,7 +15,6 @@ from taichi_ants.report.odd import Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
 from taichi_ants.studies.points import ColonyPoint, FixedPolicy, RunPoint
 from taichi_ants.studies.runner import Study
-from taichi_ants.studies.search import Search
 from taichi_ants.studies.sweep import read_sweep, sweep_of
 from taichi_ants.task import Field, Food, Task, foraging
 
@@ -235,16 +234,6 @@ def test_events_have_their_values_over_all_points():
     }
     assert values_in(text)["evaluation_epsilon"] == "0.25"
     assert "| `at.1.tick` | 100, 200 | ticks of the episode | time of the event |" in text
-
-
-def test_what_a_search_chooses_has_its_range_or_choices():
-    pytest.importorskip("optuna")
-    file = files.tomllib.loads((ROOT / "experiments/designs/search.toml").read_text())
-    file["policy"] = "trail_follower"
-    file["search"]["vary"] |= {"task.pheromone.view": ["half", "strongest"]}
-    found = values_in(of_facts(Search.of(file).facts(), file))
-    assert found["task.pheromone.half_life"] == "50, 10 to 10000"
-    assert found["task.pheromone.view"] == "strongest_under_carriers, half, strongest"
 
 
 def test_rows_of_tables_have_as_many_cells_as_their_heads():
