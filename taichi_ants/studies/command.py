@@ -76,34 +76,35 @@ def planned(module: str, options: Mapping[str, Any], plugin: str | None, arch: s
     Raises:
         AntsError: A file cannot be read or run, or an option is not allowed.
     """
-    code, places, salt = list[Code](), dict[str, bytes](), [module]
-    codes = {"plugin": plugin, "study": module if module.endswith(".py") else None}
-    for name, path in codes.items():
-        if path is not None:
-            code.append(read_plugin(path))
-            for place, content in placed(code[-1], Path(INPUTS, name)).items():
-                places[place.as_posix()] = content
+    file = module if module.endswith(".py") else None
+    codes = {"plugin": read_plugin(plugin), "study": read_plugin(file)}
     with recorded() as read:
         load_plugin(plugin)
-        loaded: Any = load_plugin(codes["study"]) or import_module(module)
+        loaded: Any = load_plugin(file) or import_module(module)
         own = loaded.plan(options)
+        salt = [f"study {Path(module).stem}"]
+        if file is not None:
+            salt.append(str(getattr(loaded, "VERSION", checksum_of(codes["study"]))))
+        if plugin is not None:
+            salt.append(f"plugin {checksum_of(codes['plugin'])}")
+        if arch != "cpu":  # whose last bits differ
+            salt.append(arch)
+        study = replace(getattr(own, "study", own), salt=tuple(salt))
+        assert study.keys  # which read the files of policies
+    inputs = {
+        place.as_posix(): content
+        for name, code in codes.items()
+        for place, content in placed(code, Path(INPUTS, name)).items()
+    }
     copies = dict[str, str]()
     for path, content in read.items():
         base = re.sub(r"[^\w.-]", "_", Path(path).name)
         names = (f"{INPUTS}/{f'{n}-' if n > 1 else ''}{base}" for n in itertools.count(1))
-        copies[path] = next(name for name in names if name not in copies.values())
-        places[copies[path]] = content
-    if codes["study"]:
-        version = getattr(loaded, "VERSION", None)
-        salt = [f"study {Path(module).stem} {version or checksum_of(code[-1])}"]
-    if plugin:
-        salt.append(f"plugin {checksum_of(code[0])}")
-    if arch != "cpu":  # whose last bits differ
-        salt.append(arch)
-    study = replace(getattr(own, "study", own), salt=tuple(salt))
+        copies[path] = next(name for name in names if name not in inputs)
+        inputs[copies[path]] = content
     facts = {"module": module, "options": options, "plugin": plugin, "arch": arch, "inputs": copies}
     facts["settings"] = settings_of(study.points, study.seeds) | getattr(own, "facts", dict)()
-    return Planned(loaded, own, study, code, places, facts)
+    return Planned(loaded, own, study, [*filter(None, codes.values())], inputs, facts)
 
 
 @contextmanager
@@ -210,7 +211,7 @@ def write_tables(
         arch = found.facts["arch"]
         results = Results(found.study, ready, store, made, figures, parquet, part, arch)
         files.write_text(ready / REPORT, found.module.tables(found.own, results))
-        made |= {"figures": figures, "parquet": parquet}
+        made |= {"figures": any(ready.rglob("*.png")), "parquet": parquet}
         folder.publish(place, ready, None if part else made)
 
 

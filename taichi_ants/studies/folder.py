@@ -28,6 +28,7 @@ import numpy as np
 
 from taichi_ants import PHYSICS, __version__, files
 from taichi_ants.errors import AntsError, count, shown
+from taichi_ants.settings import flat
 from taichi_ants.studies.provenance import provenance
 from taichi_ants.studies.store import BLOCKS, Arrays, Store
 from taichi_ants.studies.study import FailedBlocksError, Study, share_of, varied
@@ -36,6 +37,7 @@ STUDY, MANIFEST, REPORT, PAGE = "study.json", "manifest.json", "report.txt", "re
 INPUTS, SESSIONS = "inputs", "sessions"
 _OF_ALL = (STUDY, INPUTS, BLOCKS, SESSIONS)
 _SHOWN = 3  # values of a setting, at most, in a message
+_BESIDE_SETTINGS = "physics", "version", "plugin", "arch"  # what else determines results
 _MANY = 20  # lost values of a setting, which a design has drawn
 
 
@@ -176,10 +178,12 @@ def _lost(
 
 def _differences(before: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
     """Return in words how the settings of a folder differ from those of a study."""
-    there, here = ({**one, **one["options"], **one["settings"]} for one in (before, asked))
-    names = ("physics", "version", "plugin", "arch", *before["settings"], *asked["settings"])
+    there, here = (
+        {**{name: one[name] for name in _BESIDE_SETTINGS}, **flat(one["settings"])}
+        for one in (before, asked)
+    )
     said, others = [], []
-    for name in dict.fromkeys(names):
+    for name in dict.fromkeys([*there, *here]):
         one, other = there.get(name), here.get(name)
         if one != other and not {type(one), type(other)} & {list, dict}:
             said.append(f"{name} is {shown(one)} instead of {shown(other)}")

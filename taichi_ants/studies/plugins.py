@@ -130,7 +130,7 @@ def load_code(several: Iterable[Code]) -> None:
 
 def placed(code: Code, folder: Path) -> dict[Path, bytes]:
     """Return the contents of code by the paths that its files would have in another folder."""
-    own = Path(next(iter(code))).parent
+    own = Path(next(iter(code), "")).parent
     return {folder / Path(one).relative_to(own): content for one, content in code.items()}
 
 

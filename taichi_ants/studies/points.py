@@ -477,6 +477,10 @@ def key_of(point: Point, *more: str) -> str:
     as they are. `more` are checksums of code of the user, and other facts.
     """
     facts = {"physics": PHYSICS, "kind": point.kind, "more": more, **_changed(point)}
+    castes = {name: caste.policy for name, caste in point.task.castes.items() if caste.policy}
+    if castes:  # whose policies are named by their files
+        named = ((name, FixedPolicy.named(one, point.task)) for name, one in castes.items())
+        facts["castes"] = {name: one.sha256 for name, one in named}
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:32]
 
 
