@@ -78,7 +78,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.tables import markdown, plain_text, sentence
     from taichi_ants.errors import count
     from taichi_ants.learners.policies import save_policy
-    from taichi_ants.measures.colonies import MEASURES, measures_of
+    from taichi_ants.measures.finished import COLONY, Run, values_of
     from taichi_ants.report.page import (
         Player,
         Shown,
@@ -131,7 +131,7 @@ POOL, FIRST_OF_POOL = 64, 1 << 20  # number of worlds for training, and the firs
 EXPLORING = 0.7  # the share of training episodes in which epsilon and the learning rate decrease
 OPTIMISM = 10.0  # the initial action value, above most true values
 # Kinds of world in which food moves or takes time to grow back.
-LIVES = {"moving": Life(regrowth=0, wander=100), "slow": Life(regrowth=100)}
+LIVES = {"moving": Life(regrowth=0, pile_move_interval=100), "slow": Life(regrowth=100)}
 RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
 _PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # number of piles; there is no other food
 SHOWN_TICKS, MOST_SHOWN = 240, 1000  # of recordings: ticks, and ants at most
@@ -250,7 +250,7 @@ def plan(options: Mapping[str, Any]) -> Plan:
         AntsError: Ants cannot share a table with the learner.
     """
     given = nested({path: value for path, value in options.items() if "." in path})
-    training = learning().but(**given.get("training", {}))
+    training = learning().replace(**given.get("training", {}))
     if learners.get(training.learner).td_error is None:
         able = [name for name in learners.names() if learners.get(name).td_error]
         raise AntsError(
@@ -263,7 +263,7 @@ def plan(options: Mapping[str, Any]) -> Plan:
     conditions = conditions_of(*several, training, **{name: options[name] for name in names})
     seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
     points = *conditions.values(), *map(greedy, conditions.values())
-    return Plan(Study(points, seeds, tuple(MEASURES), measured), conditions, *several)
+    return Plan(Study(points, seeds, tuple(COLONY), measured), conditions, *several)
 
 
 def conditions_of(
@@ -314,8 +314,8 @@ def measured(
 ) -> dict[str, np.ndarray]:
     """Return the measures of the runs of one point, float64 (1, seeds)."""
     (point,) = points
-    values = measures_of({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
-    return {name: array[None] for name, array in values.items()}
+    run = Run.of_colony({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
+    return {name: array[None] for name, array in values_of(run).items()}
 
 
 def with_bounds(
@@ -338,7 +338,7 @@ def with_bounds(
         bound, of_point = np.broadcast_to(np.array(most), len(seeds)), values[point]
         share = of_point["deliveries"] / np.where(bound > 0, bound, np.nan)
         calm = values[greedy(point)]["deliveries"]
-        found[condition] = {**of_point, "greedy": calm, "bound": bound, "of_bound": share}
+        found[condition] = {**of_point, "greedy": calm, "bound": bound, "bound_share": share}
     return found
 
 
@@ -359,7 +359,7 @@ def tables(plan: Plan, runs: Runs) -> str:
     }
     if not conditions:
         raise AntsError("no condition has all of its runs yet; wait for the first ones.")
-    arrays = runs.read(*MEASURES)
+    arrays = runs.read(*COLONY)
     of_points = {p: {n: a[row] for n, a in arrays.items()} for p, row in place_of.items()}
     values = with_bounds(conditions, of_points, study.seeds)
     results = Results.of(values)
@@ -436,7 +436,7 @@ def colony_page(results: Results, **parts: Any) -> str:
 def _statements(judged: Judged) -> Statements:
     lines = []
     for (world_kind, series), by_sizes in judged.items():
-        unit = MEASURES[series.measure]
+        unit = COLONY[series.measure].label
         told = [
             Shown(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
             for (n, less), one in by_sizes.items()

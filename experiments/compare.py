@@ -39,7 +39,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.files import archives
     from taichi_ants.learners.policies import save_policy
-    from taichi_ants.measures.runs import MEASURES, measures_of_runs
+    from taichi_ants.measures.finished import LONE, Run, values_of
     from taichi_ants.report.page import made_facts, setting_facts
     from taichi_ants.settings import all_of, nested
     from taichi_ants.studies import command_line
@@ -141,7 +141,7 @@ def plan(options: Mapping[str, Any]) -> Plan:
         settings = {"seed": 0, **of_world}
         name = ", ".join([name, *(f"world {one} {value}" for one, value in settings.items())])
     seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
-    arrays = *MEASURES, "behaviours", "policy_returns", *map(figures.sums, figures.CURVES)
+    arrays = *LONE, "behaviours", "policy_returns", *map(figures.sums, figures.CURVES)
     study = Study(points, seeds, arrays, measured)
     discounts = tuple(dict.fromkeys(options["discounts"]))
     exact = process.begin(bounds.bound_rows, world, points[0].task, discounts, points[0].max_steps)
@@ -153,7 +153,7 @@ def grid(
 ) -> tuple[RunPoint, ...]:
     """Return the points; `rules` and `more` are settings of the task and of the training."""
     deliveries = DELIVERIES if options["delivery"] == "both" else (options["delivery"],)
-    tasks = [Task().but(delivery=delivery, **rules) for delivery in deliveries]
+    tasks = [Task().replace(delivery=delivery, **rules) for delivery in deliveries]
     names = "learning_rates", "discounts", "epsilons", "epsilon_decays"
     numbers = tuple(product(*(options[name] for name in names)))
     lengths = options["episodes"], options["max_steps"], ROLLOUTS
@@ -199,7 +199,7 @@ def measured(
         for name in figures.CURVES
     }
     return {
-        **measures_of_runs(outcome),
+        **values_of(Run.of_lone_ant(outcome)),
         **what_policies_do(points[0], seeds, outcome["q_values"]),
         **curves,
     }
@@ -259,7 +259,7 @@ def comparison_of(study: Study, world: str, arrays: Mapping[str, np.ndarray]) ->
     comparison = Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
         seeds=study.seeds,
-        measures={name: arrays[name] for name in MEASURES},
+        measures={name: arrays[name] for name in LONE},
         behaviours=arrays["behaviours"],
         policy_returns=arrays["policy_returns"],
         episodes=first.episodes,

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from policy_sheet import policy_sheet
 
 from paper import comparison as paper
 from paper import figures, process, report
@@ -21,7 +22,7 @@ from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
-from taichi_ants.rendering import PAUSE, Episode, frames, policy_sheet, save_animation
+from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 from taichi_ants.report.page import Picture, Player, Shown, Statement, Statements, fill
 from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint

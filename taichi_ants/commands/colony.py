@@ -154,7 +154,7 @@ def new_colony(settings: argparse.Namespace) -> Colony:
     options: dict[str, Any] = {name: getattr(settings, name) for name in names}
     seeds = range(settings.seed, settings.seed + settings.colonies)
     options["q_values"] = policy.q_values if policy else None
-    training = None if learns_nothing else _LEARNING.but(**given.get("training", {}))
+    training = None if learns_nothing else _LEARNING.replace(**given.get("training", {}))
     if learns_nothing and settings.sharing == "shared":  # the default
         options["sharing"] = "frozen"
     colony = Colony(world, task, training, seeds, **options)
@@ -168,7 +168,7 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     base = named or (policy.task if policy else queueing())
     if policy:
         base = replace(base, observation=policy.observation)
-    return base.but(**command_line.given_settings(settings).get("task", {}))
+    return base.replace(**command_line.given_settings(settings).get("task", {}))
 
 
 def main(arguments: list[str] | None = None) -> None:

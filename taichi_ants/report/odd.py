@@ -14,11 +14,10 @@ from typing import Any
 from taichi_ants import files, learners
 from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
-from taichi_ants.measures.colonies import OF_STUDY
-from taichi_ants.measures.runs import MEASURES as OF_RUNS
-from taichi_ants.settings import Setting, declared, flat
+from taichi_ants.measures import finished
+from taichi_ants.settings import DeclaredSetting, declared, flat
 from taichi_ants.studies.folder import INPUTS, asked_in, checksum_of
-from taichi_ants.studies.sweep_file import declaration_of, measure_of
+from taichi_ants.studies.sweep_file import declaration_of
 from taichi_ants.task import observations
 
 Row = tuple[str, ...]
@@ -92,7 +91,7 @@ class Model:
                 row["evaluation_epsilon"] = 0.0 if row.get("policy.name") else least
             yield row
 
-    def declaration(self, name: str, row: Mapping[str, Any]) -> Setting | None:
+    def declaration(self, name: str, row: Mapping[str, Any]) -> DeclaredSetting | None:
         """Return the declaration of a setting; None for settings of points and of plugins."""
         *group, own = name.split(".")
         if group != ["training", "hyperparameters"]:
@@ -101,7 +100,7 @@ class Model:
         several = learner in learners.names() and declared(learners.get(learner).hyperparameters)
         return next((one for one in several or () if one.name == own), None)
 
-    def uses(self, row: Mapping[str, Any], name: str, one: Setting | None) -> bool:
+    def uses(self, row: Mapping[str, Any], name: str, one: DeclaredSetting | None) -> bool:
         """Return whether a setting has an effect at a point, as far as declarations tell."""
         group, _, own = name.rpartition(".")
         if _EVENT.match(name):
@@ -197,12 +196,10 @@ class Model:
 
     def measures(self) -> Iterator[Row]:
         """Yield the names and meanings of the measures."""
-        if "measures" not in self.settings:
-            several = OF_STUDY if self.of_colony else {n: one.words for n, one in OF_RUNS.items()}
-            yield from ((f"`{name}`", words) for name, words in several.items())
-        for name in _list_of(self.settings.get("measures", [])):
+        kind = "colony" if self.of_colony else "runs"
+        for name in _list_of(self.settings.get("measures", [*finished.FINISHED[kind]])):
             try:
-                words = measure_of("colony" if self.of_colony else "runs", name).words
+                words = finished.of_runs(kind, name).label
             except AntsError:
                 words = "of a plugin"
             yield f"`{name}`", words

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
-from taichi_ants.settings import Named, Setting, Settings, declared, nested
+from taichi_ants.settings import DeclaredSetting, Named, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 from taichi_ants.studies.plugins import load_plugin as load_plugin
 from taichi_ants.studies.plugins import read_plugin as read_plugin
@@ -219,7 +219,7 @@ def add_settings(parser: Parser, base: Settings) -> None:
             add_settings(parser, value)
 
 
-def _help_of_entries(group: Setting) -> str:
+def _help_of_entries(group: DeclaredSetting) -> str:
     """Return the help of options such as --task.fields.home.level, for any name."""
     names = ", ".join(one.name.replace("_", "-") for one in declared(group.entry))
     option = f"--{group.path.replace('_', '-')}.NAME.SETTING"

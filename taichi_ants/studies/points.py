@@ -21,7 +21,7 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder, stops
-from taichi_ants.protocol import Event, When, check_queen, check_room, checked_protocol
+from taichi_ants.protocol import ProtocolEvent, When, check_queen, check_room, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
@@ -244,7 +244,7 @@ class ColonyPoint:
     evaluation_epsilon: float | None = None
     measures: tuple[str, ...] = ()
     measure_every: int | None = None
-    protocol: tuple[Event, ...] = ()
+    protocol: tuple[ProtocolEvent, ...] = ()
     during: str = "evaluation"
     kind: ClassVar[str] = "colony"
 
@@ -298,10 +298,10 @@ class ColonyPoint:
                         f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
                     ) from error
 
-    def _check_times(self, event: Event, learns: bool) -> None:
+    def _check_times(self, event: ProtocolEvent, learns: bool) -> None:
         event.times(self.ticks)
 
-    def _check_event(self, event: Event, learns: bool) -> None:
+    def _check_event(self, event: ProtocolEvent, learns: bool) -> None:
         places = self.pool if learns and self.pool else self.places_of_evaluation
         of, start = self.events(learns), (self.ants, self.capacity, self.start, False)
         capacity = checks.checked_capacity(self.task, *start)
@@ -368,7 +368,7 @@ class ColonyPoint:
             return self.evaluation_epsilon
         return 0.0 if self.policy else self.training.least_epsilon
 
-    def events(self, learns: bool) -> tuple[Event, ...]:
+    def events(self, learns: bool) -> tuple[ProtocolEvent, ...]:
         """Return the events of episodes of training or, if not `learns`, of the evaluation."""
         return self.protocol if self.during in ("both", DURING[learns]) else ()
 
@@ -492,10 +492,10 @@ def _changed(value: Any) -> Any:
         return json.loads(value.recipe)
     if isinstance(value, FixedPolicy):
         return value.sha256
-    if isinstance(value, Event):
+    if isinstance(value, ProtocolEvent):
         return value.facts()
     if isinstance(value, Mapping):  # in which the order of the names counts
-        return [[name, type(one).__name__, _changed(one)] for name, one in value.items()]
+        return [[name, _changed(one)] for name, one in value.items()]
     if hasattr(value, "__dataclass_fields__"):
         found = {one.name: getattr(value, one.name) for one in fields(value)}
         own = {one.name: found[one.name] for one in fields(value) if found[one.name] != _usual(one)}

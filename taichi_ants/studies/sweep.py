@@ -18,8 +18,8 @@ from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.files import tables as tables_of
-from taichi_ants.measures import colonies as of_colonies
-from taichi_ants.measures import runs as of_runs
+from taichi_ants.measures import Run, finished
+from taichi_ants.measures.measure import RUN
 from taichi_ants.measures.series import stops
 from taichi_ants.settings import flat
 from taichi_ants.studies import design
@@ -36,7 +36,6 @@ from taichi_ants.studies.sweep_file import (
     check_entries,
     check_training,
     contents,
-    measure_of,
 )
 
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
@@ -121,7 +120,7 @@ class Sweep:
         runs["seed"] = tables_of.column(self.study.seeds)[of]
         runs |= {name: array[at, of].astype(float) for name, array in values.items()}
         tables_of.write(results.folder / RUNS, runs, results.parquet)
-        with_iqm = [name for name in values if measure_of(self.kind, name).uses_iqm]
+        with_iqm = [name for name in values if finished.of_runs(self.kind, name).uses_iqm]
         gaps = [name for name, array in values.items() if np.isnan(array).any()]
         rows = [
             {**one, "seeds": seeds, **sweeps.centre_columns(centres, gaps)}
@@ -184,11 +183,8 @@ class Sweep:
 
     def _write_findings(self, results: Results, values: dict[str, np.ndarray]) -> str:
         """Write what compares points, and the figures; return the report."""
-        first, columns, folder = (
-            next(iter(values)),
-            sweeps.columns_of(self.settings),
-            results.folder,
-        )
+        columns, folder = sweeps.columns_of(self.settings), results.folder
+        first = next(iter(values))
         gaps = [name for name, array in values.items() if np.isnan(array).any()]
         found = self.findings(values[first])
         if self.against:
@@ -237,7 +233,7 @@ class Sweep:
     ) -> None:
         """Draw the first measure, float64 (points, seeds), in a figure for each [vary] table."""
         files.check_writable_folder(folder)
-        words = measure_of(self.kind, first).words
+        words = finished.of_runs(self.kind, first).label
         for number, (some, axes) in enumerate(zip(self.grids, self.axes, strict=True), start=1):
             path = folder / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
             if self.design.kind == GRID:
@@ -320,13 +316,13 @@ def _measured(
 ) -> Arrays:
     """Return the measures of a block, float64 (points, seeds)."""
     if kind == "runs":
-        return of_runs.measures_of_runs(outcome, wanted)
+        return finished.values_of(Run.of_lone_ant(outcome), wanted)
     (point,) = points
     arrays = {key: array[0] for key, array in outcome.items()}
-    found = of_colonies.measures_of(arrays, point.ants, point.ticks)
-    columns: Arrays = {}
-    for name in wanted:
-        columns |= {name: found[name]} if name in found else _ends(arrays, name)
+    run, columns = Run.of_colony(arrays, point.ants, point.ticks), Arrays()
+    for measure in (finished.of_runs(kind, name) for name in wanted):
+        of_run = {measure.name: measure.computed(run)} if measure.of == RUN else {}
+        columns |= of_run or _ends(arrays, measure.name)
     return {name: array[None] for name, array in columns.items()}
 
 

@@ -92,4 +92,4 @@ def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
     assert found[one]["bound"].tolist() == expected
     assert np.isnan(found[elsewhere]["bound"]).all()  # the limits do not hold where food moves
     assert found[one]["greedy"].tolist() == [800, 800]
-    assert found[one]["of_bound"] == pytest.approx(700 / np.array(expected))
+    assert found[one]["bound_share"] == pytest.approx(700 / np.array(expected))

@@ -40,7 +40,7 @@ from taichi_ants import (
 )
 from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.files import archives
-from taichi_ants.measures.runs import measures_of_runs
+from taichi_ants.measures.finished import Run, values_of
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
@@ -179,7 +179,7 @@ def test_runs_are_what_the_library_gives_in_the_order_of_the_summary(finished):
     greedy = evaluate(worlds.paper(), trained["q_values"], ROLLOUTS, SEEDS, MAX_STEPS)
     names = ("returns", "steps", "deliveries")
     outcome = trained | {f"greedy_{name}": getattr(greedy, name) for name in names}
-    expected = measures_of_runs(outcome)
+    expected = values_of(Run.of_lone_ant(outcome))
     assert arrays["return_all"].shape == (len(rows), len(SEEDS))
     for name, values in expected.items():
         np.testing.assert_array_equal(arrays[name], values, err_msg=name)
@@ -311,7 +311,7 @@ def test_what_is_prepared_beside_can_be_done(draws):
     """Nobody is told if it fails there: then all is ready later."""
     settings = module.parse_arguments(["--seeds", "1"])
     point = module.build_study(settings).points[0]
-    module.rehearse(point, None, {"threads": None, "arch": None}, draws)
+    module.warm_up(point, None, {"threads": None, "arch": None}, draws)
 
 
 def test_a_page_that_is_gone_is_made_again_from_the_other_files(copy, compare):
@@ -499,7 +499,7 @@ from taichi_ants.viewer import record_episode
 
 point = compare.build_study(compare.parse_arguments(["--seeds", "1"])).points[0]
 episode = played(point, np.zeros((point.task.n_states, N_ACTIONS), np.float32), 0)
-compare.rehearse(point, None, {"threads": 1, "arch": None}, False)
+compare.warm_up(point, None, {"threads": 1, "arch": None}, False)
 
 from taichi.lang.kernel_impl import Kernel
 materialize, late = Kernel.materialize, []

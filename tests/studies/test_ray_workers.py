@@ -22,10 +22,10 @@ from command_lines import (
     run,
     start,
 )
+from taichi_ants.studies.ray_workers import RayWorkers
 
 from taichi_ants import AntsError
 from taichi_ants.studies import executors, ray_workers
-from taichi_ants.studies.ray_workers import RayWorkers
 
 SWEEP = """
 kind = "runs"
