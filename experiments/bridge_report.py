@@ -17,7 +17,6 @@ from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import Table, interval, number, plain_text, sentence
 from taichi_ants.errors import count
-from taichi_ants.files.results import REPORT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,16 +111,16 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
 
 def write_results(
     folder: Path, found: Crossings, seeds: Sequence[int], ticks: int, draws: bool
-) -> None:
-    """Write counts, report and, if `draws`, figures of evaluations of `ticks` ticks."""
+) -> str:
+    """Write counts and, if `draws`, figures of evaluations of `ticks` ticks; return the report."""
     table = rows(found, seeds, ticks)
     files.write_csv(folder / "shares.csv", table, list(table[0]))
-    files.write_text(folder / REPORT, report(found, ticks))
     if draws:
         figures = files.check_writable_folder(folder / "figures")
         with style.all_or_none(figures):
             draw(figures / "bridge.png", found, ticks)
             draw_late(figures / "late.png", found, ticks)
+    return report(found, ticks)
 
 
 def report(found: Crossings, ticks: int) -> str:

@@ -486,17 +486,3 @@ class Results(NamedTuple):
     def of(cls, measured: Measured) -> Results:
         """Return the results of all measures."""
         return cls(condition_rows(measured), judge_all(measured))
-
-    @classmethod
-    def read(cls, seeds: Sequence[Mapping]) -> Results:
-        """Return the results from the rows of seeds.csv."""
-        by_condition: dict[Condition, list[Mapping]] = {}
-        for row in seeds:
-            condition = Condition(row["world_kind"], row["rules"], row["regime"], int(row["ants"]))
-            by_condition.setdefault(condition, []).append(row)
-        return cls.of(
-            {  # an empty field is None, which is nan as a float
-                one: {name: np.array([row[name] for row in rows], float) for name in OF_STUDY}
-                for one, rows in by_condition.items()
-            }
-        )

@@ -208,7 +208,8 @@ def write_tables(
     made = provenance(sys.argv) | {"seconds": seconds}
     with files.writing(place), files.unfinished(place / "tables") as ready:
         ready.mkdir()
-        results = Results(found.study, ready, store, made, figures, parquet, part)
+        arch = found.facts["arch"]
+        results = Results(found.study, ready, store, made, figures, parquet, part, arch)
         files.write_text(ready / REPORT, found.module.tables(found.own, results))
         made |= {"figures": any(ready.rglob("*.png")), "parquet": parquet}
         folder.publish(place, ready, None if part else made)

@@ -49,6 +49,7 @@ class Results:
         made: The command, time, source, versions and machine, for pages.
         figures, parquet: Whether to draw figures, and to write Parquet files too.
         part: Whether runs can be missing.
+        arch: The processor of the simulation.
     """
 
     study: Study
@@ -58,6 +59,7 @@ class Results:
     figures: bool = True
     parquet: bool = False
     part: bool = False
+    arch: str = "cpu"
 
     def read(self, *arrays: str, points: Sequence[int] | None = None) -> Arrays:
         """Return arrays with their parts, (points, seeds, ...), of some points or of all.
