@@ -19,9 +19,9 @@ from command_lines import (
     contents,
     load,
 )
+from taichi_ants.studies.runner import Study
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
-from taichi_ants.studies.runner import Study
 from taichi_ants.task import foraging, queueing
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2

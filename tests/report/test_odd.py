@@ -8,13 +8,13 @@ import re
 import numpy as np
 import pytest
 from command_lines import ROOT
+from taichi_ants.studies.runner import Study
 
 from taichi_ants import AntsError, TrainingConfig, files, worlds
 from taichi_ants.protocol import At, Every
 from taichi_ants.report.odd import Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
 from taichi_ants.studies.points import ColonyPoint, FixedPolicy, RunPoint
-from taichi_ants.studies.runner import Study
 from taichi_ants.studies.sweep import read_sweep, sweep_of
 from taichi_ants.task import Field, Food, Task, foraging
 
