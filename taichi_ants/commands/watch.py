@@ -25,12 +25,12 @@ from taichi_ants.studies.command_line import (
     PLUGIN,
     THREADS,
     Parser,
-    load_plugin,
     progress_bar,
     run_command,
     whole_number,
 )
 from taichi_ants.studies.interruption import stop_if_noted
+from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Life, queueing
 
 if TYPE_CHECKING:

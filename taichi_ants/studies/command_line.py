@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from taichi_ants.errors import AntsError, without_middle
 from taichi_ants.settings import DeclaredSetting, Named, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
-from taichi_ants.studies.plugins import load_plugin as load_plugin
-from taichi_ants.studies.plugins import read_plugin as read_plugin
 
 if TYPE_CHECKING:
     from taichi_ants import World

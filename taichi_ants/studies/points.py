@@ -20,11 +20,11 @@ from taichi_ants import PHYSICS, __version__, checks, files, learners, measures,
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.measures.series import Recorder, stops
+from taichi_ants.measures.series import Recorder
 from taichi_ants.protocol import ProtocolEvent, When, check_queen, check_room, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
+from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, ROW
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
@@ -134,15 +134,6 @@ class RunPoint:
         """The approximate time of a seed on one processor."""
         return (self.episodes or self.rollouts) * self.max_steps / _STEPS_OF_A_SECOND
 
-    @property
-    def bytes_of_a_run(self) -> int:
-        """The approximate upper bound on the bytes of one seed's outcome on disk."""
-        most = self.max_steps * self.task.rewards.largest
-        ends = (-most, most), (0, self.max_steps), (0, 1)
-        of_an_episode = sum(files.smallest(np.array(one)).itemsize for one in ends)
-        numbers = (self.episodes + self.rollouts) * of_an_episode
-        return numbers + 4 * self.task.n_states * N_ACTIONS + 8
-
     @staticmethod
     def do(
         points: Sequence[RunPoint],
@@ -228,7 +219,7 @@ class ColonyPoint:
         AntsError: A value is not allowed.
     """
 
-    world: World | Drawn | tuple[World, ...]
+    world: World | Drawn
     task: Task
     training: TrainingConfig
     pool: tuple[World, ...] | None = None
@@ -322,9 +313,7 @@ class ColonyPoint:
     @property
     def places_of_evaluation(self) -> tuple[World, ...]:
         """The worlds of the evaluation that checks look at: one, if each seed draws its own."""
-        if isinstance(self.world, Drawn):
-            return (self.world.of(0),)
-        return self.world if isinstance(self.world, tuple) else (self.world,)
+        return (self.world.of(0) if isinstance(self.world, Drawn) else self.world,)
 
     alike = property(lambda self: self)  # each point has its own blocks
 
@@ -353,13 +342,6 @@ class ColonyPoint:
         )
         ticks = self.ticks * (self.episodes + self.rollouts)
         return (self.ants + cells) * ticks / _TICKS_OF_A_SECOND
-
-    @property
-    def bytes_of_a_run(self) -> int:
-        """The approximate upper bound on the bytes of one seed's outcome on disk."""
-        rows = len(self.measures) * len(list(stops(self.ticks, self.measure_every)))
-        numbers = 8 * (len(_COLONY_ARRAYS) + rows) * self.rollouts
-        return numbers + 4 * self.task.n_states * N_ACTIONS
 
     @property
     def exploration(self) -> float:

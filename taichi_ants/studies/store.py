@@ -13,10 +13,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import secrets
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -96,16 +96,10 @@ class Store:
         """Write a block of runs; AntsError if it cannot be written."""
         header = json.dumps([list(points), list(seeds), list(arrays)])
         path = self.folder / f"{hashlib.sha256(header.encode()).hexdigest()[:32]}.npz"
-        part = self.folder / f".{secrets.token_hex(8)}.part"
-        content: Mapping[str, np.ndarray] = {_ABOUT: np.array(header), **arrays}
+        content: dict[str, Any] = {_ABOUT: np.array(header), **arrays}
         with files.writing(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
-            try:
-                with open(part, "wb") as file:
-                    np.savez(file, **content)  # type: ignore[arg-type]
-                os.replace(part, path)
-            finally:
-                part.unlink(missing_ok=True)
+        files.write_atomically(path, lambda file: np.savez(file, **content))
         self._held[path.name] = Held(path, tuple(points), tuple(seeds), tuple(arrays))
 
     def read(
@@ -142,7 +136,7 @@ class Store:
 
     def _arrays(self, one: Held, names: Sequence[str]) -> Arrays:
         try:
-            with np.load(one.path, allow_pickle=False) as file:
+            with _opened(one.path) as file:
                 several = (part for name in names for part in parts_of(name, one.arrays))
                 return {name: file[name] for name in several}  # zipfile checks their CRC-32
         except MemoryError:
@@ -161,10 +155,17 @@ class Store:
             os.replace(path, path.with_suffix(".damaged"))
 
 
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Yield the arrays of a regular file, which are read when they are asked for."""
+    with files.opened(path) as file, np.load(file, allow_pickle=False) as arrays:
+        yield arrays
+
+
 def _header(path: Path) -> Held | None:
     """Return what a file holds; None if it is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with _opened(path) as file:
             points, seeds, arrays = json.loads(str(file[_ABOUT]))
             is_whole = set(file.files) == {_ABOUT, *arrays}
         return Held(path, tuple(points), tuple(seeds), tuple(arrays)) if is_whole else None

@@ -208,9 +208,10 @@ def run(
         progress(1.0 - max(0.0, left - more) / max(total, 1e-9))
 
     show()
-    for one, runs in stages:
+    for number, (one, runs) in enumerate(stages):
         work = partial(_work, one, store, where, None if executor else show)
         wanted = runs & one.missing(store)  # the stage before has computed some of them
+        left = one.seconds[wanted].sum() + sum(s.seconds[r].sum() for s, r in stages[number + 1 :])
         for block, outcome in completed(list(one.blocks(wanted)), work, executor, code):
             if isinstance(outcome, Exception):
                 failed.append(f"{one.named(block)} ({_said(outcome)})")

@@ -414,7 +414,7 @@ def test_all_that_determines_results_changes_the_key():
     assert key_of(replace(POINTS[0])) == key_of(POINTS[0])
 
 
-MODEL = Task(life=Life(births=True)).but(
+MODEL = Task(life=Life(births=True)).replace(
     traffic="following", noise={"slip": 0.1}, fields={"home": {"level": 9}}
 )
 GOLDEN = {
@@ -447,7 +447,7 @@ KEYS = {
     "drawn": "c01e1a3a2d6e90b12d4a29f9a27b8b2c",
     "copies": "7294b20c6e665c15c86b96b266a30b29",
     "pool": "60b1fc0f3c9846ff46d786de74631b50",
-    "model": "658512bd431403dabd5a1f5b317e912b",
+    "model": "28ad4587b098e26341d6fff7a71a2551",
     "protocol": "a0ab1efc8cf6f7c041192fab1b4deea4",
 }
 

@@ -24,8 +24,8 @@ from command_lines import assert_one_sentence, load
 
 from taichi_ants import Task, files
 from taichi_ants.analysis.bounds import baselines
-from taichi_ants.files import results as result_files
-from taichi_ants.studies import result_folder
+from taichi_ants.studies import command as studies_command
+from taichi_ants.studies import folder
 from taichi_ants.studies.points import ColonyPoint, RunPoint
 
 KILLED, WENT_ON = 77, 78  # exit statuses
@@ -40,10 +40,11 @@ def remember(patch: pytest.MonkeyPatch) -> None:
     ):
         known = _remembered(getattr(owner, name))
         patch.setattr(owner, name, staticmethod(known) if isinstance(owner, type) else known)
-    made = result_folder.provenance(["command"])
-    patch.setattr(result_folder, "provenance", lambda arguments: made)
-    patch.setattr(result_folder, "time", SimpleNamespace(perf_counter=lambda: 0.0))
-    patch.setattr(result_files, "seconds_of", lambda folder: 0.0)
+    made = folder.provenance(["command"])
+    for module in (folder, studies_command):
+        patch.setattr(module, "provenance", lambda arguments: dict(made))
+    patch.setattr(studies_command, "time", SimpleNamespace(perf_counter=lambda: 0.0))
+    patch.setattr(folder, "sessions_in", lambda place: [])
 
 
 def _remembered(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -75,10 +76,16 @@ def run(name: str, arguments: Sequence[object], out: io.StringIO | None = None) 
 
 
 def everything(folder: Path) -> dict[str, bytes | None]:
-    """Return all files with their contents, and all folders as None, below a folder."""
+    """Return all files with their contents, and all folders as None, below a folder of results.
+
+    Without what depends on the number of processes: how runs were cut into blocks, the sessions,
+    and unfinished files, which later processes remove.
+    """
     return {
         str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None
         for path in sorted(folder.rglob("*"))
+        if path.relative_to(folder).parts[0] not in ("blocks", "sessions")
+        and not path.relative_to(folder).parts[0].startswith(".")
     }
 
 
