@@ -58,7 +58,6 @@ NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
 DESIGN = "tests/studies/test_design.py"
 SENSITIVITY = "tests/analysis/test_sensitivity.py"
-SEARCH = "tests/studies/test_search.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
@@ -197,11 +196,16 @@ MUTATIONS = [
     ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", ROLLOUT),
     ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
     ("envs/vector.py", "else rows.any(0)", "else rows[-1]", ROLLOUT),
-    ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
+    ("engines/runs/kernels.py", "= paper_state, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
     ("engines/colony/life.py", "tick >= taken + waits", "tick > taken + waits", COLONY),
-    ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
+    (
+        "engines/colony/life.py",
+        "(tick + 1) % c.pile_move_interval",
+        "tick % c.pile_move_interval",
+        COLONY,
+    ),
     ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),
     (
         "engines/colony/life.py",
@@ -372,7 +376,7 @@ MUTATIONS = [
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "made[one.name] = one.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
-    # Designs and searches.
+    # Designs.
     ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
     ("studies/design.py", "random_base2(whole)[: self.samples]", "random_base2(whole)", DESIGN),
@@ -380,16 +384,6 @@ MUTATIONS = [
     ("analysis/sensitivity.py", "- drawn.mean(axis=0)", "", SENSITIVITY),
     ("analysis/sensitivity.py", "(seeds - 1)) / seeds", "(seeds - 1))", SENSITIVITY),
     ("analysis/sensitivity.py", '"seed": RANDOM_SEED', '"seed": 0', SENSITIVITY),
-    ("studies/search.py", "SeedSequence((self.seed, number))", "SeedSequence(self.seed)", SEARCH),
-    (
-        "studies/search.py",
-        "world=point.world[at]",
-        "world=point.world[: at.stop - at.start]",
-        SEARCH,
-    ),
-    ("studies/search.py", "max(seeds) + 1, max(seeds) + 1 + n", "n", SEARCH),
-    ("studies/search.py", "sign * (best - default)", "best - default", SEARCH),
-    ("studies/search.py", "PRUNED if done.state == PRUNED", "PRUNED if False", SEARCH),
     # Archives of studies, and descriptions of models.
     ("files/bundles.py", 'not {"", ".", ".."}.intersection(parts)', "True", ARCHIVE),
     ("files/bundles.py", 'if digest.hexdigest() != facts["sha256"]:', "if False:", ARCHIVE),

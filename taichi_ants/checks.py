@@ -318,7 +318,7 @@ def checked_configs(configs: TrainingConfig | Sequence[TrainingConfig]) -> tuple
         raise AntsError("configs is empty; give at least one TrainingConfig.")
     for config in several:
         expect("a configuration", config, TrainingConfig)
-    return tuple(learners.settle(config) for config in several)
+    return tuple(learners.with_hyperparameters(config) for config in several)
 
 
 def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:

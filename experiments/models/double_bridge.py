@@ -18,14 +18,17 @@ from taichi_ants.studies.interruption import stoppable
 
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
+    import sys
     from pathlib import Path
 
     import numpy as np
 
+    sys.path.append(str(Path(__file__).parents[1]))
+    from bridge import crossings
+
     from taichi_ants import Colony, Field, files
     from taichi_ants.analysis import style
     from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.studies.bridge import crossings
     from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
     from taichi_ants.task import Choice, Life, Pheromone, Task
     from taichi_ants.worlds import double_bridge
@@ -43,8 +46,8 @@ ON_THE_RETURN = Task(
     turns_at_queen=True,
 )
 MODELS = {
-    "both ways": ON_THE_RETURN.but(
-        fields={"both": Field(laid="always", **MARKS)}, choice={"carriers_follow": "both"}
+    "both ways": ON_THE_RETURN.replace(
+        fields={"both": Field(deposited_when="always", **MARKS)}, choice={"carriers_follow": "both"}
     ),
     "on the return": ON_THE_RETURN,
 }

@@ -58,12 +58,12 @@ def indices(measure: str, names: Sequence[str], values: np.ndarray) -> list[Inde
         return []
     problem = {"num_vars": len(names), "names": list(names), "bounds": [[0, 1]] * len(names)}
     how = {"calc_second_order": False, "num_resamples": RESAMPLES, "seed": RANDOM_SEED}
-    found = sobol.analyze(problem, means, **how)
+    result = sobol.analyze(problem, means, **how)
     share = seed_share(values[kept], len(names))
-    columns = (found[name].tolist() for name in ("S1", "S1_conf", "ST", "ST_conf"))
+    columns = (result[name].tolist() for name in ("S1", "S1_conf", "ST", "ST_conf"))
     return [
-        Index(measure, name, one, one - a, one + a, total, total - b, total + b, share, left_out)
-        for name, one, a, total, b in zip(names, *columns, strict=True)
+        Index(measure, name, s1, s1 - a, s1 + a, total, total - b, total + b, share, left_out)
+        for name, s1, a, total, b in zip(names, *columns, strict=True)
     ]
 
 
@@ -75,11 +75,9 @@ def seed_share(values: np.ndarray, n_settings: int) -> float:
     have the same seeds. Points at which a seed has no value do not count. Nan for one seed.
     """
     step, seeds = n_settings + 2, values.shape[1]
-    if seeds < 2:
-        return float("nan")
     drawn = np.concatenate([values[::step], values[step - 1 :: step]])
     drawn = drawn[~np.isnan(drawn).any(axis=1)]
-    if len(drawn) < 2:
+    if seeds < 2 or len(drawn) < 2:
         return float("nan")
     rest = drawn - drawn.mean(axis=1, keepdims=True) - drawn.mean(axis=0) + drawn.mean()
     noise = np.square(rest).sum() / ((len(drawn) - 1) * (seeds - 1)) / seeds
@@ -90,62 +88,59 @@ def seed_share(values: np.ndarray, n_settings: int) -> float:
 def report(found: Mapping[str, Sequence[Index]], seeds: int) -> str:
     """Return the indices by measure as tables for a terminal, the largest total index first."""
     blocks: list[str | Table] = []
-    for measure, several in found.items():
-        if not several:
-            blocks.append(
-                f"{measure} has no indices: it has values at too few points, or is constant."
-            )
+    for measure, rows in found.items():
+        if not rows:
+            words = f"{measure} has no indices: it has values at too few points, or is constant."
+            blocks.append(words)
             continue
-        names = [one.setting for one in several]
+        names = [row.setting for row in rows]
         lines = [
             [
-                short(one.setting, names),
-                f"{number(one.first_order, 2)} "
-                f"{interval(one.first_order_low, one.first_order_high, 2)}",
-                f"{number(one.total, 2)} {interval(one.total_low, one.total_high, 2)}",
+                short(name, names),
+                f"{number(first, 2)} {interval(first_low, first_high, 2)}",
+                f"{number(total, 2)} {interval(low, high, 2)}",
             ]
-            for one in sorted(several, key=lambda one: -one.total)
+            for _, name, first, first_low, first_high, total, low, high, *_ in sorted(
+                rows, key=lambda row: -row.total
+            )
         ]
-        blocks.append(Table("", [measure, "first order", "total"], lines, [_noise(several, seeds)]))
+        notes = [_noise(rows[0], seeds)]
+        blocks.append(Table("", [measure, "first order", "total"], lines, notes))
     return plain_text(blocks, _WIDTH)
 
 
-def _noise(several: Sequence[Index], seeds: int) -> str:
-    share, without = percent(several[0].seed_share), several[0].left_out
+def _noise(row: Index, seeds: int) -> str:
+    share, without = percent(row.seed_share), row.left_out
     more = f" {without} points are left out, because one of their group has no value."
     noise = f"Means over {seeds} seeds; seeds make {share} of their variance, in each total index."
     return noise + more * bool(without)
 
 
-def draw(path: Path, several: Sequence[Index], words: str, seeds: int) -> None:
+def draw(path: Path, rows: Sequence[Index], words: str, seeds: int) -> None:
     """Draw the indices of a measure, called `words`, as bars, the largest total index on top.
 
     Raises:
         AntsError: The file (.png) cannot be written.
     """
-    ordered = sorted(several, key=lambda one: one.total)
-    names = [one.setting for one in ordered]
-    places = np.arange(len(ordered))
+    rows = sorted(rows, key=lambda row: row.total)
+    names, y = [row.setting for row in rows], np.arange(len(rows))
     with style.styled():
-        figure = style.new_figure(1.6 + 0.34 * len(ordered))
+        figure = style.new_figure(1.6 + 0.34 * len(rows))
         axes = figure.subplots()
-        for field, shift, colour, label in (
-            ("first_order", 0.2, style.ORANGE, "First order: alone"),
-            ("total", -0.2, style.BLUE, "Total: also together with others"),
+        for first, shift, colour, label in (
+            (2, 0.2, style.ORANGE, "First order: alone"),
+            (5, -0.2, style.BLUE, "Total: also together with others"),
         ):
-            value, low, high = (
-                np.array([getattr(one, f"{field}{end}") for one in ordered])
-                for end in ("", "_low", "_high")
-            )
-            axes.barh(places + shift, value, 0.36, color=colour, label=label)
-            axes.hlines(places + shift, low, high, color=style.INK, linewidth=1)
-        share = several[0].seed_share
+            value, low, high = np.array([row[first : first + 3] for row in rows]).T
+            axes.barh(y + shift, value, 0.36, color=colour, label=label)
+            axes.hlines(y + shift, low, high, color=style.INK, linewidth=1)
+        share = rows[0].seed_share
         axes.axvline(share, color=style.GREY, linestyle="--", linewidth=1, label="Share of seeds")
         axes.axvline(0, color=style.INK, linewidth=0.8)
-        axes.set_yticks(places, [short(name, names) for name in names])
+        axes.set_yticks(y, [short(name, names) for name in names])
         axes.grid(visible=False, axis="y")
         axes.set_xlabel(f"Share of the variance of {words}")
-        caption = f"95 % intervals by SALib's bootstrap. {_noise(several, seeds)}"
+        caption = f"95 % intervals by SALib's bootstrap. {_noise(rows[0], seeds)}"
         title = f"{sentence(words)}: sensitivity indices"
         style.frame(figure, title, caption, style.legend_entries([axes]))
     style.save(figure, path)

@@ -2,22 +2,16 @@
 
 FILE lists fixed settings, the values or ranges of settings to vary, seeds, and measures. The
 command runs every combination of values, or the points of a design, with every seed, and writes
-tables and figures to a folder. With [search], it looks for the best settings. See docs/sweeps.md
-and docs/designs.md.
+tables and figures to a folder. See docs/sweeps.md and docs/designs.md.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
-
-if TYPE_CHECKING:
-    from taichi_ants.studies.search import Search
 
 
 def parse_arguments(
@@ -46,19 +40,15 @@ def sweep(settings: argparse.Namespace) -> None:
     from taichi_ants.files.parquet import check_installed
     from taichi_ants.studies.machines import chosen
     from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.search import Search, read
+    from taichi_ants.studies.sweep import read_sweep
 
     with recorded() as inputs:
         command_line.load_plugin(settings.plugin)
         settings.text = settings.text or read_text(settings.file)
         with command_line.progress_bar("settings") as progress:
-            asked = read(settings.file, settings.text, progress)
+            asked = read_sweep(settings.file, settings.text, progress)
     if settings.parquet:
         check_installed()
-    if isinstance(asked, Search):
-        return _search(settings, asked, inputs)
-    if not settings.force:
-        asked.design.check_folder(settings.out)
 
     def work(blocks: Path, ready: Path) -> None:
         bar = command_line.progress_bar
@@ -71,30 +61,6 @@ def sweep(settings: argparse.Namespace) -> None:
 
     more: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
     more |= {"as_parquet": asked.write_parquet}
-    work_or_show(settings, asked.facts(), work, **more)
-
-
-def _search(settings: argparse.Namespace, asked: Search, inputs: Mapping[str, bytes]) -> None:
-    """Run a search, or show its results if it is finished."""
-    from taichi_ants.studies.machines import chosen
-    from taichi_ants.studies.result_folder import work_or_show
-
-    if settings.parquet:
-        raise AntsError("--parquet is for sweeps with [vary], but this is a search; leave it out.")
-    if settings.shard:
-        raise AntsError(
-            "a search cannot be split into shards, because each trial depends on those before it; "
-            "leave out --shard."
-        )
-
-    def work(blocks: Path, ready: Path) -> None:
-        bar = command_line.progress_bar
-        with chosen(settings) as how, bar("search", how.get("executor")) as progress:
-            found = asked.measured(blocks, progress, **how)
-        asked.write(found, ready, draws=not settings.no_figures)
-
-    more: dict[str, Any] = {"take": asked.take, "inputs": inputs}
-    more |= {"grows_in": ("search.trials", "search.held_out")}
     work_or_show(settings, asked.facts(), work, **more)
 
 

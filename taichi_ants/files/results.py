@@ -40,8 +40,6 @@ class ResultFolder:
         leading: Settings that determine others; if they differ, messages name only these.
         runs: The result of `Study.runs`, if the work is a study.
         grows: Whether finished results of a part of these runs can become a part of the results.
-        grows_in: The names of settings, instead of runs: results with smaller numbers, or with a
-            part of a list, are a part of those with larger ones.
     """
 
     def __init__(
@@ -51,10 +49,9 @@ class ResultFolder:
         leading: Sequence[str] = (),
         runs: Mapping[str, Any] | None = None,
         grows: bool = False,
-        grows_in: Sequence[str] = (),
     ) -> None:
         self.path = Path(path)
-        self._runs, self._grows, self._grows_in = {"runs": runs} if runs else {}, grows, grows_in
+        self._runs, self._grows = {"runs": runs} if runs else {}, grows
         self.seconds_before = 0.0
         self._leading = leading
         self._settings = json.loads(files.to_json(settings))
@@ -114,10 +111,6 @@ class ResultFolder:
 
     def _is_part(self, manifest: Mapping[str, Any]) -> bool:
         """Return whether all that a manifest has is also a part of this work."""
-        if self._grows_in:
-            other, this = dict(manifest["settings"]), dict(self._settings)
-            sizes = [(other.pop(name, None), this.pop(name)) for name in self._grows_in]
-            return other == this and all(_is_within(*pair) for pair in sizes)
         settings, own, theirs = manifest["settings"], self._runs.get("runs"), manifest.get("runs")
         if any(settings.get(name) != self._settings.get(name) for name in _OF_ALL_RUNS):
             return False
@@ -299,13 +292,6 @@ def _varied(settings: Mapping[str, Any], leading: Sequence[str]) -> dict[str, di
         names = [one for one in leading if one in settings] or [n for n in settings if "." in n]
         several |= {n: settings[n] for n in names if isinstance(settings[n], list)}
     return {n: {files.to_json(one): one for one in values} for n, values in several.items()}
-
-
-def _is_within(one: Any, other: Any) -> bool:
-    """Return whether a number is at most another one, or a list is a part of another one."""
-    if isinstance(other, list):
-        return isinstance(one, list) and all(value in other for value in one)
-    return one is not None and one <= other
 
 
 def seconds_of(unfinished: Path) -> float:

@@ -9,13 +9,13 @@ from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.settings import Is, Settings, Share, declared
+from taichi_ants.settings import Setting, Settings, Share, declared
 
 if TYPE_CHECKING:
     import numpy as np
 
-Factor = Annotated[float, Is(above=0, most=1)]
-InitialValue = Annotated[float, Is(least=-1_000_000, most=1_000_000)]
+Factor = Annotated[float, Setting(above=0, most=1)]
+InitialValue = Annotated[float, Setting(least=-1_000_000, most=1_000_000)]
 
 
 @dataclass(frozen=True, init=False)
@@ -31,25 +31,28 @@ class TrainingConfig(Settings, path="training"):
     """
 
     learner: Annotated[
-        str, Is("name of the learner, such as sarsa or q_learning; see docs/learners_reference.md")
+        str,
+        Setting("name of the learner, such as sarsa or q_learning; see docs/learners_reference.md"),
     ]
     # Smaller step sizes could underflow to zero in float32.
-    learning_rate: Annotated[float, Is("learning rate of the first episode", least=1e-37, most=1)]
-    discount: Annotated[Share, Is("discount factor")]
-    epsilon: Annotated[
-        Share, Is("exploration rate (probability of a random action) in the first episode")
+    learning_rate: Annotated[
+        float, Setting("learning rate of the first episode", least=1e-37, most=1)
     ]
-    epsilon_decay: Annotated[Factor, Is("factor that multiplies epsilon after each episode")]
-    min_epsilon: Annotated[Share, Is("smallest value to which epsilon decays")] = 0.01
+    discount: Annotated[Share, Setting("discount factor")]
+    epsilon: Annotated[
+        Share, Setting("exploration rate (probability of a random action) in the first episode")
+    ]
+    epsilon_decay: Annotated[Factor, Setting("factor that multiplies epsilon after each episode")]
+    min_epsilon: Annotated[Share, Setting("smallest value to which epsilon decays")] = 0.01
     learning_rate_decay: Annotated[
-        Factor, Is("factor that multiplies the learning rate after each episode")
+        Factor, Setting("factor that multiplies the learning rate after each episode")
     ] = 1.0
-    min_learning_rate: Annotated[Share, Is("smallest value to which the learning rate decays")] = (
-        0.0
-    )
+    min_learning_rate: Annotated[
+        Share, Setting("smallest value to which the learning rate decays")
+    ] = 0.0
     initial_q: Annotated[
         InitialValue,
-        Is("action values before learning; high values make ants try every action"),
+        Setting("action values before learning; high values make ants try every action"),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 
@@ -68,9 +71,9 @@ class TrainingConfig(Settings, path="training"):
         initial_q: float = 0.0,
         **more: float,
     ) -> None:
-        given = locals()
-        for one in declared(TrainingConfig):
-            object.__setattr__(self, one.name, given[one.name])
+        values = locals()
+        for setting in declared(TrainingConfig):
+            object.__setattr__(self, setting.name, values[setting.name])
         self.check()
         try:
             pairs = {**dict(hyperparameters), **more}
@@ -102,11 +105,11 @@ class TrainingConfig(Settings, path="training"):
 
     def _changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
         """Take other names as hyperparameters; drop those of the learner before."""
-        own = [one.name for one in declared(TrainingConfig)]
-        more = {name: value for name, value in changes.items() if name not in own}
+        common = [setting.name for setting in declared(TrainingConfig)]
+        more = {name: value for name, value in changes.items() if name not in common}
         same = changes.get("learner", self.learner) == self.learner
         kept = dict(self.hyperparameters) if same else {}
-        changed = super()._changed({n: value for n, value in changes.items() if n in own})
+        changed = super()._changed({n: value for n, value in changes.items() if n in common})
         return replace(changed, hyperparameters=tuple({**kept, **more}.items()))
 
     def next_learning_rate(self, rate: float) -> float:
@@ -131,17 +134,17 @@ class TrainingConfig(Settings, path="training"):
 class Hyperparameters(Settings, path="training"):
     """Base of the hyperparameters of a learner; by itself, no hyperparameters.
 
-    Declare each field as `Annotated[int, Is(...)]` or `Annotated[float, Is(...)]`; in kernels it is
-    i32 or f32.
+    Declare each field as `Annotated[int, Setting(...)]` or `Annotated[float, Setting(...)]`; in
+    kernels it is i32 or f32.
     """
 
     def __post_init__(self) -> None:
-        kinds = {one.name: one.kind for one in declared(type(self))}
-        for one in fields(self):
-            if kinds.get(one.name) not in (int, float):
+        kinds = {setting.name: setting.kind for setting in declared(type(self))}
+        for field in fields(self):
+            if kinds.get(field.name) not in (int, float):
                 raise AntsError(
-                    f"the field {one.name} has the type {one.type}; declare it as "
-                    "Annotated[int, Is(...)] or Annotated[float, Is(...)]."
+                    f"the field {field.name} has the type {field.type}; declare it as "
+                    "Annotated[int, Setting(...)] or Annotated[float, Setting(...)]."
                 )
         self.check()
 

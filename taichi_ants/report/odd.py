@@ -12,13 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from taichi_ants import files, learners
-from taichi_ants.analysis.colony.study import OF_STUDY
-from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
 from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
-from taichi_ants.settings import Setting, declared, flat
-from taichi_ants.studies.design import axes_of
-from taichi_ants.studies.sweep_file import declaration_of, measure_of
+from taichi_ants.measures import finished
+from taichi_ants.settings import DeclaredSetting, declared, flat
+from taichi_ants.studies.sweep_file import declaration_of
 from taichi_ants.task import observations
 
 Row = tuple[str, ...]
@@ -67,8 +65,7 @@ class Model:
 
     def __init__(self, settings: Mapping[str, Any], sweep: Mapping[str, Any]) -> None:
         self.settings, self.sweep, self.of_colony = settings, sweep, "ants" in settings
-        self.searched = dict(axes_of(sweep.get("search", {}).get("vary", {})))
-        self.rows = [more for row in self._points() for more in self._with_searched(row)]
+        self.rows = list(self._points())
         self.places = [one for place in settings["worlds"] for one in _list_of(place)]
         self.world = flat({"world": sweep.get("world", {})})
 
@@ -93,15 +90,7 @@ class Model:
                 row["evaluation_epsilon"] = 0.0 if row.get("policy.name") else least
             yield row
 
-    def _with_searched(self, row: dict[str, Any]) -> Iterator[dict[str, Any]]:
-        """Yield a row, and for each setting that a search chooses more rows with its values."""
-        yield row
-        for name, axis in self.searched.items():
-            is_range = isinstance(axis, Mapping)
-            for value in [f"{axis['from']} to {axis['to']}"] if is_range else axis:
-                yield {**row, name: value}
-
-    def declaration(self, name: str, row: Mapping[str, Any]) -> Setting | None:
+    def declaration(self, name: str, row: Mapping[str, Any]) -> DeclaredSetting | None:
         """Return the declaration of a setting; None for settings of points and of plugins."""
         *group, own = name.split(".")
         if group != ["training", "hyperparameters"]:
@@ -110,10 +99,10 @@ class Model:
         several = learner in learners.names() and declared(learners.get(learner).hyperparameters)
         return next((one for one in several or () if one.name == own), None)
 
-    def uses(self, row: Mapping[str, Any], name: str, one: Setting | None) -> bool:
+    def uses(self, row: Mapping[str, Any], name: str, one: DeclaredSetting | None) -> bool:
         """Return whether a setting has an effect at a point, as far as declarations tell."""
         group, _, own = name.rpartition(".")
-        if name in self.searched or _EVENT.match(name):
+        if _EVENT.match(name):
             return True
         if group == "training.hyperparameters" and row[name] is None:
             return False
@@ -146,8 +135,6 @@ class Model:
             one = self.declaration(name, some[0])
             usual = one.default if one else None  # facts of events leave out defaults
             values = [row.get(name, usual) for row in some if self.uses(row, name, one)]
-            if name in self.searched:
-                values = [value for value in values if value is not None]
             if any(value is not None for value in values):
                 unit, words = _OF_POINTS.get(name, ("", "of a plugin"))
                 unit, words = (one.rule.unit, one.rule.help) if one else (unit, words)
@@ -208,12 +195,10 @@ class Model:
 
     def measures(self) -> Iterator[Row]:
         """Yield the names and meanings of the measures."""
-        if "measures" not in self.settings:
-            several = OF_STUDY if self.of_colony else {n: one.words for n, one in OF_RUNS.items()}
-            yield from ((f"`{name}`", words) for name, words in several.items())
-        for name in _list_of(self.settings.get("measures", [])):
+        kind = "colony" if self.of_colony else "runs"
+        for name in _list_of(self.settings.get("measures", [*finished.FINISHED[kind]])):
             try:
-                words = measure_of("colony" if self.of_colony else "runs", name).words
+                words = finished.of_runs(kind, name).label
             except AntsError:
                 words = "of a plugin"
             yield f"`{name}`", words
@@ -237,7 +222,6 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
         for one in model.places[:_MOST]
     ]
     of_worlds = ("Ranges", "Food items", "Rock", "Trail cells", "Listed ants", "Nests", "SHA-256")
-    own = [(f"`{k}`", _value(v)) for k, v in model.settings.items() if re.match("search.[^v]", k)]
     more: dict[str, Block] = {
         "Stochasticity": f"Seeds: {', '.join(map(str, model.settings['seeds']))}",
         "Observation": _table(("Measure", "Meaning"), model.measures()),
@@ -265,7 +249,7 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
         _table(("Event", *heads[1:]), [row for row in rows if _EVENT.match(row[0])]),
         *("## 7. Submodels", _AUTHOR),
         _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
-        *(_table(("Search", "Value"), own), _table(("File", "SHA-256 begins"), sources)),
+        _table(("File", "SHA-256 begins"), sources),
     ]
     return markdown([one for one in blocks if (one if isinstance(one, str) else one.rows)])
 

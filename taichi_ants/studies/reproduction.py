@@ -24,12 +24,10 @@ from taichi_ants.files.results import (
     read_manifest,
 )
 from taichi_ants.studies.provenance import packages, source
-from taichi_ants.studies.search import STORAGE
 
 RESULTS = "results/"  # begins the names of the files of a results folder in an archive
 COMMANDS = ("sweep", "compare", "colony")
 _SOURCE = re.compile(rb"(<dt>(Command|Finished|Commit|Versions|Machine|Time)</dt><dd>).*?</dd>")
-_OF_TRIAL = re.compile(rb'"(worker_id|datetime_start|datetime_complete)": ?"[^"]*",? ?')
 _SHOWN = 5  # versions that differ, at most, in a message
 
 
@@ -212,8 +210,7 @@ def compare(
 ) -> Iterator[Compared]:
     """Yield each file of the results in a bundle and in a folder, with its first difference.
 
-    Pages, manifests and the trials of searches name the command, the time or the machine of a run.
-    These facts may differ.
+    Pages and manifests name the command, the time or the machine of a run. These facts may differ.
     """
     made = read_manifest(folder)
     for name in sorted({*manifest["files"], *made["files"]}):
@@ -238,7 +235,6 @@ def compare(
 
 _WITHOUT_RUN = {  # functions of the content of a file that leave out the facts about the run
     PAGE: partial(_SOURCE.sub, rb"\1</dd>"),
-    STORAGE: partial(_OF_TRIAL.sub, b""),
 }
 
 

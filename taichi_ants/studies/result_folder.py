@@ -50,7 +50,6 @@ def work_or_show(
     study: Study[Any] | None = None,
     take: Take | None = None,
     inputs: Mapping[str, bytes] | None = None,
-    grows_in: Sequence[str] = (),
     as_parquet: Callable[[Path, Path], None] | None = None,
 ) -> None:
     """Compute the results of a command unless its folder has them, and print the report.
@@ -65,7 +64,6 @@ def work_or_show(
         take: A function that writes the blocks of finished results that are a part of the study.
         inputs: The contents of the files that the study has read, by path, except the plugin and
             the sweep file. The results contain copies of them.
-        grows_in: The argument of `ResultFolder`.
         as_parquet: A function that writes Parquet files from the tables in a folder of results to
             another folder, for the command's option `parquet`.
     """
@@ -76,7 +74,7 @@ def work_or_show(
     facts = {**determines, "arch": settings.arch, "plugin": plugin}
     shard = getattr(settings, "shard", None)
     runs = study.runs(shard or (1, 1)) if study else None
-    folder = ResultFolder(settings.out, facts, leading, runs, take is not None, grows_in)
+    folder = ResultFolder(settings.out, facts, leading, runs, take is not None)
     is_finished = not settings.force and folder.is_finished()
     if is_finished and (shard or folder.has_other_work() or not _lacks(settings, folder)):
         _show(settings, folder, page)

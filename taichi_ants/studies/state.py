@@ -14,16 +14,12 @@ from taichi_ants.errors import AntsError, count
 from taichi_ants.files.results import (
     BLOCKS,
     FAILED,
-    ROWS,
     UNFINISHED,
     manifest_in,
     seconds_of,
     start_of,
 )
 from taichi_ants.studies.blocks import Blocks
-from taichi_ants.studies.search import COMPLETE, HELD_OUT_BLOCKS, TRIAL_BLOCKS, TRIALS
-
-_FEW = 3  # trials of a search from which the time of the others is estimated
 
 
 def state(folder: Path) -> Iterator[str]:
@@ -40,9 +36,8 @@ def state(folder: Path) -> Iterator[str]:
             "study."
         )
     if finished:
-        runs, trials = finished.get("runs"), finished["settings"].get("search.trials")
+        runs = finished.get("runs")
         several = count(len(list(_runs_of(runs))), "run") if runs else ""
-        several = count(trials, "trial") if trials else several
         yield f"finished: results{several and f' with {several}'}, since {finished['finished']}"
     if unfinished:
         yield from _of_work(folder / UNFINISHED, unfinished)
@@ -57,8 +52,6 @@ def _of_work(folder: Path, manifest: Mapping[str, Any]) -> Iterator[str]:
     several = count(len(times), "block")
     if manifest.get("runs"):
         yield from _of_study(folder, manifest, times)
-    elif "search.trials" in manifest["settings"]:
-        yield from _of_search(folder, manifest["settings"], several)
     else:
         yield f"unfinished: {several} done"
     with suppress(ValueError, TypeError):  # the file is missing or damaged; includes AntsError
@@ -107,29 +100,6 @@ def _of_study(
     seconds = max(when) - started if new else seconds_of(folder)
     if seconds > 0 and total > work:
         yield f"left: about {_duration((total - work) * seconds / (new or work))}"
-
-
-def _of_search(folder: Path, settings: Mapping[str, Any], several: str) -> Iterator[str]:
-    trials = settings["search.trials"]
-    begun = sorted((folder / BLOCKS).glob(f"{TRIAL_BLOCKS}*"))
-    compares = (folder / BLOCKS / HELD_OUT_BLOCKS).exists()
-    done = trials if compares else int(begun[-1].name.removeprefix(TRIAL_BLOCKS)) if begun else 0
-    more = ", and the comparison with held-out seeds has begun" if compares else ""
-    yield f"unfinished: {done} of {count(trials, 'trial')} done, in {several}{more}"
-    # The first trials include the start of the process, so they say little about the others.
-    if _FEW <= done < trials and (seconds := seconds_of(folder)):
-        seeds = settings["search.prune_after"] or len(settings["seeds"])
-        runs = sum(len(list(one.iterdir())) for one in begun) * seeds
-        left = runs / done * (trials - done) + 2 * len(settings["search.held_out"])
-        yield f"left: about {_duration(seconds / runs * left)}"
-    if (folder / ROWS / TRIALS).exists():
-        minimises = "search.minimise" in settings
-        measure = settings["search.minimise" if minimises else "search.maximise"]
-        rows = files.read_csv(folder / ROWS / TRIALS)
-        complete = [one for one in rows if one["state"] == COMPLETE]
-        if complete:
-            best = min(complete, key=lambda one: one[measure] * (1 if minimises else -1))
-            yield f"best: trial {best['trial']:.0f}, {measure} {best[measure]:.4g}"
 
 
 def _duration(seconds: float) -> str:

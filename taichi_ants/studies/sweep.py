@@ -15,18 +15,18 @@ import numpy as np
 
 from taichi_ants import files
 from taichi_ants.analysis import designs, sensitivity, style, sweeps
-from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
-from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.files import parquet
 from taichi_ants.files.results import REPORT, ROWS
+from taichi_ants.measures import Run, finished
+from taichi_ants.measures.measure import RUN
 from taichi_ants.measures.series import stops
 from taichi_ants.settings import flat
 from taichi_ants.studies import design
 from taichi_ants.studies.blocks import Blocks, Outcome
-from taichi_ants.studies.design import GRID, Axis, Design
+from taichi_ants.studies.design import GRID, Axis, Design, Range
 from taichi_ants.studies.points import SERIES, Progress
 from taichi_ants.studies.runner import VALUE, Block, Study, values_in
 from taichi_ants.studies.sweep_file import (
@@ -37,7 +37,6 @@ from taichi_ants.studies.sweep_file import (
     check_entries,
     check_training,
     contents,
-    measure_of,
 )
 
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
@@ -45,6 +44,7 @@ SERIES_FILE, SENSITIVITY = "series.csv", "sensitivity.csv"
 _OF_SERIES = ("seed", "episode", "tick", "measure", "value")  # columns of SERIES_FILE
 _SHOW_EVERY = 100  # points
 _BYTES_OF_A_NUMBER = 20  # in a table
+_SHOWN_POINTS = 10  # of a design, in the report
 _WORDS = {"supported": "more", "contradicted": "less", "equivalent": "equal"}
 
 
@@ -248,7 +248,7 @@ class Sweep:
         first, columns = next(iter(values)), sweeps.columns_of(self.settings)
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
-        with_iqm = [name for name in values if measure_of(self.kind, name).uses_iqm]
+        with_iqm = [name for name in values if finished.of_runs(self.kind, name).uses_iqm]
         gaps = [name for name, array in values.items() if np.isnan(array).any()]
         rows = [
             {**one, "seeds": len(self.study.seeds), **sweeps.centre_columns(centres, gaps)}
@@ -263,7 +263,7 @@ class Sweep:
         if self.design.kind == GRID:
             report = sweeps.report(self.settings, values, self.against, notes)
         else:
-            report = designs.first_rows(self.settings, values, f"the design {self.design.kind!r}")
+            report = self._report_on_first(values)
         indices = self.indices(values)
         if indices:
             report = f"{report}\n{sensitivity.report(indices, len(self.study.seeds))}"
@@ -279,6 +279,15 @@ class Sweep:
             with style.all_or_none(folder / FIGURES):
                 self._draw(values[first], indices.get(first, []), first, folder / FIGURES)
 
+    def _report_on_first(self, values: dict[str, np.ndarray]) -> str:
+        """Return a report on the points of a design with the highest first measure."""
+        name, means = next(iter(values)), known_means(next(iter(values.values())))
+        order = np.argsort(-means, kind="stable")[:_SHOWN_POINTS]  # nan comes last
+        rows = {measure: array[order] for measure, array in values.items()}
+        table = sweeps.report([self.settings[p] for p in order], rows)
+        most = f"the {len(order)} with the highest {name}" if len(order) < len(means) else "all"
+        return f"{len(means)} points of the design {self.design.kind!r}; {most}:\n\n{table}"
+
     def indices(self, values: dict[str, np.ndarray]) -> dict[str, list[sensitivity.Index]]:
         """Return the sensitivity indices by measure, from values that `measured` returned.
 
@@ -293,27 +302,30 @@ class Sweep:
     ) -> None:
         """Draw the first measure, float64 (points, seeds), in a figure for each [vary] table."""
         files.check_writable_folder(folder)
-        words = measure_of(self.kind, first).words
+        words = finished.of_runs(self.kind, first).label
         for number, (some, axes) in enumerate(zip(self.grids, self.axes, strict=True), start=1):
             path = folder / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
             if self.design.kind == GRID:
                 sweeps.draw(path, self.settings[some], values[some], words)
             else:
-                names, logs = list(design.varying(axes)), design.logarithmic(axes)
+                names = list(design.varying(axes))
+                logs = {n for n, axis in axes.items() if isinstance(axis, Range) and axis.log}
                 designs.draw(path, self.settings[some], names, logs, values[some], words)
         if indices:
             path = folder / f"sensitivity_{first}.png"
             sensitivity.draw(path, indices, words, values.shape[1])
 
 
-def read_sweep(path: Path) -> Sweep:
-    """Return the sweep of a file.
+def read_sweep(
+    path: Path, text: str | None = None, progress: Progress = lambda share: None
+) -> Sweep:
+    """Return the sweep of a file, or of its text; see `sweep_of` for `progress`.
 
     Raises:
         AntsError: The file cannot be read, or a setting is not allowed.
     """
-    with contents(path) as file:
-        return sweep_of(file)
+    with contents(path, text) as file:
+        return sweep_of(file, progress)
 
 
 def sweep_of(file: Settings, progress: Progress = lambda share: None) -> Sweep:
@@ -374,14 +386,14 @@ def _measured(
 ) -> Outcome:
     """Return the measures of a block as `VALUE` arrays, and the series if they are asked for."""
     if kind == "runs":
-        columns = of_runs.measures_of_runs(outcome, wanted)
+        columns = finished.values_of(Run.of_lone_ant(outcome), wanted)
         return {f"{VALUE}{name}": array for name, array in columns.items()}
     (point,) = points
-    arrays = {key: array[0] for key, array in outcome.items()}
-    found = of_colonies.measures_of(arrays, point.ants, point.ticks)
-    columns = {}
-    for name in wanted:
-        columns |= {name: found[name]} if name in found else _ends(arrays, name)
+    arrays, columns = {key: array[0] for key, array in outcome.items()}, {}
+    run = Run.of_colony(arrays, point.ants, point.ticks)
+    for measure in (finished.of_runs(kind, name) for name in wanted):
+        of_run = {measure.name: measure.computed(run)} if measure.of == RUN else {}
+        columns |= of_run or _ends(arrays, measure.name)
     kept = {f"{VALUE}{name}": array[None] for name, array in columns.items()}
     series = {name: array for name, array in outcome.items() if name.startswith(SERIES)}
     return {**kept, **series} if has_series else kept

@@ -10,7 +10,7 @@ import numpy as np
 from taichi_ants.errors import AntsError, whole
 from taichi_ants.grid.hexgrid import AxialGrid, axial, cube
 from taichi_ants.grid.randomness import Stream, choose
-from taichi_ants.settings import Is, checked
+from taichi_ants.settings import Setting, checked
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
@@ -26,9 +26,11 @@ _STREAM_ROCKS = int.from_bytes(b"rocks", "big")
 _STREAM_FOOD = int.from_bytes(b"food", "big")
 _BATCH_CELLS = 1 << 22  # the most cells under hexagons that are placed at once, to bound memory
 
-Ranges = Annotated[Sequence[int] | None, Is("size of the world along x, y and z", unit="cells")]
-RockShare = Annotated[float, Is("share of the cells under rocks", least=0, most=MAX_SHARE)]
-Piles = Annotated[int, Is("number of piles of food", most=3)]
+Ranges = Annotated[
+    Sequence[int] | None, Setting("size of the world along x, y and z", unit="cells")
+]
+RockShare = Annotated[float, Setting("share of the cells under rocks", least=0, most=MAX_SHARE)]
+Piles = Annotated[int, Setting("number of piles of food", most=3)]
 
 
 @checked
@@ -37,9 +39,9 @@ def open_world(
     ranges: Ranges = None,
     rock_share: RockShare = 0.15,
     food_share: Annotated[
-        float, Is("single food items as a share of the cells", least=0, most=MAX_SHARE)
+        float, Setting("single food items as a share of the cells", least=0, most=MAX_SHARE)
     ] = 0.03,
-    piles: Annotated[Piles, Is(least=0)] = 3,
+    piles: Annotated[Piles, Setting(least=0)] = 3,
 ) -> World:
     """Return a random world with rocks, single food items and up to three piles of food.
 
@@ -58,15 +60,15 @@ def open_world(
             f"rock_share {rock_share} and food_share {food_share} add up to more than {MAX_SHARE}; "
             "choose smaller shares, so that ants have space to walk."
         )
-    given = None if ranges is None else parse_ranges(ranges)
+    wanted = None if ranges is None else parse_ranges(ranges)
     for attempt in range(MAX_DRAWS):
         words = Stream(seed, _STREAM_RANGES, attempt).bits(3) >> np.uint64(32)
-        grid = AxialGrid(given or parse_ranges(10 + choose(words, 91)))  # from 10 to 100
+        grid = AxialGrid(wanted or parse_ranges(10 + choose(words, 91)))  # from 10 to 100
         world = _draw(grid, rock_share, food_share, piles, seed, attempt)
         if world.reachable_foods().any():
             return world
     raise AntsError(
-        f"in {MAX_DRAWS} open worlds of ranges {given or 'drawn at random'}, rock_share "
+        f"in {MAX_DRAWS} open worlds of ranges {wanted or 'drawn at random'}, rock_share "
         f"{rock_share} and food_share {food_share}, no food could be reached from the queen; "
         "choose larger ranges or other shares."
     )
@@ -77,7 +79,7 @@ def far_piles(
     seed: int = 0,
     ranges: Ranges = (30, 30, 30),
     rock_share: RockShare = 0.15,
-    piles: Annotated[Piles, Is(least=1)] = 3,
+    piles: Annotated[Piles, Setting(least=1)] = 3,
 ) -> World:
     """Return an open world in which all food lies in piles far from the queen."""
     return open_world(seed, ranges, rock_share, 0.0, piles)
@@ -100,12 +102,12 @@ def _draw(
 
     free = grid.exists & ~rocks & ~food
     free[clearing] = False
-    places = np.flatnonzero(free)
-    singles = min(round(food_share * grid.count), len(places))
+    free_cells = np.flatnonzero(free)
+    singles = min(round(food_share * grid.count), len(free_cells))
     # The places of the smallest random words are a sample without replacement.
     if singles:
-        words = Stream(seed, _STREAM_FOOD, attempt).bits(len(places))
-        food[places[np.argpartition(words, singles - 1)[:singles]]] = True
+        words = Stream(seed, _STREAM_FOOD, attempt).bits(len(free_cells))
+        food[free_cells[np.argpartition(words, singles - 1)[:singles]]] = True
     return World(
         grid.ranges,
         _QUEEN,
@@ -149,8 +151,8 @@ def _hexagons(
     sizes = 1 + 3 * radii * (radii + 1)
     hexagon = np.repeat(np.arange(len(radii)), sizes)
     # `disc` is sorted by distance, so a smaller hexagon is the beginning of a larger one.
-    place = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    cells = cube(axial(centres)[hexagon] + disc[place])
+    rank = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    cells = cube(axial(centres)[hexagon] + disc[rank])
     inside = (cells < np.array(grid.ranges)).all(axis=1)
     return hexagon[inside], grid.index(cells[inside])
 

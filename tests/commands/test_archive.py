@@ -336,26 +336,6 @@ def test_a_study_in_an_archive_reads_no_other_files(old, new, copy, capsys):
     assert not Path("results").exists()
 
 
-SEARCH = """
-kind = "colony"
-seeds = 2
-ants = 2
-episodes = 0
-ticks = 30
-rollouts = 1
-policy = "trail_follower"
-[search]
-maximise = "deliveries"
-trials = 3
-held_out = 2
-vary.task.pheromone.half_life = { from = 10, to = 1000, scale = "log" }
-vary.task.pheromone.view = ["half", "strongest"]
-[task]
-pheromone.evaporation = "exponential"
-pheromone.half_life = 20
-"""
-
-
 def test_a_changed_import_of_the_plugin_changes_the_study(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("my_plugin.py").write_text(PLUGIN)
@@ -371,29 +351,6 @@ def test_a_changed_import_of_the_plugin_changes_the_study(tmp_path, capsys, monk
     assert "(not the same plugin)" in refused("sweep", given, capsys)
     assert call("sweep", [*given, "--force", "--workers", 1], capsys)[0] == 0
     assert Path("a/runs.csv").read_text().endswith(",300.0\n")
-
-
-def test_a_search_is_archived_and_reproduced(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("my.toml").write_text(SEARCH)
-    assert call("sweep", ["my.toml", "--out", "done", "--no-figures"], capsys)[0] == 0
-    assert call("archive", ["done"], capsys)[0] == 0
-    Path("my.toml").unlink()
-    status, out, err = call("reproduce", ["done.zip"], capsys)
-    assert (status, err) == (0, "")
-    assert "equal      optuna.journal (except the time and the machine of the run)" in out
-    with bundles.reading(Path("done.zip")) as bundle:
-        odd = bundle.read("ODD.md").decode()
-    assert "| `search.trials` | 3 |" in odd
-    assert "| `task.pheromone.half_life` | 20, 10 to 1000 | ticks |" in odd
-    assert "strongest" in odd
-    folder = ResultFolder(Path("done"), read_manifest(Path("done"))["settings"])
-    trials = Path("done/optuna.journal").read_text()
-    folder.add("optuna.journal", trials.replace('"value":', '"value":1', 1))
-    assert call("archive", ["done", "--force"], capsys)[0] == 0
-    status, out, _ = call("reproduce", ["done.zip", "--out", "again"], capsys)
-    assert status == 1
-    assert "DIFFERENT  optuna.journal (first difference at byte " in out
 
 
 def test_an_index_that_declares_less_than_is_there_is_refused(here):

@@ -13,16 +13,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ant_system import Search, search
+from bridge import crossings
 from command_lines import EXPERIMENTS
+from goss import choices
 from matplotlib.figure import Figure
+from utility import Foraging
 
 from taichi_ants import Colony, TrainingConfig, World, task, train
-from taichi_ants.baselines.ant_system import Search, search
-from taichi_ants.baselines.goss import choices
-from taichi_ants.baselines.utility import Foraging
 from taichi_ants.learners import registry as learners
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies.bridge import crossings
 from taichi_ants.task import Caste, Noise, Threshold
 from taichi_ants.worlds import double_bridge, paper
 
@@ -33,7 +33,7 @@ CENTRE, RING = (0, 0, 0), [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)
 @pytest.fixture
 def script(monkeypatch):
     """Load a script, and return its names; changes to them hold for its functions."""
-    monkeypatch.setattr(learners, "_LEARNERS", dict(learners._LEARNERS))
+    monkeypatch.setattr(learners.LEARNERS, "yours", dict(learners.LEARNERS.yours))
 
     def load(name: str, **changes: Any) -> dict[str, Any]:
         names = runpy.run_path(str(EXPERIMENTS / f"{name}.py"))
@@ -81,7 +81,7 @@ def test_a_home_trail_that_nobody_follows_does_not_matter(script):
     found = script("models/home_trail")
     models = {
         "compass": found["COMPASS"],
-        "laid": found["HOME_TRAIL"].but(homing_cue="compass"),
+        "deposited_when": found["HOME_TRAIL"].replace(homing_cue="compass"),
         "followed": found["HOME_TRAIL"],
     }
     found.update(MODELS=models, EPISODES=2, TICKS=200)
@@ -481,7 +481,7 @@ def test_names_of_equal_branches_do_not_matter():
     def counts(bridge):
         follow = TrainingConfig("q_learning", 1.0, 1.0, epsilon=0.05, epsilon_decay=1.0)
         options = {"sharing": "frozen", "q_values": trail_follower("ants"), "schedule": "by_world"}
-        rules = task.foraging().but(life={"regrowth": 0})
+        rules = task.foraging().replace(life={"regrowth": 0})
         colony = Colony(double_bridge(**bridge), rules, follow, [0, 1], 16, **options)
         return crossings(colony, bridge, 400)
 

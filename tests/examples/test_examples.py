@@ -14,7 +14,10 @@ from command_lines import ROOT, environment
 from taichi_ants import load_policy, task
 
 EXAMPLES = ROOT / "examples"
-NEEDS = {"ppo": "torch", "shared_policy": "torch", "sb3_ppo": "stable_baselines3"}
+NEEDS = {
+    **{"ppo": "torch", "shared_policy": "torch", "search": "optuna"},
+    **{"sb3_ppo": "stable_baselines3", "minari_data": "minari"},
+}
 
 
 def run(name: str, arguments: list[object], kernels: Path, folder: Path) -> str:
@@ -36,7 +39,7 @@ def run(name: str, arguments: list[object], kernels: Path, folder: Path) -> str:
 
 def test_every_example_is_here() -> None:
     names = {path.stem for path in EXAMPLES.glob("*.py")}
-    assert names == {"q_learning", *NEEDS}
+    assert names == {"q_learning", "sb3_vec_env", *NEEDS}
 
 
 @pytest.mark.slow
@@ -44,6 +47,24 @@ def test_q_learning_delivers_in_40_lines(kernels: Path, tmp_path: Path) -> None:
     said = run("q_learning", ["--seeds", 3], kernels, tmp_path)
     assert said == "seed 3: 50 of 50 rollouts deliver, 13.0 in 35.0 steps\n"
     assert len((EXAMPLES / "q_learning.py").read_text().splitlines()) <= 40
+
+
+@pytest.mark.slow
+def test_minari_data_learns_from_what_it_has_written(
+    kernels: Path, tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "data"))
+    said = run("minari_data", [], kernels, tmp_path)
+    assert said == "58652 transitions; 20 of 20 rollouts deliver\n"
+
+
+@pytest.mark.slow
+def test_a_search_resumes_and_ends_with_held_out_seeds(kernels: Path, tmp_path: Path) -> None:
+    run("search", ["--trials", 2, "--journal", "stopped"], kernels, tmp_path)
+    resumed = run("search", ["--trials", 3, "--journal", "stopped"], kernels, tmp_path)
+    assert resumed == run("search", ["--trials", 3], kernels, tmp_path)
+    assert re.match(r"best of 3 trials: {'half_life': \d", resumed)
+    assert re.search(r"held-out seeds: \d+ .* against \d+, difference .* \[.*\]$", resumed)
 
 
 @pytest.mark.slow

@@ -22,9 +22,9 @@ from taichi_ants import (
 from taichi_ants.engines import plugin_check
 from taichi_ants.learners import (
     Hyperparameters,
-    Is,
     Learner,
     Memory,
+    Setting,
     register,
     registry,
     td_learner,
@@ -36,7 +36,7 @@ NUMBERS = np.arange(5, dtype=np.float32)
 
 @pytest.fixture(autouse=True)
 def _no_learner_stays(monkeypatch):
-    monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
+    monkeypatch.setattr(registry.LEARNERS, "yours", dict(registry.LEARNERS.yours))
 
 
 def config(name="mine"):
@@ -324,7 +324,7 @@ def test_td_errors_that_are_refused_at_once(td_error, says):
 
 @dataclass(frozen=True)
 class Momentum(Hyperparameters):
-    momentum: Annotated[float, Is("share of the last error", least=0, most=1)] = 0.5
+    momentum: Annotated[float, Setting("share of the last error", least=0, most=1)] = 0.5
 
 
 @ti.func
@@ -420,7 +420,7 @@ def test_memories_that_are_not_ones_own_are_refused(function, says):
 
 @dataclass(frozen=True)
 class Clashing(Hyperparameters):
-    discount: Annotated[float, Is(least=0, most=1)] = 0.5
+    discount: Annotated[float, Setting(least=0, most=1)] = 0.5
 
 
 @dataclass(frozen=True)
@@ -430,7 +430,7 @@ class OfText(Hyperparameters):
 
 @dataclass(frozen=True)
 class OutOfRange(Hyperparameters):
-    depth: Annotated[int, Is(least=1, most=2)] = 3
+    depth: Annotated[int, Setting(least=1, most=2)] = 3
 
 
 FAILS = "learner 'mine' cannot be used: "
@@ -472,7 +472,7 @@ def test_learners_that_are_refused_when_they_are_registered(changes, says):
 def test_a_learner_that_has_come_to_need_more_memory(tmp_path):
     register(with_memory())
     train(paper(), with_momentum(0.5), 0, 2, 50).save(tmp_path / "x.npz")
-    registry._LEARNERS.clear()
+    registry.LEARNERS.yours.clear()
     register(with_memory(memory=lambda settings, n_states: Memory(floats=9, integers=1)))
     with pytest.raises(AntsError, match="'mine' needs more memory than when"):
         continue_training(TrainingResult.load(tmp_path / "x.npz"), 1)

@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from colonies import act, begun, load, training
+from colonies import begun, load, training
 from random_worlds import random_world
 
-from taichi_ants.errors import AntsError
 from taichi_ants.reference import OBSERVATIONS, ReferenceColony
 from taichi_ants.reference.geometry import neighbour
-from taichi_ants.task import Pheromone, Task, observations
-from taichi_ants.task.constants import GIVE, LEFT
+from taichi_ants.task import Pheromone, observations
+from taichi_ants.task.constants import LEFT
 from taichi_ants.worlds import World
 
 # Around the ant from behind left on: a rock, a trail, food, nothing, a trail; behind it the queen.
@@ -28,7 +27,7 @@ trail = 8
   #   t
     Q
 """
-# The percept: T F E, 2, 3, 0.
+# The paper's state: T F E, 2, 3, 0.
 PERCEPT = 16 * 2 + 4 * 3
 
 
@@ -44,12 +43,12 @@ def digits(base, *codes):
     return int("".join(map(str, codes)), base)
 
 
-def test_the_papers_row_is_the_percept():
+def test_the_papers_row_is_the_paper_state():
     assert state_of(AROUND, "paper") == PERCEPT
     for seed in range(30):
         colony = ReferenceColony(random_world(seed), None, training(epsilon=1.0), seed)
         for [step] in colony.run_episode(40):
-            assert colony.ants[0].state == colony.ants[0].percept == step.next_state
+            assert colony.ants[0].state == colony.ants[0].paper_state == step.next_state
 
 
 @pytest.mark.parametrize(
@@ -106,12 +105,6 @@ def test_with_food_the_cells_behind_lure_if_they_are_nearer_to_the_queen(observa
     assert state_of(HOMEWARDS, observation, carries=True) == row
 
 
-def test_with_food_a_nearer_cell_is_a_strong_trail_and_the_queen_a_goal():
-    facing = HOMEWARDS.replace("0", "3")  # ahead down; to the right down left, to the left the rock
-    assert state_of(facing, "trail_levels", carries=True) == digits(6, 1, 1, 4, 4)
-    assert state_of(AROUND.replace("0", "3"), "trail_levels", carries=True) == digits(6, 1, 0, 5, 1)
-
-
 A = (0, 0, 0)
 FAR = (0, 0, 4)
 
@@ -157,13 +150,6 @@ def test_trails_in_thirds_of_the_strongest(levels, codes, pheromone):
     assert row == digits(6, 0, *codes)
 
 
-def test_a_trail_on_food_is_food_and_counts_for_nothing():
-    foods = [neighbour(A, 0)]
-    trails = [(foods[0], 900), (neighbour(A, 1), 9), (neighbour(A, 2), 3)]
-    world = World((5, 5, 5), FAR, foods=foods, trails=trails, ants=[(A, 1)])
-    assert state_of(world, "trail_levels") == digits(6, 0, 5, 4, 3)
-
-
 # Ant 0 looks up at another one; beside that a rock and the end of the world.
 CROWD = """
     3
@@ -181,7 +167,7 @@ def test_another_ant_is_told_from_a_rock_whatever_it_carries(carries, other_carr
     load(colony, *([0] if other_carries else []), *([1] if carries else []))
     looking = colony.ants[1]
     assert looking.state == digits(5, int(carries), 1, 4, 1)
-    assert looking.percept == 64 * carries + 16 + 4 + 1
+    assert looking.paper_state == 64 * carries + 16 + 4 + 1
 
 
 P, OTHER, AHEAD = 4, 5, 6  # ants: other load on a better cell, on any other; same load on a better
@@ -219,21 +205,14 @@ def test_without_food_a_better_cell_has_a_stronger_trail_than_the_ants_own(level
     load(colony, 1)
     colony.observe(colony.ants[0])
     assert colony.ants[0].state == digits(7, 0, 0, code, 0)
-    assert colony.ants[0].percept == 4  # what it can do goes by the paper's state
-
-
-def test_an_ant_that_has_just_died_is_not_seen():
-    colony = begun(CROWD, observation="ants_seen", lifespan=5)
-    colony.ants[0].age = 4
-    act(colony, GIVE, GIVE)
-    assert sorted(colony.ants) == [1]
-    assert colony.ants[1].state == digits(5, 0, 1, 0, 1)
+    assert colony.ants[0].paper_state == 4  # what it can do goes by the paper's state
 
 
 @pytest.mark.parametrize("name", OBSERVATIONS)
-def test_ants_choose_and_learn_by_the_row_and_act_by_the_percept(name):
+def test_ants_choose_and_learn_by_the_row_and_act_by_the_paper_state(name):
     # Left is a trail. Greedy, the ant goes there by a table with one best value, in the row that
-    # it looks at; the move pays as the percept says, +1; and what it learns stands in that row.
+    # it looks at; the move pays as the paper's state says, +1; and what it learns stands in that
+    # row.
     n_states = observations.get(name).n_states
     q_values = np.zeros((n_states, 5), np.float32)
     q_values[state_of(AROUND, name), LEFT] = 4
@@ -247,19 +226,6 @@ def test_ants_choose_and_learn_by_the_row_and_act_by_the_percept(name):
     assert learnt[step.state, LEFT] == 2.5  # 4 + 0.5 * (1 - 4)
 
 
-@pytest.mark.parametrize("sharing", ["shared", "independent", "frozen"])
-@pytest.mark.parametrize("name", OBSERVATIONS)
-def test_tables_have_as_many_rows_as_the_observation(name, sharing):
-    n_states = observations.get(name).n_states
-    for seed in range(6):
-        colony = ReferenceColony(
-            random_world(seed), Task(observation=name), training(epsilon=1.0), seed, sharing=sharing
-        )
-        assert colony.q_values.shape[-2:] == (n_states, 5)
-        rows = {step.next_state for [step] in colony.run_episode(30)}
-        assert max(rows) < n_states
-
-
 def test_each_observation_has_a_twin():
     own = [
         name
@@ -267,9 +233,3 @@ def test_each_observation_has_a_twin():
         if observations.get(name).encode.__module__.startswith("taichi_ants.")
     ]
     assert list(OBSERVATIONS) == own
-
-
-def test_an_observation_without_a_twin_is_refused(monkeypatch):
-    monkeypatch.delitem(OBSERVATIONS, "ants_seen")
-    with pytest.raises(AntsError, match=r"observation is 'ants_seen'.*paper, five_cells"):
-        state_of(AROUND, "ants_seen")

@@ -436,7 +436,7 @@ def test_provenance():
     facts = provenance(["experiments/compare.py", "--out", "a b"])
     assert facts["command"] == "experiments/compare.py --out 'a b'"
     for program in ("/home/me/bin/taichi-ants", "/home/me/taichi_ants/__main__.py"):
-        assert provenance([program, "compare"])["command"] == "taichi-ants compare"
+        assert provenance([program, "sweep"])["command"] == "taichi-ants sweep"
     assert facts["packages"]["taichi"] == "1.7.4"
     assert {"kiwisolver", "mdurl"} <= facts["packages"].keys()  # which Matplotlib and Rich need
     assert not {"pytest", "mypy", "pip"} & facts["packages"].keys()

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-
-from taichi_ants.analysis.colony.study import REGIMES, RULES, Condition, Measured
+from colony_findings import REGIMES, RULES, Condition, Measured
 
 SIZES = (1, 2, 4, 8)
 
@@ -53,7 +52,7 @@ def build(
                         "deliveries": deliveries,
                         "greedy": 1.5 * deliveries,
                         "bound": np.full(seeds, 25.0 * ants),
-                        "of_bound": deliveries / (25.0 * ants),
+                        "bound_share": deliveries / (25.0 * ants),
                         "per_ant": deliveries / ants,
                         "first_delivery": np.full(seeds, float(first(ants))),
                         "no_delivery_rate": np.zeros(seeds),

@@ -242,7 +242,7 @@ class ColonyState:
     # the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1; and the
     # state of its random stream, uint64. If actions slip, `actions` are those that ants chose.
     numbers, cells, headings = column("number"), column("cell"), column("heading")
-    percepts, actions, events = column("percept"), column("action"), column("event")
+    paper_states, actions, events = column("paper_state"), column("action"), column("event")
     next_actions, streams = column("next_action"), column("streams")
     _stages, _loads, _states = column("stage"), column("carries"), column("state")
 
@@ -259,7 +259,7 @@ class ColonyState:
     @property
     def states(self) -> np.ndarray:
         """The state index of the last ant in each slot, int32 (W, capacity)."""
-        return (self._states if "state" in self.arrays else self.percepts).astype(np.int32)
+        return (self._states if "state" in self.arrays else self.paper_states).astype(np.int32)
 
     @property
     def executed(self) -> np.ndarray:
@@ -390,19 +390,21 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
+        arrays = {**self._counts(), **self._deliveries_apart()}
+        counts: dict[str, Any] = {name: array[None].copy() for name, array in arrays.items()}
+        return ColonyEpisodes(**counts, seeds=self.seeds)
+
+    def _deliveries_apart(self) -> Arrays:
+        """Return deliveries by nest and kind of food, and by caste: int32 (W, ...)."""
         if self.n_nests * self.n_kinds == 1:
             apart = self.deliveries.astype(np.int32)
         else:
-            apart = self.arrays["deliveries_apart"]
-        apart = apart.reshape(-1, self.n_nests, self.n_kinds)
+            apart = self.arrays["deliveries_by_nest_and_kind"]
         by_caste = self.arrays.get("caste_deliveries", self.deliveries.astype(np.int32))
-        every = {
-            **self._counts(),
-            "deliveries_apart": apart,
+        return {
+            "deliveries_by_nest_and_kind": apart.reshape(-1, self.n_nests, self.n_kinds),
             "caste_deliveries": by_caste.reshape(len(self.seeds), -1),
         }
-        counts: dict[str, Any] = {name: one[None].copy() for name, one in every.items()}
-        return ColonyEpisodes(**counts, seeds=self.seeds)
 
     def _counts(self) -> Arrays:
         """Return the counts of the episode (W,), by their names in `ColonyEpisodes`."""
@@ -429,6 +431,15 @@ class ColonyState:
             of_ants = self.arrays["kind"].reshape(self.cells.shape)[world, living].astype(np.int32)
             of_cells = np.where(ground == FOOD, self.arrays["kind_of"][cells], np.uint8(0))
         queens = self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)[world]
+        counts: dict[str, Any] = {n: int(array[world]) for n, array in self._counts().items()}
+        apart = self._deliveries_apart()
+        counts["nest_deliveries"] = apart["deliveries_by_nest_and_kind"][world].sum(
+            axis=1, dtype=np.int32
+        )
+        counts["food_deliveries"] = apart["deliveries_by_nest_and_kind"][world].sum(
+            axis=0, dtype=np.int32
+        )
+        counts["caste_deliveries"] = apart["caste_deliveries"][world].copy()
         return Snapshot(
             self.grid,
             ground,
@@ -448,7 +459,7 @@ class ColonyState:
             ant_idle=self.idle[world, living],
             ant_thresholds=self.thresholds[world, living],
             fields=fields,
-            counts={name: int(array[world]) for name, array in self._counts().items()},
+            counts=counts,
             world=self.worlds[world],
         )
 
@@ -684,7 +695,7 @@ class ColonyState:
         return {
             "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
             "loads": here.reshape(-1) if self.task.has_loads else np.zeros(1, np.int32),
-            "deliveries_apart": np.zeros(apart, np.int32),
+            "deliveries_by_nest_and_kind": np.zeros(apart, np.int32),
         }
 
     def _castes_at_start(self, nests: np.ndarray) -> np.ndarray:
@@ -715,7 +726,7 @@ class ColonyState:
         noise = self.task.noise
         unused = set() if noise.slip else {"executed"}
         if self.task.sees.name == "paper" and not noise.misread:
-            unused.add("state")  # the percept is the state
+            unused.add("state")  # the paper's state is the state
         if not self.ants_change:
             unused.add("age")
         if not self.draws_ahead:
@@ -1049,10 +1060,10 @@ def _caste_numbers(task: Task, discount: float) -> np.ndarray:
             discount if one.discount is None else one.discount,
             *(usual[i] if own[i] is None else own[i] for i in range(3)),
             one.policy is None,
-            sum(1 << pheromones.index(name) for name in set(one.laid(pheromones))),
+            sum(1 << pheromones.index(name) for name in set(one.pheromones_laid(pheromones))),
             cues.index(task.cues_of(one)),
             -1 if lifespan is None else lifespan,
-            (labour.quit or 0.0) * one.threshold.exists,
+            (labour.stop_probability or 0.0) * one.threshold.exists,
             *one.threshold.numbers,
         )
     return numbers
