@@ -285,7 +285,7 @@ def _rules(
         lifespan = 9 if not births and lifespan is None else lifespan
         wander = 3 if regrowth is None and wander is None else wander
     start = str(rng.choice(["nest", "spread"]))
-    life = Life(births=births, lifespan=lifespan, regrowth=regrowth, wander=wander)
+    life = Life(births=births, lifespan=lifespan, regrowth=regrowth, pile_move_interval=wander)
     task = Task(pheromone=pheromone, evaporation_in_training=True, life=life)
     return {"ants": ants, "capacity": capacity, "start": start}, task
 
@@ -318,7 +318,7 @@ def _field(seed: int, name: str, view: str) -> Field:
     deposited = rng.choice(["with_food", "without_food", "always", "dead_end", "failed_pick_up"])
     if name in "cC":  # so that two cues have different views
         view = "strongest" if view == "half" else "half"
-    return Field(**{**rules, "view": view, "laid": str(deposited)})
+    return Field(**{**rules, "view": view, "deposited_when": str(deposited)})
 
 
 def random_training(rng: np.random.Generator, learner: str) -> TrainingConfig:
@@ -397,7 +397,8 @@ def _with_nests(drawn: Drawn, seed: int, nests: int, kinds: int, loads: bool) ->
         for k in range(kinds)
     }
     stays = kinds > 1 or loads
-    life = replace(life, regrowth=None, wander=None if stays else life.wander)
+    interval = None if stays else life.pile_move_interval
+    life = replace(life, regrowth=None, pile_move_interval=interval)
     numbers = rng.integers(0, kinds, len(world.foods))
     world = replace(world, other_queens=queens, food_kinds=numbers, trails=world.trails)
     return drawn._replace(world=world, task=replace(drawn.task, foods=foods, life=life))
@@ -427,7 +428,7 @@ def _with_castes(
         demand=float(rng.choice([0.1, 0.7, 3.0])),
         relief=float(rng.choice([0.0, 0.3, 5.0])),
         exponent=float(rng.choice([0.0, 1.0, 1.7, 2.0])),
-        quit=float(rng.choice([0.05, 0.4, 1.0])),
+        stop_probability=float(rng.choice([0.05, 0.4, 1.0])),
     )
     return drawn._replace(task=replace(task, castes=castes, labour=divided if labour else Labour()))
 

@@ -14,10 +14,10 @@ def golden_power_law(level, tick, exponent=1.1):
 
 
 @rules.register("deposit")
-def golden_weaker(level, carried, carries, event, percept, trait, tick, amount=100.0):
+def golden_weaker(level, carried, carries, event, paper_state, trait, tick, amount=100.0):
     """Return a level that depends on all inputs."""
     found = level
-    if event == Event.PICKED_UP or (percept % 4 == 2 and not carries):
+    if event == Event.PICKED_UP or (paper_state % 4 == 2 and not carries):
         found = max(level, 3 * amount)
     elif 0 < tick < 5:
         pass
@@ -36,7 +36,7 @@ def golden_alarm(level, level_trail, threshold, stimulus, carries, amount=30.0):
 
 
 @rules.register("choice")
-def golden_restless(values, epsilon, random, random_2, levels, level, percept, trait, tick):
+def golden_restless(values, epsilon, random, random_2, levels, level, paper_state, trait, tick):
     """Return an action by action values and levels."""
     best = 0
     top = values[0]
@@ -48,7 +48,7 @@ def golden_restless(values, epsilon, random, random_2, levels, level, percept, t
             top = value
             best = a
     if random < epsilon + 0.2 * trait:
-        best = (random_2 * 5 + tick + percept) // 1 % 5
+        best = (random_2 * 5 + tick + paper_state) // 1 % 5
     return best
 
 
@@ -66,14 +66,14 @@ def golden_hungry(codes, carries, threshold, stimulus, trait, random, random_2):
 
 
 @rules.register("reward")
-def golden_shaped(reward, event, carries, next_percept, levels, level, trait, tick, scale=2.0):
+def golden_shaped(reward, event, carries, next_paper_state, levels, level, trait, tick, scale=2.0):
     """Return a reward that depends on the trails."""
     more = 0
     if levels[1] > level and not carries:
         more = scale
     if event == Event.DELIVERED:
         more += 5 + tick % 3
-    if next_percept % 3 == 1:
+    if next_paper_state % 3 == 1:
         more -= 1 + (trait < 0.3)
     return min(max((reward + more) // 1, -1000), 1000)
 

@@ -49,17 +49,32 @@ from taichi_ants import (  # noqa: E402
 # What is hashed of a colony after each tick. These lists are the only place that knows the names.
 OF_COLONY = ("q_values", "stimuli", "running", "episode_ticks", "deliveries", "living")
 OF_ANTS = (
-    *("numbers", "cells", "headings", "carrying", "percepts", "states", "actions", "executed"),
+    *("numbers", "cells", "headings", "carrying", "paper_states", "states", "actions", "executed"),
     *("events", "rewards", "streams", "nests", "castes", "idle", "thresholds"),
 )
 OF_SNAPSHOT = ("ground", "trail", "food_kinds", "ant_foods", "ant_carried")
 OF_EPISODES = (
     *("returns", "ticks", "deliveries", "first_delivery", "moves", "blocked", "carried", "births"),
-    *("waiting_births", "deaths", "regrown", "living", "deliveries_apart", "caste_deliveries"),
+    *(
+        "waiting_births",
+        "deaths",
+        "regrown",
+        "living",
+        "deliveries_by_nest_and_kind",
+        "caste_deliveries",
+    ),
 )
 OF_TRACE = (
-    *("episodes", "steps", "cells", "headings", "percepts", "states", "actions", "rewards"),
-    *("next_percepts", "next_states", "terminated", "events", "q_values", "td_errors", "tables"),
+    *("episodes", "steps", "cells", "headings", "paper_states", "states", "actions", "rewards"),
+    *(
+        "next_paper_states",
+        "next_states",
+        "terminated",
+        "events",
+        "q_values",
+        "td_errors",
+        "tables",
+    ),
     "executed",
 )
 OF_RUNS = ("returns", "steps", "deliveries")
