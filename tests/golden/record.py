@@ -32,7 +32,7 @@ os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")  # compiles faster, with 
 
 import drawing  # noqa: E402
 import numpy as np  # noqa: E402
-import own_rules  # noqa: E402, F401  registers rules
+import frozen_rules  # noqa: E402, F401  registers rules
 
 from taichi_ants import (  # noqa: E402
     PHYSICS,
