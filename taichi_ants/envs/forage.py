@@ -99,7 +99,7 @@ class LoneAnts(Ants):
             "taken": into.actions,
             "seen": into.observations[1:],
             "rewards_of": into.rewards,
-            "results": into.events,
+            "result_rows": into.events,
             "final_states": finals,
         }
         self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[mode], policy)

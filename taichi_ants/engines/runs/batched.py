@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import runtime
-from taichi_ants.engines.layout import TRUNCATED, Command, unpack_cells
+from taichi_ants.engines.layout import Command, unpack_cells
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
@@ -39,10 +39,9 @@ class BatchedEnvironments:
     once. Trails evaporate if `falls`.
 
     Attributes:
-        arrays: Arrays by name, with one row per ant. States: paper states uint8, states int32.
-            Results
-            of the last step: rewards_of float64, reasons uint8 (`Reason`), and results uint8, see
-            `layout.TERMINATED`, with a bit of an ended episode until the next one begins. Last
+        arrays: Arrays by name, with one row per ant. States: paper_states uint8, states int32.
+            Results of the last step: rewards_of float64, reasons uint8 (`Reason`), and results
+            uint8, see `layout.TERMINATED`; of a rollout, only whether the episode has ended. Last
             states of an episode that a step has restarted: final_states int32, final_paper_states
             uint8. Deliveries of the episode, and of one that a step has restarted: deliveries,
             final_deliveries.
@@ -118,8 +117,8 @@ class BatchedEnvironments:
         Args:
             rows: Arrays (steps, n, ...) by name. `taken`, int64, are the actions: given ones or,
                 with a policy, those it chose. The results are `seen`, observations of the dtype of
-                `shown`; `rewards_of`, float64; `results`, uint8, see `layout.TERMINATED`; and if
-                the next episode begins in the step that ends one, `final_states`, int32.
+                `shown`; `rewards_of`, float64; `result_rows`, uint8, see `layout.TERMINATED`; and,
+                if the next episode begins in the step that ends one, `final_states`, int32.
             shown: The observation of each state, int64 or float32 (n_states, ...).
             begins: True for ants that start an episode in the first step, bool (n,).
             after_end: The command after the last step of an episode; STEP if the next episode
@@ -149,9 +148,7 @@ class BatchedEnvironments:
             for first in range(0, len(rows["taken"]), steps):
                 part = {name: one[first : first + steps].reshape(-1) for name, one in rows.items()}
                 launch({**values, **part, "n_steps": len(part["taken"]) // self.n})
-        ended = (self.arrays["commands"] != Command.STEP) * np.uint8(TRUNCATED)
         self.arrays["rewards_of"][:] = rows["rewards_of"][-1]
-        self.arrays["results"][:] = rows["results"][-1] | ended
 
     def _launch(self, follows: bool, width: int) -> Callable[[Mapping[str, Any]], None]:
         """Return the launch of a rollout with observations of `width` numbers."""

@@ -64,7 +64,10 @@ def rollout_kernel(
         if ti.static(follows):
             a.taken[row] = code >> _ACTION & 7
         a.rewards_of[row] = a.rewards[result & (TRUNCATED - 1)]
-        a.results[row] = ti.cast(result & 255, ti.u8)
+        if ti.static(single):
+            a.results[row] = ti.cast(result & 255, ti.u8)
+        else:
+            a.result_rows[row] = ti.cast(result & 255, ti.u8)
         for k in ti.static(range(width)):
             a.seen[row * width + k] = a.shown[state * width + k]
 
@@ -150,6 +153,7 @@ def rollout_kernel(
             a.reasons[i] = ti.cast(reason, ti.u8)
         else:
             a.commands[i] = ti.cast(command, ti.u8)
+            a.results[i] = ti.cast(ti.select(command == Command.STEP, 0, TRUNCATED), ti.u8)
         if ti.static(follows):
             a.choices[i] = choices
 
