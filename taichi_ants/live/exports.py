@@ -33,7 +33,7 @@ def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300
     from taichi_ants.rendering import colony_snapshots, frames, save_animation
 
     passed = _snapshots(log, most_frames, progress)
-    shown = (one for session, _ in passed for one in colony_snapshots(session.colony))
+    shown = (snapshot for session, _ in passed for snapshot in colony_snapshots(session.colony))
     pictures = frames(shown, task=log.setup.task)
     return bytes_of("session.gif", lambda path: save_animation(path, pictures, fps=12.0))
 
@@ -110,8 +110,8 @@ class Making:
         self._cancelled = False
         context = multiprocessing.get_context("spawn")
         self._answers, answers = context.Pipe(duplex=False)
-        given = (kind, content, prepare, answers)
-        self._process = context.Process(target=_make, args=given, daemon=True)
+        arguments = (kind, content, prepare, answers)
+        self._process = context.Process(target=_make, args=arguments, daemon=True)
         threading.Thread(target=self._run, args=(answers,), daemon=True).start()
 
     def go_on(self) -> None:

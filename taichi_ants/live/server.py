@@ -265,8 +265,8 @@ class SessionServer:
         took, passed = time.monotonic() - began, self.session.steps - before
         if passed == ticks and took > 0:
             self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
-        usual = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
-        self._due = max(self._due + usual, began + took)  # do not catch up on lost time
+        interval = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
+        self._due = max(self._due + interval, began + took)  # do not catch up on lost time
 
     def _leap(self) -> int:
         """Return the estimated number of steps that fill the time of a frame.
@@ -408,8 +408,8 @@ class SessionServer:
 
         def show() -> None:
             self._pages.update([page] if page else [])
-            for one in [page] if page else self._pages:
-                one.begin(*messages)
+            for receiver in [page] if page else self._pages:
+                receiver.begin(*messages)
 
         self._post(show)
 
@@ -484,23 +484,23 @@ class SessionServer:
         The page does not contain a secret; a socket requires the token.
         """
         method = getattr(request, "method", "GET")  # websockets before 17 accepts only GET
-        asked = urlsplit(request.path)
+        url = urlsplit(request.path)
         hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
         host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
-        opens, tokens = asked.path == "/socket", parse_qs(asked.query).get("token", [])
+        opens, tokens = url.path == "/socket", parse_qs(url.query).get("token", [])
         mine = len(host) == 1 and host[0] in hosts
         # The origin of a socket must be this server. The page must not be requested by other pages.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
         knows = hmac.compare_digest("".join(tokens[:1]).encode(), self.token.encode())
         if method not in ("GET", "HEAD")[: 1 if opens else 2]:
             response = connection.respond(405, "Only GET is allowed here.\n")
-        elif not mine or not (knows or (asked.path == "/" and not tokens)):
+        elif not mine or not (knows or (url.path == "/" and not tokens)):
             response = connection.respond(403, "Open the address that the command printed.\n")
         elif opens:
             if self._joined < _MOST_PAGES:
                 return None
             response = connection.respond(503, "Too many pages are open.\n")
-        elif asked.path != "/":
+        elif url.path != "/":
             response = connection.respond(404, "This page does not exist.\n")
         else:
             response = connection.respond(200, live_page(f"ws://{host[0]}"))

@@ -40,7 +40,7 @@ _LARGEST = 1 << 26  # bytes of a colony above which there are no snapshots
 def cells_of(edit: Any) -> int:
     """Return the number of cells that an edit names, 0 if it names none."""
     settings = list(edit.values()) if isinstance(edit, dict) else []
-    lists = [one.get("cells") for one in settings if isinstance(one, dict)]
+    lists = [setting.get("cells") for setting in settings if isinstance(setting, dict)]
     return sum(len(cells) for cells in lists if isinstance(cells, list))
 
 
@@ -225,8 +225,8 @@ class Session:
         return self._recorder.snapshot()
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
-        one = edits.checked(edit, self.interventions)
-        plain = one.facts()
+        intervention = edits.checked(edit, self.interventions)
+        plain = intervention.facts()
         check_room(len(self.edits) + 1, self._cells + cells_of(plain))
         begins = not (goes_on and self.changes)
         if begins:
@@ -242,7 +242,7 @@ class Session:
         self._cells += cells_of(plain)
         self._episodes += "episode" in plain
         try:
-            one.apply(self.interventions)
+            intervention.apply(self.interventions)
         except AntsError:
             del self.edits[known[0] :], self.changes[known[1] :]
             self._cells, self._episodes = known[2:]
@@ -262,8 +262,8 @@ class Session:
         bare.setup, bare.edits, bare.changes, bare._snapshots = None, [], [], []
         content = zlib.compress(pickle.dumps(bare, pickle.HIGHEST_PROTOCOL), 1)
         kept.append(_Snapshot(len(self.edits), self._spent, content))
-        while len(kept) > 1 and sum(len(one.content) for one in kept) > _MOST_KEPT:
-            spent = [0.0, *(one.spent for one in kept)]
+        while len(kept) > 1 and sum(len(snapshot.content) for snapshot in kept) > _MOST_KEPT:
+            spent = [0.0, *(snapshot.spent for snapshot in kept)]
             gaps = [later - before for before, later in zip(spent, spent[2:], strict=False)]
             del kept[gaps.index(min(gaps))]
 
@@ -326,8 +326,8 @@ class Session:
 
     def same(self, other: Session) -> bool:
         """Return whether both sessions have the same setup, edits and state."""
-        one, two = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
-        return one == two and self.interventions.state() == other.interventions.state()
+        mine, others = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
+        return mine == others and self.interventions.state() == other.interventions.state()
 
     def undone(self) -> Iterator[Session]:
         """Return an iterator like `replay` that ends before the last change; it uses a snapshot.
@@ -337,7 +337,7 @@ class Session:
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
         *changes, last = self.changes
-        kept = [one for one in self._snapshots if one.edits <= last]
+        kept = [snapshot for snapshot in self._snapshots if snapshot.edits <= last]
         if kept:
             session = pickle.loads(zlib.decompress(kept[-1].content))
             session.setup, session._snapshots = self.setup, kept
@@ -357,7 +357,7 @@ class Session:
         every = max(1, -(-(log.steps + changes) // most))
         session = cls(log.setup)
         yield session, session.snapshot()
-        for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda one: one[0]):
+        for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda edit: edit[0]):
             while session.steps < steps:
                 if every == 1:
                     yield session, session.advance()
@@ -402,8 +402,8 @@ class Session:
         told = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
         if self.setup.learns:
             told["training"] = colony.training.as_dict()
-        given = (table, told, colony.task.observation)
-        return bytes_of("policy.npz", lambda path: save_policy(path, *given))
+        arguments = (table, told, colony.task.observation)
+        return bytes_of("policy.npz", lambda path: save_policy(path, *arguments))
 
     def colony_bytes(self) -> bytes:
         """Return the bytes of a file from which `Colony.load` resumes the colony.

@@ -30,7 +30,7 @@ def shares_of(castes: Sequence[Caste], nest: int) -> list[float | None]:
     neither = [caste for caste in here if caste.share is None and caste.ants is None]
     shares: list[float | None] = []
     for caste in castes:
-        if not any(caste is one for one in here) or caste.ants is not None:
+        if not any(caste is other for other in here) or caste.ants is not None:
             shares.append(None)
         elif caste.share is not None:
             shares.append(caste.share)
@@ -110,10 +110,10 @@ def draw_trait(seed: int, number: int) -> float:
     return high / _WORDS
 
 
-def epsilon_of(caste: Caste, ant: Ant, usual: float) -> float:
+def epsilon_of(caste: Caste, ant: Ant, default: float) -> float:
     """Return the exploration rate of an ant, whose caste can have another one than `usual`."""
     if caste.epsilon is None:
-        return usual
+        return default
     if not caste.epsilon_spread:
         return caste.epsilon
     return caste.epsilon + caste.epsilon_spread * (2.0 * ant.trait - 1.0)
@@ -145,5 +145,5 @@ def lays(task: Task, ant: Ant, name: str) -> bool:
     if not task.castes:
         return True
     caste = list(task.castes.values())[ant.caste]
-    names = [one.strip() for one in caste.lays.split(",")]
+    names = [name.strip() for name in caste.lays.split(",")]
     return names == ["all"] or name in names

@@ -125,7 +125,7 @@ class ReferenceColony:
             task.evaporation_in_evaluation if sharing == "frozen" else task.evaporation_in_training
         )
         self.pheromone = task.pheromone if falls else task.pheromone.lasting
-        self.fields = {n: one if falls else one.lasting for n, one in task.fields.items()}
+        self.fields = {n: field if falls else field.lasting for n, field in task.fields.items()}
         if task.observation in OBSERVATIONS:
             self._row = OBSERVATIONS[task.observation]
             self._turns = TURNS.get(task.observation, AHEAD)
@@ -184,8 +184,8 @@ class ReferenceColony:
         """Return the names of the cues by caste."""
         task = self.task
         return [
-            (one.outbound_cue or task.outbound_cue, one.homing_cue or task.homing_cue)
-            for one in self.castes or [NO_CASTE]
+            (caste.outbound_cue or task.outbound_cue, caste.homing_cue or task.homing_cue)
+            for caste in self.castes or [NO_CASTE]
         ]
 
     def _set_up(self) -> None:
@@ -341,7 +341,9 @@ class ReferenceColony:
                 if self.sharing == "independent":
                     self.minds.of(ant).begin()
         if self.task.labour.rule == "thresholds":
-            self.stimuli[:] = [one + (self.task.labour.demand or 0.0) for one in self.stimuli]
+            self.stimuli[:] = [
+                stimulus + (self.task.labour.demand or 0.0) for stimulus in self.stimuli
+            ]
         self.record.ticks += 1
 
     def _pay(self, pairs: Sequence[tuple[Ant, Ant]], tick: int) -> None:
@@ -371,9 +373,9 @@ class ReferenceColony:
     def _choice_of(self, ant: Ant) -> Choice:
         """Return the rule of choice with the numbers of the ant's caste."""
         caste = self.caste_of(ant)
-        own = {name: getattr(caste, name) for name in ("temperature", "k", "exponent")}
-        own = {name: number for name, number in own.items() if number is not None}
-        return replace(self.task.choice, **own) if own else self.task.choice
+        numbers = {name: getattr(caste, name) for name in ("temperature", "k", "exponent")}
+        numbers = {name: number for name, number in numbers.items() if number is not None}
+        return replace(self.task.choice, **numbers) if numbers else self.task.choice
 
     def _epsilon_of(self, ant: Ant) -> float:
         return epsilon_of(self.caste_of(ant), ant, self.epsilon)

@@ -122,11 +122,11 @@ def _connected(food_sources: list[FoodSource]) -> list[list[FoodSource]]:
     for source in food_sources:
         if source.cell not in missing:
             continue
-        found = [missing.pop(source.cell)]
-        for member in found:  # the list grows during this loop
+        pile = [missing.pop(source.cell)]
+        for member in pile:  # the list grows during this loop
             around = (neighbour(member.cell, heading) for heading in range(N_HEADINGS))
-            found += [missing.pop(cell) for cell in around if cell in missing]
-        piles.append(sorted(found, key=food_sources.index))
+            pile += [missing.pop(cell) for cell in around if cell in missing]
+        piles.append(sorted(pile, key=food_sources.index))
     return piles
 
 

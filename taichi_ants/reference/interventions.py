@@ -43,8 +43,8 @@ class Interventions:
         self._first = colony.start_world
         self._pheromone = colony.task.pheromone
         self._falls = colony.pheromone.evaporation == self._pheromone.evaporation
-        for name, one in colony.fields.items():
-            self._falls = self._falls and one == colony.task.fields[name]
+        for name, field in colony.fields.items():
+            self._falls = self._falls and field == colony.task.fields[name]
         world = colony.start_world
         # The content of the cells that are not empty when later episodes start.
         self._queens = list(colony.world.queens)  # when later episodes start
@@ -132,8 +132,8 @@ class Interventions:
         bare = World(self._first.ranges, world.queen, obstacles=rocks)
         rules = self.colony.task.rules
         world.trail = self._copy(world.trail, Trail(bare, world.pheromone, rules=rules))
-        for name, one in self.colony.fields.items():
-            world.fields[name] = self._copy(world.fields[name], Trail(bare, one, rules=rules))
+        for name, field in self.colony.fields.items():
+            world.fields[name] = self._copy(world.fields[name], Trail(bare, field, rules=rules))
 
     def _copy(self, old: Trail, new: Trail) -> Trail:
         """Return a new trail after setting it to the levels of an old one."""
@@ -159,7 +159,7 @@ class Interventions:
         """
         queens = self.colony.world.queens
         nests = [
-            min(range(len(queens)), key=lambda one: distance(cell, queens[one]))
+            min(range(len(queens)), key=lambda queen: distance(cell, queens[queen]))
             if nest is None
             else nest
             for cell in cells
@@ -186,13 +186,13 @@ class Interventions:
         colony, world = self.colony, self.colony.world
         wanted = range(len(world.queens)) if nest is None else [nest]
         orders = {
-            one: start_order(self._first, world.queens[one], colony.seed, colony.start)
-            for one in wanted
+            number: start_order(self._first, world.queens[number], colony.seed, colony.start)
+            for number in wanted
         }
         cells: list[Cell] = []
         nests = [wanted[k % len(wanted)] for k in range(n)]
-        for one in nests:
-            free = (cell for cell in orders[one] if world.content(cell) == EMPTY)
+        for number in nests:
+            free = (cell for cell in orders[number] if world.content(cell) == EMPTY)
             cells.append(next(cell for cell in free if cell not in cells))
         self._add(cells, nests, heading)
 
@@ -254,8 +254,8 @@ class Interventions:
         now = replace(self._pheromone, **still)
         self.colony.pheromone = self.colony.world.pheromone = now
         self.colony.fields = {
-            name: one if self._falls else one.lasting
-            for name, one in self.colony.task.fields.items()
+            name: field if self._falls else field.lasting
+            for name, field in self.colony.task.fields.items()
         }
         self._new_trail()
 

@@ -42,7 +42,7 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
     """
     turns, cells = observation.cells, cells_in_view(ant, observation.cells)
     shown = [turn not in ant.misread for turn in turns]
-    own, queen = world.cue(ant), world.queens[ant.nest]
+    cue, queen = world.cue(ant), world.queens[ant.nest]
     # All levels of cues are float32 if those of one cue are.
     cues = {name for pair in world.cues for name in pair if name != "compass"}
     dense = any(world.pheromone_named(name).rule.dense for name in cues)
@@ -54,7 +54,7 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
             for cell, shows in zip(cells, shown, strict=True)
         )
 
-    ahead, own_level = levels(own, kind), kind(own.level(ant.cell))
+    ahead, own_level = levels(cue, kind), kind(cue.level(ant.cell))
     if world.cues[ant.caste][1] == "compass":
         far = distance(ant.cell, queen)
         nearer = [distance(cell, queen) < far for cell in cells]

@@ -51,7 +51,7 @@ def content_policy(script: str, style: str, connect: str = "") -> str:
     none). Style attributes are allowed, because they position and colour bars and drawings.
     """
     digests = [hashlib.sha256(text.encode()).digest() for text in (script, style)]
-    scripts, styles = (f"'sha256-{base64.b64encode(one).decode()}'" for one in digests)
+    scripts, styles = (f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
     rules = [
         *("default-src 'none'", f"script-src {scripts}", f"style-src-elem {styles}"),
         *("style-src-attr 'unsafe-inline'", "img-src data:", "base-uri 'none'"),

@@ -126,7 +126,7 @@ class CasteRow(IntEnum):
     LAYS = auto()  # a bit for each pheromone
     CUES = auto()  # the number of its cues in `Task.all_cues`
     LIFESPAN = auto()  # -1 if it does not die
-    QUIT = auto()  # 0 without a threshold
+    STOP_PROBABILITY = auto()  # 0 without a threshold
     DISTRIBUTION = auto()  # of thresholds, a number in `DISTRIBUTIONS`
     VALUE = auto()
     SPREAD = auto()

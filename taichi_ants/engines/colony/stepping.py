@@ -78,8 +78,8 @@ class Stepper:
             lanes = lanes_for(n_worlds)
             self._launch_ticks(state, n, parts=lanes * -(-n_worlds // lanes), lanes=lanes)
             return
-        usual = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
-        interval = max(_FEWEST_TICKS, min(_MOST_TICKS, usual))
+        interval = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
+        interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
         while state.ticks < end:
             if state.ticks % interval == 0:
                 state.sort_ants()
@@ -95,8 +95,8 @@ class Stepper:
 
     def _share_ticks(self, state: ColonyState, n: int) -> None:
         """Advance by up to n ticks, which threads share."""
-        most = min(runtime.start().threads, runtime.available_threads(), state.chunks)
-        n, threads = self.threads.plan(n, most)
+        n_threads = min(runtime.start().threads, runtime.available_threads(), state.chunks)
+        n, threads = self.threads.plan(n, n_threads)
         compiled, began = "ticks" in self._launches, time.perf_counter()
         self._launch_ticks(state, n, threads)
         if compiled:
@@ -147,7 +147,7 @@ def lanes_for(n_worlds: int) -> int:
 def _field_numbers(state: ColonyState) -> dict[str, Any]:
     """Return the numbers of further fields, empty without fields."""
     fields = state.fields.values()
-    counts = {"counts_without_food": int(any(one.counts_without_food for one in fields))}
+    counts = {"counts_without_food": int(any(field.counts_without_food for field in fields))}
     return (counts if fields else {}) | {
         f"{name}_{number}": value
         for number, field in enumerate(fields, start=1)
