@@ -151,9 +151,7 @@ class DeclaredSetting(NamedTuple):
         if self.rule.only is not None:
             other, *values = self.rule.only
             flag = _below(self.path.rpartition(".")[0], other).replace("_", "-")
-            parts.append(
-                f"only with --{flag} {_either(str(allowed).lower() for allowed in values)}"
-            )
+            parts.append(f"only with --{flag} {_either(str(word).lower() for word in values)}")
         default = self.rule.usual if value is None else value
         if self.is_group:
             default = next((name for name, preset in named.items() if preset == default), MISSING)
@@ -330,9 +328,9 @@ class Settings(metaclass=_Checked):
             object.__setattr__(self, setting.name, setting.checked(getattr(self, setting.name)))
         for setting in declared(type(self)):
             if setting.rule.only is not None:
-                self._settle(setting)
+                self._fill_or_refuse(setting)
 
-    def _settle(self, setting: DeclaredSetting) -> None:
+    def _fill_or_refuse(self, setting: DeclaredSetting) -> None:
         """Refuse a setting that has no effect; replace None by the usual value if it has one."""
         assert setting.rule.only is not None
         other, *values = setting.rule.only
@@ -415,9 +413,7 @@ class Named(dict[str, Entry], Generic[Entry]):
     """
 
     def _refuse(self, *arguments: Any, **named: Any) -> Any:
-        raise TypeError(
-            "named settings are read-only; use `replace` of the settings that have them"
-        )
+        raise TypeError("named settings are read-only; use `replace` of what has them")
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     clear = pop = popitem = setdefault = update = _refuse
@@ -450,14 +446,10 @@ def settings_of_entry(group: DeclaredSetting, name: str) -> dict[str, DeclaredSe
     return {path: setting._replace(path=path) for path, setting in of_entry.items()}
 
 
-_DECLARED: dict[Any, tuple[DeclaredSetting, ...]] = {}
-
-
+@cache
 def declared(cls: Any) -> tuple[DeclaredSetting, ...]:
     """Return the settings of a class or function: its fields or arguments with a `Setting`."""
-    if cls not in _DECLARED:
-        _DECLARED[cls] = tuple(_read(cls))
-    return _DECLARED[cls]
+    return tuple(_read(cls))
 
 
 def _read(cls: Any) -> Iterator[DeclaredSetting]:
@@ -481,12 +473,8 @@ def _read(cls: Any) -> Iterator[DeclaredSetting]:
 def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(cls, type):
         for attribute in fields(cls):
-            default = (
-                attribute.default
-                if attribute.default_factory is MISSING
-                else attribute.default_factory()
-            )
-            yield attribute.name, default
+            make = attribute.default_factory
+            yield attribute.name, attribute.default if make is MISSING else make()
     else:
         for name, argument in signature(cls).parameters.items():
             yield name, MISSING if argument.default is argument.empty else argument.default
@@ -547,7 +535,7 @@ def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def nested(named: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings by full names as nested mappings, the form that `Settings.but` takes."""
+    """Return settings by full names as nested mappings, the form that `Settings.replace` takes."""
     tree: dict[str, Any] = {}
     for path, value in named.items():
         *outer, last = path.split(".")

@@ -40,7 +40,7 @@ PAID = {
 
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """An ant's action, 0 to 4, and its effect if the ant prevails.
+    """An ant's action, 0 to 4, and its effect if the ant wins.
 
     Attributes:
         heading: The heading of a move or a pick-up, towards its target.

@@ -216,7 +216,7 @@ class Interventions:
 
     def set_policy(self, q_values: np.ndarray) -> None:
         """Let all ants follow a table."""
-        for learner in self.colony.minds.tables:
+        for learner in self.colony.learners.tables:
             learner.rows = [list(row) for row in np.asarray(q_values, np.float32)]
 
     def remove_ants(self, cells: Sequence[Cell], nest: int | None = None) -> None:
@@ -266,7 +266,7 @@ class Interventions:
     def set_learning_rate(self, learning_rate: float) -> None:
         """Set the learning rate for this and all later episodes."""
         self._learning_rate = self.colony.learning_rate = learning_rate
-        self.colony.minds.set_learning_rate(learning_rate)
+        self.colony.learners.set_learning_rate(learning_rate)
 
     def begin_episode(self) -> None:
         """End the episode, and start the next one in the world as interventions have changed it."""

@@ -44,7 +44,7 @@ class Protocol:
         colony.begin_episode()
         self._happened: set[int] = set()
         self._interventions = Interventions(colony)
-        tables = copy.deepcopy([learner.rows for learner in colony.minds.tables])
+        tables = copy.deepcopy([learner.rows for learner in colony.learners.tables])
         self._before = colony.task, colony.epsilon, colony.learning_rate, tables
         self._pheromones = colony.pheromone, colony.fields
 
@@ -54,10 +54,10 @@ class Protocol:
         colony.task, colony.epsilon, learning_rate, tables = self._before
         colony.pheromone, colony.fields = self._pheromones
         colony.take_castes()
-        colony.minds.set_learning_rate(learning_rate)
+        colony.learners.set_learning_rate(learning_rate)
         colony.learning_rate = learning_rate
         if colony.sharing == "frozen":
-            for learner, rows in zip(colony.minds.tables, tables, strict=True):
+            for learner, rows in zip(colony.learners.tables, tables, strict=True):
                 learner.rows = rows
         colony.end_episode()
 

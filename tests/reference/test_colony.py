@@ -29,8 +29,8 @@ def test_one_ant_learns_into_a_shared_table_what_it_learns_into_its_own(learner,
         alone = train(world, learning, seed, 3, 40, task)
         colony = ReferenceColony(world, task, learning, seed, ends_at_delivery=True)
         assert colony.run(3, 40) == alone.trace
-        assert colony.minds.tables[0].rows == alone.learner.rows
-        assert list(colony.minds.tables[0].model.items()) == list(alone.model.items())
+        assert colony.learners.tables[0].rows == alone.learner.rows
+        assert list(colony.learners.tables[0].model.items()) == list(alone.model.items())
         n_deliveries += sum(alone.deliveries)
     assert n_deliveries >= 3
 

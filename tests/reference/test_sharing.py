@@ -48,55 +48,55 @@ def table(**values):
     return q_values
 
 
-def changed(minds):
+def changed(learners):
     """The values that are not zero, by state and action."""
-    q_values = minds.tables[0].table()
+    q_values = learners.tables[0].table()
     return {(int(s), int(a)): float(q_values[s, a]) for s, a in np.argwhere(q_values)}
 
 
 def test_one_error_counts_as_for_a_single_ant():
-    minds = shared()
+    learners = shared()
     step = transition(0, 1, 3, 5)
-    minds.learn([step], streams(1), 0.0)
+    learners.learn([step], streams(1), 0.0)
     assert step.td_error == 3
-    assert changed(minds) == {(0, 1): 1.5}
+    assert changed(learners) == {(0, 1): 1.5}
 
 
 def test_two_errors_of_one_pair():
     # Errors 3 and -1: the mean 1, times 1 - 1/4.
-    minds = shared()
-    minds.learn([transition(0, 1, 3, 5), transition(0, 1, -1, 6, number=1)], streams(2), 0.0)
-    assert changed(minds) == {(0, 1): 0.75}
+    learners = shared()
+    learners.learn([transition(0, 1, 3, 5), transition(0, 1, -1, 6, number=1)], streams(2), 0.0)
+    assert changed(learners) == {(0, 1): 0.75}
 
 
 def test_three_errors_of_one_pair_and_one_of_another():
     # Errors by the table as it was before: 3 + 4/2 - 2 = 3, -1 + 0 - 2 = -3, 10 - 2 = 8 (ended);
     # the mean 8/3 times 1 - 1/8; both in float32. The other pair: 1 + 2/2 - 4 = -2.
-    minds = shared(q_values=table(s0a1=2, s5a0=4))
+    learners = shared(q_values=table(s0a1=2, s5a0=4))
     steps = [
         transition(0, 1, 3, 5),
         transition(5, 0, 1, 0, number=1),
         transition(0, 1, -1, 6, number=2),
         transition(0, 1, 10, 5, number=3, terminated=True),
     ]
-    minds.learn(steps, streams(4), 0.0)
+    learners.learn(steps, streams(4), 0.0)
     assert [step.td_error for step in steps] == [3, -2, -3, 8]
     mean = np.float32(8 / 3)
     value = np.float32(2) + np.float32(0.875) * mean
-    assert changed(minds) == {(0, 1): float(value), (5, 0): 3.0}
+    assert changed(learners) == {(0, 1): float(value), (5, 0): 3.0}
 
 
 @pytest.mark.parametrize("n", [2, 3, 5, 8])
 def test_equal_errors_go_as_far_as_so_many_updates_in_turn(n):
     # All towards one target that does not depend on the table: a terminal reward of 8.
-    minds = shared()
-    minds.learn(
+    learners = shared()
+    learners.learn(
         [transition(0, 1, 8, 5, number=k, terminated=True) for k in range(n)], streams(n), 0.0
     )
     value = 0.0
     for _ in range(n):
         value += 0.5 * (8 - value)
-    assert changed(minds) == {(0, 1): value}
+    assert changed(learners) == {(0, 1): value}
 
 
 def test_the_order_of_the_ants_does_not_matter():
@@ -105,9 +105,9 @@ def test_the_order_of_the_ants_does_not_matter():
     ants = [transition(0, 1, 0, state, number=state) for state in (1, 2, 3)]
     results = []
     for order in itertools.permutations(ants):
-        minds = shared(q_values=q_values)
-        minds.learn(order, streams(3), 0.0)
-        results.append(minds.tables[0].table())
+        learners = shared(q_values=q_values)
+        learners.learn(order, streams(3), 0.0)
+        results.append(learners.tables[0].table())
     assert all((result == results[0]).all() for result in results)
 
 
@@ -243,18 +243,18 @@ def test_sarsa_after_a_delivery():
         assert n_draws(colony.ants[0].stream.state, start) == 2
 
 
-def entries(minds):
+def entries(learners):
     return [
         (*pair, seen.reward, seen.next_state, seen.terminated)
-        for pair, seen in minds.tables[0].model.items()
+        for pair, seen in learners.tables[0].model.items()
     ]
 
 
 def test_the_model_of_all():
-    minds = shared("dyna_q", learning_rate=1.0, planning_steps=1)
+    learners = shared("dyna_q", learning_rate=1.0, planning_steps=1)
     # Of one pair the highest number counts (not the slot, not the place in the list), and new
     # pairs come in ascending order of 5 * state + action.
-    minds.learn(
+    learners.learn(
         [
             transition(9, 2, 0, 3, number=4, slot=1),
             transition(7, 3, 3, 4, number=7, slot=0),
@@ -265,27 +265,27 @@ def test_the_model_of_all():
         0.0,
     )
     first = [(7, 0, 1, 6, False), (7, 3, 3, 4, False), (9, 2, 0, 3, False)]
-    assert entries(minds) == first
+    assert entries(learners) == first
     # Pairs known already keep their places; what was seen last replaces what was seen before, be
     # the ant's number as low as it may.
-    minds.learn(
+    learners.learn(
         [transition(9, 2, 10, 1, number=0, terminated=True), transition(1, 1, 0, 2, number=1)],
         streams(2),
         0.0,
     )
-    assert entries(minds) == [*first[:2], (9, 2, 10, 1, True), (1, 1, 0, 2, False)]
+    assert entries(learners) == [*first[:2], (9, 2, 10, 1, True), (1, 1, 0, 2, False)]
 
 
 def test_a_round_of_planning_by_hand():
     # Real updates: pair (0, 1), reward 8, ended, by two ants: 8 * 3/4 = 6. Then one round: both
     # draw the one visited pair, error 8 - 6 = 2, twice: 6 + 2 * 3/4 = 7.5. Another: 7.875.
     for rounds, value in ((1, 7.5), (2, 7.875)):
-        minds = shared("dyna_q", planning_steps=rounds)
+        learners = shared("dyna_q", planning_steps=rounds)
         ants = streams(2)
         steps = [transition(0, 1, 8, 5, number=k, terminated=True) for k in range(2)]
-        minds.learn(steps, ants, 0.0)
+        learners.learn(steps, ants, 0.0)
         assert [step.td_error for step in steps] == [8, 8]  # of the real transitions alone
-        assert changed(minds) == {(0, 1): value}
+        assert changed(learners) == {(0, 1): value}
         assert [stream.state for stream in ants] == [rounds * GAMMA % 2**64] * 2
 
 
@@ -293,17 +293,17 @@ def test_a_round_sees_the_table_as_it_stood_at_its_start():
     # Two pairs that lead to each other's states: (0, 1) gives 8 and leads to state 1, (1, 0) gives
     # 0 and leads to state 0. Real: Q(0,1) = 4, Q(1,0) = 0. The first draw of state 0 takes the
     # second of two (0.883), that of state GAMMA the first (0.432).
-    minds = shared("dyna_q", planning_steps=1)
+    learners = shared("dyna_q", planning_steps=1)
     ants = [RandomStream(0), RandomStream(GAMMA)]
-    minds.learn([transition(0, 1, 8, 1), transition(1, 0, 0, 0, number=1)], ants, 0.0)
+    learners.learn([transition(0, 1, 8, 1), transition(1, 0, 0, 0, number=1)], ants, 0.0)
     # (1, 0): error 0 + 4/2 - 0 = 2, so 1. (0, 1): error 8 + 0/2 - 4 = 4, so 6: Q(1, 0) was 0 still.
-    assert changed(minds) == {(0, 1): 6, (1, 0): 1}
+    assert changed(learners) == {(0, 1): 6, (1, 0): 1}
 
 
 def test_own_tables_plan_each_from_its_own_model():
-    minds = IndependentTables(maker("dyna_q", planning_steps=2), 3, None)
+    learners = IndependentTables(maker("dyna_q", planning_steps=2), 3, None)
     ants = streams(2)
-    minds.learn(
+    learners.learn(
         [
             transition(0, 1, 8, 5, slot=0, terminated=True),
             transition(2, 2, 4, 5, slot=2, terminated=True),
@@ -311,11 +311,11 @@ def test_own_tables_plan_each_from_its_own_model():
         ants,
         0.0,
     )
-    assert [list(mind.model) for mind in minds.tables] == [[(0, 1)], [], [(2, 2)]]
+    assert [list(learner.model) for learner in learners.tables] == [[(0, 1)], [], [(2, 2)]]
     # Three updates each: 1 - 1/8.
-    assert minds.tables[0].table()[0, 1] == 7
-    assert minds.tables[2].table()[2, 2] == 3.5
-    assert not minds.tables[1].table().any()
+    assert learners.tables[0].table()[0, 1] == 7
+    assert learners.tables[2].table()[2, 2] == 3.5
+    assert not learners.tables[1].table().any()
 
 
 def test_an_ant_born_into_a_slot_begins_with_nothing():
@@ -332,15 +332,15 @@ def test_an_ant_born_into_a_slot_begins_with_nothing():
     load(colony, 0)
     act(colony, GIVE, FORWARD)
     assert sorted(colony.ants) == [0, 2]
-    assert len(colony.minds.tables[1].model) == 1
+    assert len(colony.learners.tables[1].model) == 1
     load(colony, 0)
     act(colony, GIVE, PICK_UP)
-    tables, minds = colony.q_values, colony.minds.tables
+    tables, learners = colony.q_values, colony.learners.tables
     assert {slot: ant.number for slot, ant in colony.ants.items()} == {0: 0, 1: 3, 2: 2}
     assert not tables[1].any()
-    assert minds[1].model == {}
+    assert learners[1].model == {}
     # The one that was born first has learnt since: a pick-up in vain.
-    [(pair, seen)] = minds[2].model.items()
+    [(pair, seen)] = learners[2].model.items()
     assert (pair, seen.reward) == (colony.transitions[1].pair, -1)
     assert tables[2].min() == -0.75
     # A table stays with its slot in the next episode.
@@ -356,7 +356,7 @@ def test_tables_and_models_live_through_the_episodes_and_epsilon_decays():
     for _ in range(3):
         epsilons.append(colony.epsilon)
         colony.run(1, 20)
-        sizes.append(len(colony.minds.tables[0].model))
+        sizes.append(len(colony.learners.tables[0].model))
     assert epsilons == [0.8, 0.4, 0.3]
     assert 0 < sizes[0] <= sizes[1] <= sizes[2]
     assert [record.ticks for record in colony.records] == [20] * 3
@@ -364,7 +364,7 @@ def test_tables_and_models_live_through_the_episodes_and_epsilon_decays():
     again = ReferenceColony(MEETING, None, learning, 5, ants=4)
     again.run(3, 20)
     assert again.records == colony.records
-    assert entries(again.minds) == entries(colony.minds)
+    assert entries(again.learners) == entries(colony.learners)
 
 
 def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():

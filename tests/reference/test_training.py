@@ -37,7 +37,7 @@ def prepared(learning, task=None, rng_state=0):
     q_values = np.zeros((128, 5), np.float32)
     q_values[12, PICK_UP], q_values[76, GIVE], q_values[4, 1] = 1, 2, 4
     run = train(TWO_STEPS, learning, 0, 0, 600, task)
-    run.colony.minds.tables[0] = LEARNERS[learning.learner](learning, 128, q_values)
+    run.colony.learners.tables[0] = LEARNERS[learning.learner](learning, 128, q_values)
     run.colony.streams[0].state = rng_state
     return run
 
@@ -88,7 +88,7 @@ def test_td_errors_by_delivery_setting(learner, delivery, last):
 @pytest.mark.parametrize("learner", ["q_learning", "sarsa", "expected_sarsa"])
 def test_the_table_moves_by_the_learning_rate(learner, delivery, given):
     run = train_once(training(learner), delivery)
-    expected = prepared(training()).colony.minds.tables[0].table()
+    expected = prepared(training()).colony.learners.tables[0].table()
     expected[12, PICK_UP] = 1 + 0.5 * 3
     expected[76, GIVE] = given  # 2 + 0.5 * 8 and 2 + 0.5 * 10
     np.testing.assert_array_equal(run.q_values, expected)

@@ -85,4 +85,4 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert cells == [list(source.cell) for source in theirs]
     assert food_sources[FoodSourceRow.KIND].tolist() == [source.kind for source in theirs]
     if colony.sharing == "shared" and colony.training.learner == "dyna_q":
-        assert colony.arrays["integers"][0] == len(plain.minds.tables[0].model)
+        assert colony.arrays["integers"][0] == len(plain.learners.tables[0].model)

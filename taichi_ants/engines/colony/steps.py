@@ -550,7 +550,7 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if ti.static(v.traffic.reward_pushed):  # then a pushed ant may need the event, too
         put(c.event, ant, event_of(c, v, w, ant, tick))
     if wanted != cell:
-        if conflicts.prevails(c, v.traffic, base, cell, wanted, tick):
+        if conflicts.wins_cell(c, v.traffic, base, cell, wanted, tick):
             if ti.static(not v.traffic.reward_pushed):
                 put(c.event, ant, event_of(c, v, w, ant, tick))
             c.wants[base + cell] = c.wants[base + cell] | ti.u8(conflicts.WINS)
@@ -623,7 +623,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         enters = ti.cast(entered, ti.i32)
         takes = (moves == 0) & (wanted != cell)
     else:
-        won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
+        won = conflicts.wins_cell(c, v.traffic, base, cell, wanted, tick)
         # Arithmetic, because the compiler would make branches, which nothing can predict here.
         enters, takes = ti.cast(won, ti.i32) & moves, won & (moves == 0)
         goes = cell + enters * (wanted - cell)

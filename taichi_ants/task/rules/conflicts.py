@@ -39,7 +39,7 @@ def conflict_key(cell, tick):
 
 
 @ti.func
-def prevails(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick):
+def wins_cell(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick):
     """Return whether the ant on `cell` wins the cell `wanted`; False if that is its own cell."""
     kind = c.wants[base + cell] & 8  # 8 to take, else 0
     rivals = who_want(c, base, wanted, MARK, kind)  # the ant itself is one of them
