@@ -162,10 +162,10 @@ class OfAnts(OfCells):
 
     def check(self) -> None:
         super().check()
-        given = [name for name in ("number", "share", "cells") if getattr(self, name) is not None]
-        if len(given) != 1:
+        ways = [name for name in ("number", "share", "cells") if getattr(self, name) is not None]
+        if len(ways) != 1:
             raise AntsError(
-                f"`{self.path}` has {' and '.join(given) or 'neither number, share nor cells'}; "
+                f"`{self.path}` has {' and '.join(ways) or 'neither number, share nor cells'}; "
                 "give one of number, share and cells."
             )
 
@@ -285,8 +285,8 @@ class Move(OfCells, path="move"):
             )
 
     def apply(self, to: Interventions) -> None:
-        cell, there = (int(to.index([cell])[0]) for cell in self.cells)
-        to.move(cell, there)
+        cell, target = (int(to.index([cell])[0]) for cell in self.cells)
+        to.move(cell, target)
 
 
 @dataclass(frozen=True)
@@ -359,21 +359,23 @@ class SetTask(Intervention, path="task"):
         for name, value in self.values:
             group, _, rest = name.partition(".")
             of = rest.partition(".")[0]
-            here = known
+            settings = known
             if rest and group in _NAMED:
                 of_entry = settings_of_entry(_NAMED[group], of)
-                here = {path.removeprefix("task."): setting for path, setting in of_entry.items()}
-            if name not in here:
-                raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")
-            values.append((name, here[name].checked(value)))
+                settings = {
+                    path.removeprefix("task."): setting for path, setting in of_entry.items()
+                }
+            if name not in settings:
+                raise AntsError(f"`task.{name}` {not_a_setting(name, settings)}")
+            values.append((name, settings[name].checked(value)))
         object.__setattr__(self, "values", tuple(sorted(values)))
 
     @classmethod
     def converted(cls, value: Any) -> Any:
         if not isinstance(value, Mapping):
             return value
-        given = flat({k: v for k, v in value.items() if isinstance(k, str)})
-        return cls(tuple(given.items()))
+        numbers = flat({k: v for k, v in value.items() if isinstance(k, str)})
+        return cls(tuple(numbers.items()))
 
     def as_dict(self) -> dict[str, Any]:
         return dict(self.values)

@@ -283,10 +283,10 @@ class _Checked(type):
 @cache
 def _arguments(cls: type) -> tuple[str, ...]:
     """Return the names of the arguments of a class; none if it takes any name."""
-    every = signature(cls.__init__).parameters.values()  # type: ignore[misc]
-    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in every):
+    parameters = signature(cls.__init__).parameters.values()  # type: ignore[misc]
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
         return ()
-    return tuple(parameter.name for parameter in every)[1:]
+    return tuple(parameter.name for parameter in parameters)[1:]
 
 
 class Settings(metaclass=_Checked):
@@ -462,8 +462,8 @@ def _read(cls: Any) -> Iterator[DeclaredSetting]:
             continue
         kind, *rules = get_args(hint)
         rule = Setting()
-        for more in rules:
-            rule = rule.replace(more)
+        for other in rules:
+            rule = rule.replace(other)
         entry = get_args(kind)[0] if get_origin(kind) is Named else NoneType
         kind, words, optional = _kind_of(kind)
         path = _below(getattr(cls, "path", "world"), name)  # functions build worlds

@@ -166,8 +166,8 @@ def _world(seed: int) -> World:
     world = worlds.open_world(seed, ranges=(5, 5, 5))
     if seed % 4 < 2:
         return world
-    far = np.where(world.ground() == EMPTY, world.distances(), 0)
-    other = world.grid.cells(far.argmax()).tolist()
+    distances = np.where(world.ground() == EMPTY, world.distances(), 0)
+    other = world.grid.cells(distances.argmax()).tolist()
     return World(world.ranges, [world.queen, other], world.foods, world.obstacles)
 
 

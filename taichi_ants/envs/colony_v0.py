@@ -157,13 +157,13 @@ class HexColonyParallelEnv(ParallelEnv):
         worlds.step(chosen)
         living, ended = worlds.colony.living[0], bool(worlds.over()[0])
         born = np.setdiff1d(np.flatnonzero(living & (not ended)), slots).tolist()
-        told, seen = acting + self._names(born), slots + born
-        observations, infos = self._told(told, seen)
-        rewards = dict(zip(told, worlds.rewards[0, seen].tolist(), strict=True))
-        terminated = dict(zip(told, (~living[seen]).tolist(), strict=True))
-        truncated = dict.fromkeys(told, ended)
+        names, seen = acting + self._names(born), slots + born
+        observations, infos = self._told(names, seen)
+        rewards = dict(zip(names, worlds.rewards[0, seen].tolist(), strict=True))
+        terminated = dict(zip(names, (~living[seen]).tolist(), strict=True))
+        truncated = dict.fromkeys(names, ended)
         stay = [] if ended else [k for k, slot in enumerate(seen) if living[slot]]
-        self.agents, self._slots = [told[k] for k in stay], [seen[k] for k in stay]
+        self.agents, self._slots = [names[k] for k in stay], [seen[k] for k in stay]
         return observations, rewards, terminated, truncated, infos
 
     def _action(self, actions: dict[str, int], name: str) -> int:

@@ -64,13 +64,13 @@ def unfinished(target: Path) -> Iterator[Path]:
     """
     # A hash, because the name itself can already have the greatest length allowed.
     name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
-    for left in _left_in(target.parent):
+    for leftover in _left_in(target.parent):
         with suppress(OSError):
             if (
-                left.name.startswith(f".{name}.")
-                and time.time() - left.stat().st_mtime > _ABANDONED
+                leftover.name.startswith(f".{name}.")
+                and time.time() - leftover.stat().st_mtime > _ABANDONED
             ):
-                _remove(left)
+                _remove(leftover)
     temporary = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
     try:
         yield temporary

@@ -32,8 +32,10 @@ def _cells(values: object) -> np.ndarray:
             f"cells have shape {array.shape} and type {array.dtype}; they must be whole numbers of "
             "shape (..., 3)."
         )
-    if (far := (array > FAR) | (array < -FAR)).any():
-        raise AntsError(f"a coordinate is {array[far][0]}; it must be between -2**40 and 2**40.")
+    if (too_far := (array > FAR) | (array < -FAR)).any():
+        raise AntsError(
+            f"a coordinate is {array[too_far][0]}; it must be between -2**40 and 2**40."
+        )
     return array.astype(np.int64)
 
 

@@ -85,8 +85,8 @@ def record(
     pieces = []
     for columns, chances, run in record_steps(world, task, max_steps, runs, episodes, progress):
         piece = {name: columns[there] for name, there in _FROM_TRACE.items()}
-        more = {"run": run, "behaviour_probability": chances, "agent": np.zeros_like(run)}
-        pieces.append(_typed({**piece, **more}))
+        constants = {"run": run, "behaviour_probability": chances, "agent": np.zeros_like(run)}
+        pieces.append(_typed({**piece, **constants}))
     return _dataset(pieces, world=world, task=task, seeds=numbers, behaviour=facts)
 
 

@@ -25,12 +25,12 @@ def shares_of(castes: Sequence[Caste], nest: int) -> list[float | None]:
 
     Castes with neither divide the remaining share equally.
     """
-    here = [caste for caste in castes if caste.nest is None or caste.nest == nest]
-    taken = sum([caste.share for caste in here if caste.share is not None])
-    neither = [caste for caste in here if caste.share is None and caste.ants is None]
+    of_nest = [caste for caste in castes if caste.nest is None or caste.nest == nest]
+    taken = sum([caste.share for caste in of_nest if caste.share is not None])
+    neither = [caste for caste in of_nest if caste.share is None and caste.ants is None]
     shares: list[float | None] = []
     for caste in castes:
-        if not any(caste is other for other in here) or caste.ants is not None:
+        if not any(caste is other for other in of_nest) or caste.ants is not None:
             shares.append(None)
         elif caste.share is not None:
             shares.append(caste.share)
@@ -56,8 +56,8 @@ def castes_at_start(castes: Sequence[Caste], nest: int, n: int) -> list[int]:
     quotas = [round(share * rest, 9) if share is not None else 0.0 for share in shares]
     numbers = [fixed + int(quota) for fixed, quota in zip(numbers, quotas, strict=True)]
     while sum(numbers) < n:
-        left = [quota - int(quota) for quota in quotas]
-        largest = left.index(max(left))
+        remainders = [quota - int(quota) for quota in quotas]
+        largest = remainders.index(max(remainders))
         numbers[largest] += 1
         quotas[largest] = 0.0
     return [caste for caste, number in enumerate(numbers) for _ in range(number)]

@@ -333,10 +333,12 @@ class ReferenceColony:
                     stopping.add(ant.slot)
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
-        both = [(was, ant) for was, ant, f in zip(before, acting, foraged, strict=True) if f]
-        self._pay(both, tick)
+        pairs = [(was, ant) for was, ant, f in zip(before, acting, foraged, strict=True) if f]
+        self._pay(pairs, tick)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
-        self._learn([was for was, _ in both], [ant for _, ant in both], stopping, last or self.over)
+        self._learn(
+            [was for was, _ in pairs], [ant for _, ant in pairs], stopping, last or self.over
+        )
         for ant in acting:
             if ant.slot in stopping:
                 ant.idle, ant.chosen = True, None

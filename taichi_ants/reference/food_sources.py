@@ -45,20 +45,20 @@ class FoodSources:
         source, a new one is appended. It joins the pile of the first adjacent food source, or
         forms a new pile.
         """
-        here = [source for source in self.food_sources if source.cell == cell]
-        if not here:
+        sources = [source for source in self.food_sources if source.cell == cell]
+        if not sources:
             around = [neighbour(cell, heading) for heading in range(N_HEADINGS)]
             beside = next((source for source in self.food_sources if source.cell in around), None)
-            here = [FoodSource(cell, waiting_since=0)]
-            self.food_sources += here
+            sources = [FoodSource(cell, waiting_since=0)]
+            self.food_sources += sources
             for pile in self._piles:
                 if any(source is beside for source in pile):
-                    pile += here
+                    pile += sources
             if beside is None:
-                self._piles.append(list(here))
-        if all(source.waiting_since is not None for source in here):
-            here[0].waiting_since = None
-        for source in here:
+                self._piles.append(list(sources))
+        if all(source.waiting_since is not None for source in sources):
+            sources[0].waiting_since = None
+        for source in sources:
             if source.waiting_since is None:
                 source.kind = kind
 

@@ -184,13 +184,13 @@ class Interventions:
     def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
         """Put n ants on free cells, in the order of `ants.starts`; without a nest, by turns."""
         colony, world = self.colony, self.colony.world
-        wanted = range(len(world.queens)) if nest is None else [nest]
+        by_turns = range(len(world.queens)) if nest is None else [nest]
         orders = {
             number: start_order(self._first, world.queens[number], colony.seed, colony.start)
-            for number in wanted
+            for number in by_turns
         }
         cells: list[Cell] = []
-        nests = [wanted[k % len(wanted)] for k in range(n)]
+        nests = [by_turns[k % len(by_turns)] for k in range(n)]
         for number in nests:
             free = (cell for cell in orders[number] if world.content(cell) == EMPTY)
             cells.append(next(cell for cell in free if cell not in cells))
@@ -221,10 +221,10 @@ class Interventions:
 
     def remove_ants(self, cells: Sequence[Cell], nest: int | None = None) -> None:
         """Remove the ants on these cells, or those of a nest, with their food."""
-        there = self.colony.world.ants
+        by_cell = self.colony.world.ants
         for cell in cells:
-            if cell in there and nest in (None, there[cell].nest):
-                del self.colony.ants[there.pop(cell).slot]
+            if cell in by_cell and nest in (None, by_cell[cell].nest):
+                del self.colony.ants[by_cell.pop(cell).slot]
         self._observe()
 
     def set_ants(self, n: int) -> None:

@@ -106,17 +106,17 @@ class Trail:
 
     def _computed(self, rule: Rule, index: int, facts: Mapping[str, float]) -> float:
         """Return the result of your own rule for a cell."""
-        every = {**facts, "level": self._levels[index]}
-        inputs = {name: float(every[name]) for name in rule.inputs}
+        inputs = {**facts, "level": self._levels[index]}
+        inputs = {name: float(inputs[name]) for name in rule.inputs}
         return rule.result(inputs, vars(self._rules[rule.name]))
 
     def tick(self, tick: int = 0) -> None:
         """Let trails evaporate, then spread, for one tick."""
         evaporation = self.rule.own_evaporation
         if evaporation is not None:
-            every = range(len(self._levels))
-            left = [self._computed(evaporation, index, {"tick": tick}) for index in every]
-            self._levels = np.array(left).astype(np.float32)
+            indices = range(len(self._levels))
+            levels = [self._computed(evaporation, index, {"tick": tick}) for index in indices]
+            self._levels = np.array(levels).astype(np.float32)
         elif self.rule.evaporation == "linear":
             self._levels = np.maximum(self._levels - 1, 0)
         elif self.rule.evaporation == "exponential":
@@ -129,11 +129,11 @@ class Trail:
         shares = self._levels * self.rule.share
         outflow = shares * self._n_open  # nothing diffuses into walls
         shares_and_wall = np.append(shares, np.float32(0))
-        got = np.zeros_like(shares)
+        inflow = np.zeros_like(shares)
         for heading in range(N_HEADINGS):
-            got = got + shares_and_wall[self._around[:, heading]]
+            inflow = inflow + shares_and_wall[self._around[:, heading]]
         # With diffusion 1 a cell loses its whole level, and rounding could leave less than 0.
-        self._levels = np.maximum((self._levels - outflow) + got, 0)
+        self._levels = np.maximum((self._levels - outflow) + inflow, 0)
 
 
 class WorldState:

@@ -221,8 +221,8 @@ class Task(Settings, path="task"):
             for pheromone in pheromones
             for rule in (pheromone.own_deposit, pheromone.own_evaporation)
         ]
-        every = (self.choice.own_rule, self.own_reward, *of_fields)
-        return tuple(dict.fromkeys(rule for rule in every if rule is not None))
+        of_task = (self.choice.own_rule, self.own_reward, *of_fields)
+        return tuple(dict.fromkeys(rule for rule in of_task if rule is not None))
 
     def _check_rules(self) -> None:
         rules = {rule.name: rule for rule in self.own_rules}
@@ -449,7 +449,7 @@ class Task(Settings, path="task"):
         pheromones = self.pheromone_while(learning), *self.fields_while(learning).values()
         cues = self.all_cues
         outbound, homing = cues[0]
-        found = {
+        facts = {
             "observation": self.sees,
             "dense": tuple(pheromone.dense for pheromone in pheromones),
             # Only the views of cues are compiled.
@@ -476,14 +476,14 @@ class Task(Settings, path="task"):
             "epsilon_varies": any(caste.epsilon_spread for caste in self.castes.values()),
         }
         if self.rules:
-            found |= {
+            facts |= {
                 "rules": self.own_rules,
                 "reward": self.reward,
                 "deposits": tuple(pheromone.deposit for pheromone in pheromones),
                 "evaporations": tuple(pheromone.evaporation for pheromone in pheromones),
                 "fields": (TRAIL, *self.fields),
             }
-        return found
+        return facts
 
     def number_of(self, cue: str) -> int:
         """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""

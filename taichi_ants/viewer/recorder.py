@@ -69,7 +69,7 @@ class Progress:
         if ended:
             self._before, self._ended = numbers[1], colony.episode
 
-    def news(self) -> list[Point]:
+    def take_new_points(self) -> list[Point]:
         """Return the points of the curves that were added since the last call."""
         new, self._new = self._new, []
         return new
@@ -322,7 +322,7 @@ class Recorder:
         counts = (len(numbers), delivered, self.progress.ticks)
         stored, clock = colony.stored_trail(self.world, self.pheromone)
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
-        sections.setdefault("progress", self.progress.news())
+        sections.setdefault("progress", self.progress.take_new_points())
         sections |= _changes("ground", self._ground, snapshot.ground)
         sections |= _changes("kinds", self._kinds, snapshot.food_kinds)
         sections |= _changes("trail", self._trail, stored)

@@ -599,9 +599,9 @@ def is_better(
 
 
 @ti.func
-def is_stronger(field: ti.template(), index, other, tick):
+def is_stronger(field: ti.template(), index, from_index, tick):
     """Return whether the level of a cell is higher than that of another one."""
-    return level_of(field, index, tick) > level_of(field, other, tick)
+    return level_of(field, index, tick) > level_of(field, from_index, tick)
 
 
 @ti.func
@@ -775,13 +775,13 @@ def event_reward(c: ti.template(), v: ti.template(), ant):
 @ti.func
 def take_load(c: ti.template(), v: ti.template(), ant, index, tick):
     """Take a load of food from a cell, which becomes empty with its last load."""
-    left = 0
+    loads_left = 0
     if ti.static(v.n_kinds > 1):
         put(c.kind, ant, ti.cast(c.kind_of[index], ti.i32))
     if ti.static(v.has_loads):
-        left = c.loads[index] - 1
-        c.loads[index] = left
-    if left == 0:
+        loads_left = c.loads[index] - 1
+        c.loads[index] = loads_left
+    if loads_left == 0:
         c.ground[index] = EMPTY
         take_from_source(c, index, tick)
 

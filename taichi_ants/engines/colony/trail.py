@@ -169,8 +169,8 @@ def evaporate(c: ti.template(), v: ti.template(), index, tick):
     for field in ti.static(v.dense_fields(c)):
         if ti.static(field.has_own_evaporation):
             if c.ground[index] != OBSTACLE:  # rocks and the outside hold no trail
-                left = field.own_evaporation(level=field.levels[index], tick=tick)
-                field.levels[index] = ti.cast(left, ti.f32)
+                level = field.own_evaporation(level=field.levels[index], tick=tick)
+                field.levels[index] = ti.cast(level, ti.f32)
         else:
             field.levels[index] = pheromone.evaporated(field.levels[index], field.decay)
 

@@ -77,10 +77,10 @@ def first_heading(ants):
 @ti.func
 def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, rivals, tick):
     """Return whether the ant on `cell` precedes all others that want the same, see `who_want`."""
-    key, won, rest = conflict_key(cell, tick), True, rivals
-    while rest != 0:
-        other = wanted + c.compass[first_heading(rest) + 1]
-        rest &= rest - ti.u64(1)
+    key, won, rivals_left = conflict_key(cell, tick), True, rivals
+    while rivals_left != 0:
+        other = wanted + c.compass[first_heading(rivals_left) + 1]
+        rivals_left &= rivals_left - ti.u64(1)
         if other != cell:
             after = conflict_key(other, tick) > key
             if ti.static(traffic.carriers_first):
