@@ -69,7 +69,7 @@ class EpisodeRecord:
     births: int = 0
     deaths: int = 0
     regrown: int = 0
-    apart: Counter[tuple[int, int]] = field(default_factory=Counter)  # by nest and kind of food
+    delivered: Counter[tuple[int, int]] = field(default_factory=Counter)  # by nest, kind of food
     by_caste: Counter[int] = field(default_factory=Counter)
 
 
@@ -396,7 +396,7 @@ class ReferenceColony:
         record.deliveries += delivered
         for ant in acting:
             if ant.event is Event.DELIVERED:
-                record.apart[ant.nest, ant.kind] += 1
+                record.delivered[ant.nest, ant.kind] += 1
                 record.by_caste[ant.caste] += 1
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1

@@ -113,7 +113,7 @@ def deliveries_by(colony: ReferenceColony, part: str) -> int:
     if owner == "caste":
         return colony.record.by_caste[int(number)]
     column = ("nest", "food").index(owner)
-    return sum(n for key, n in colony.record.apart.items() if key[column] == int(number))
+    return sum(n for key, n in colony.record.delivered.items() if key[column] == int(number))
 
 
 def measured(colony: ReferenceColony, name: str) -> float:

@@ -56,7 +56,7 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Let an ant observe after interventions; an ant that was just added becomes living."""
     if columns.trait(c.stage, ant) == Stage.NEWBORN:
         columns.put(c.stage, ant, Stage.LIVING)
-        if ti.static(v.alone):
+        if ti.static(v.independent):
             forget(c, v, ant)
         if ti.static(v.has_labour):
             labour.begin(c, v, w, ant)
@@ -88,7 +88,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
                 next_action = steps.draw_action(
                     c, v, w, ant, state, paper_state, tick + 1, c.streams[ant]
                 )
-        if ti.static(v.alone):
+        if ti.static(v.independent):
             learn_alone(c, v, ant, state, next_action, tick, stops)
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, state, next_action)

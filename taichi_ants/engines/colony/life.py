@@ -49,7 +49,7 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         for row in ti.static(range(len(Tally))):
             c.tallies[first + row] = 0
     c.worlds[WorldRow.DELIVERIES, w] = c.worlds[WorldRow.DELIVERIES, w] + gives
-    if ti.static(v.counts_apart):
+    if ti.static(v.counts_by_nest_and_kind):
         count_by_nest(c, v, w)
     else:
         c.nests[NestRow.STORE, w] = c.nests[NestRow.STORE, w] + gives * c.births
@@ -125,7 +125,7 @@ def give_birth_in(c: ti.template(), v: ti.template(), w, nest):
         if ti.static(v.n_castes > 0):
             put(c.caste, w * c.n_slots + slot, draw_caste(c, v, w, nest))
         place_newborn(c, v, w, nest, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
-        if ti.static(v.alone):
+        if ti.static(v.independent):
             forget(c, v, w * c.n_slots + slot)
         c.nests[NestRow.STORE, column] -= 1
         free = free_around(c, base, queen)

@@ -75,8 +75,8 @@ class Stepper:
         end = state.ticks + n
         if state.schedule == "by_world":
             n_worlds = len(state.seeds)
-            lanes = lanes_for(n_worlds)
-            self._launch_ticks(state, n, parts=lanes * -(-n_worlds // lanes), lanes=lanes)
+            threads = threads_for(n_worlds)
+            self._launch_ticks(state, n, parts=threads * -(-n_worlds // threads), threads=threads)
             return
         interval = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
         interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
@@ -102,10 +102,10 @@ class Stepper:
         if compiled:
             self.threads.took(threads, (time.perf_counter() - began) / n)
 
-    def _launch_ticks(self, state: ColonyState, n: int, parts: int, lanes: int = 1) -> None:
+    def _launch_ticks(self, state: ColonyState, n: int, parts: int, threads: int = 1) -> None:
         """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""
         orders, barrier = state.arrays["orders"], state.arrays["barrier"]
-        orders[: Order.PASSED], barrier[:] = (n, parts, lanes, 0, _SPINS), 0
+        orders[: Order.PASSED], barrier[:] = (n, parts, threads, 0, _SPINS), 0
         try:
             self.launch(state, "ticks")
         finally:  # Ctrl-C during a launch raises an error after it
@@ -139,8 +139,8 @@ def features_of(state: ColonyState) -> Features:
     )
 
 
-def lanes_for(n_worlds: int) -> int:
-    """Return the number of threads among which independent worlds are dealt, see `Order.LANES`."""
+def threads_for(n_worlds: int) -> int:
+    """Return the number of threads among which worlds are dealt, see `Order.THREADS`."""
     return min(runtime.start().threads, n_worlds)
 
 

@@ -360,7 +360,7 @@ def draw_action(c: ti.template(), v: ti.template(), w, ant, state, paper_state, 
 def best_actions_of(c: ti.template(), v: ti.template(), table, state):
     """Return the `best_actions` of a state; they are stored unless ants have their own tables."""
     best = 0
-    if ti.static(v.alone):
+    if ti.static(v.independent):
         best = best_actions(values_of(c.q, table, state))
     else:
         best = ti.cast(c.q[table + state * ROW + BEST_AT], ti.i32)
@@ -635,7 +635,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if carries == 1:
         carried = age
         if goes != cell:
-            if ti.static(not v.lays_apart):
+            if ti.static(not v.lays_in_turn):
                 if lays(c, v, ant, 0):
                     index = base + goes
                     deposit(c, v, trail, w, ant, index, tick, carried, carries, event, paper_state)
@@ -652,7 +652,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         put(c.carries, ant, 1)
         c.carried[ant] = 1
         take_load(c, v, ant, base + wanted, tick)
-        if ti.static(not v.lays_apart):
+        if ti.static(not v.lays_in_turn):
             if lays(c, v, ant, 0):
                 deposit(c, v, trail, w, ant, base + wanted, tick, 0, carries, event, paper_state)
                 deposit(c, v, trail, w, ant, base + cell, tick, 0, carries, event, paper_state)
@@ -662,7 +662,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         occasions = occasions_of(had_food, paper_state, action, event, goes != cell)
         if ti.static(v.has_labour):
             occasions *= 1 - trait(c.idle, ant)
-        fields = ti.static([] if v.lays_apart else v.further_fields(c))
+        fields = ti.static([] if v.lays_in_turn else v.further_fields(c))
         for i in ti.static(range(len(fields))):
             if lays(c, v, ant, i + 1):
                 field = ti.static(fields[i])
@@ -689,7 +689,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @cache
 def lays_field(number: int) -> Callable[..., None]:
-    """Return the `do` of a phase after `act` in which ants lay a pheromone, see `lays_apart`."""
+    """Return the `do` of a phase after `act` in which ants lay a pheromone, see `lays_in_turn`."""
 
     @ti.func
     def lay_apart(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
@@ -735,7 +735,7 @@ def tally(c: ti.template(), state, chunk, n):
 @ti.func
 def count_apart(c: ti.template(), v: ti.template(), ant, chunk):
     """Count a delivery by nest and kind of food, if there are several, and by caste."""
-    if ti.static(v.counts_apart):
+    if ti.static(v.counts_by_nest_and_kind):
         column = chunk * NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
         if ti.static(v.n_kinds > 1):
             column += trait(c.kind, ant)
