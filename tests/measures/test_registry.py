@@ -111,9 +111,9 @@ def test_wrong_requests_are_refused(asked, message):
 @pytest.mark.parametrize(
     ("function", "message"),
     [
-        (lambda s: "much", "returned 'much'; it must return a number"),
+        (lambda s: "much", "returned 'much'; it must return a finite number"),
         (lambda s: {"a": "much"}, "returned 'much'"),
-        (lambda s: -math.inf, "returned -inf; it must return a finite number, or nan"),
+        (lambda s: -math.inf, "returned -inf; it must return a finite number, nan"),
         (lambda s: s.nothing, "failed with AttributeError"),
         (lambda s: s.ground.fill(0), "failed with ValueError: .* read-only"),
         (lambda s: s.fields["trail"].sort(), "failed with ValueError: .* read-only"),
