@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
     from taichi_ants.envs.formats import tabulate
-    from taichi_ants.envs.minari_data import from_minari, to_minari
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
@@ -50,7 +49,6 @@ _NAMES_IN = {
     "engines.runs.results": ("Rollouts", "TrainingResult"),
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
     "engines.runs.training": ("continue_training", "evaluate", "train"),
-    "envs.minari_data": ("from_minari", "to_minari"),
     "envs.formats": ("tabulate",),
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
@@ -87,7 +85,6 @@ __all__ = [
     "continue_training",
     "envs",
     "evaluate",
-    "from_minari",
     "learners",
     "load_policy",
     "measures",
@@ -105,7 +102,6 @@ __all__ = [
     "tabulate",
     "task",
     "testing",
-    "to_minari",
     "trace_training",
     "train",
     "worlds",

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ant_system import Search, search
 from bridge import crossings
 from command_lines import EXPERIMENTS
+from goss import choices
 from matplotlib.figure import Figure
+from utility import Foraging
 
 from taichi_ants import Colony, TrainingConfig, World, task, train
-from taichi_ants.baselines.ant_system import Search, search
-from taichi_ants.baselines.goss import choices
-from taichi_ants.baselines.utility import Foraging
 from taichi_ants.learners import registry as learners
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import Caste, Noise, Threshold
