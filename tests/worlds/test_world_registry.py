@@ -38,20 +38,6 @@ def test_names_and_seeds() -> None:
     assert worlds.build("paper", 3) == worlds.paper()
 
 
-def test_worlds_of_ones_own_are_replaced_and_built_in_ones_are_not() -> None:
-    worlds.register("tiny", lambda seed: worlds.paper())
-    worlds.register("tiny", tiny)
-    assert worlds.build("tiny") == tiny(0)
-    with pytest.raises(AntsError, match="'paper' is the name of a built-in world, which cannot be"):
-        worlds.register("paper", tiny)
-
-
-@pytest.mark.parametrize("name", ["", "  ", None, 3])
-def test_a_name_is_text(name: object) -> None:
-    with pytest.raises(AntsError, match="must be text"):
-        worlds.register(name, tiny)
-
-
 def test_a_builder_builds_worlds() -> None:
     with pytest.raises(AntsError, match="must be a function of a seed"):
         worlds.register("tiny", worlds.paper())
