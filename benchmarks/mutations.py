@@ -365,12 +365,7 @@ MUTATIONS = [
     ("measures/built_in.py", "log(len(levels)))", "log(len(levels) + 1))", MEASURES),
     ("measures/built_in.py", "(share - mean) ** 2", "abs(share - mean)", MEASURES),
     ("measures/series.py", "if self._read.get(world) == tick:", "if False:", MEASURES),
-    (
-        "measures/built_in.py",
-        "snapshot.distances[snapshot.ant_cells]",
-        "snapshot.distances",
-        MEASURES,
-    ),
+    ("measures/built_in.py", "[snapshot.ant_cells].sum(", ".sum(", MEASURES),
     ("measures/tidy.py", "ticks == last[which", "ticks <= last[which", RESULTS_OF_RUNS),
     ("analysis/results.py", "goes_on, np.roll(begins, -1)", "goes_on, begins + 1", RESULTS_OF_RUNS),
     ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
