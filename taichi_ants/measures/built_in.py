@@ -14,12 +14,12 @@ import numpy as np
 from taichi_ants.errors import AntsError
 from taichi_ants.measures.measure import COUNTS, Measure
 from taichi_ants.measures.paths import shortest_path
+from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import OBSTACLE
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.records import Snapshot
     from taichi_ants.task import Task
     from taichi_ants.worlds.world import World
 
