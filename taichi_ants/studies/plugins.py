@@ -31,7 +31,6 @@ def read_plugin(path: str | None) -> dict[str, bytes]:
 
     Raises:
         AntsError: A file cannot be read, or has the name of an installed module.
-        SyntaxError: A file is not Python.
     """
     if path is None:
         return {}
@@ -54,7 +53,10 @@ def _needed(folder: Path, path: Path, content: bytes) -> Iterator[Path]:
     """Yield the files of a folder that one of its modules needs."""
     for end in (".toml", ".html") if path.parent == folder else ():
         yield from sorted(folder.glob(f"{path.stem}*{end}"))
-    nodes = [*ast.walk(ast.parse(content, path))]
+    try:
+        nodes = [*ast.walk(ast.parse(content, path))]
+    except SyntaxError:
+        return  # which `load_plugin` reports
     names = [name.name for node in nodes if isinstance(node, ast.Import) for name in node.names]
     names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
     installed = [one for one in sys.path if one.endswith(("site-packages", "dist-packages"))]
