@@ -287,7 +287,12 @@ MUTATIONS = [
     ("files/__init__.py", 'with open(temporary, "wb")', 'with open(target, "wb")', FILES),
     ("files/__init__.py", "st_mtime > _ABANDONED", "st_mtime >= 0", FILES),
     ("files/__init__.py", "None if v != v else v", "v", FILES),
-    ("studies/store.py", "is_whole = set(file.files)", "is_whole = True or set(file.files)", STUDIES),
+    (
+        "studies/store.py",
+        "is_whole = set(file.files)",
+        "is_whole = True or set(file.files)",
+        STUDIES,
+    ),
     ("studies/store.py", "if one.has(arrays)]", "]", STUDIES),
     ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", GROWING),
     ("studies/study.py", "np.array_split(several, -(-len(several) // most))", "[several]", STUDIES),
