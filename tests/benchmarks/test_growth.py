@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import growth
 import numpy as np
-import pytest
 
 from taichi_ants import worlds
 
@@ -39,19 +38,3 @@ def test_its_tables():
         ["29 701", "2", "4", "[3.0, 5.0]", "500"],
     ]
     assert memory.rows == [["ant", "40", "-"]]
-
-
-@pytest.mark.long
-def test_the_command(capfd, tmp_path, monkeypatch):
-    page = tmp_path / "page.md"
-    page.write_text("<!-- growth -->\n<!-- /growth -->\n")
-    monkeypatch.setattr(growth, "FIGURES", tmp_path)
-    monkeypatch.setattr(growth, "PAGE", page)
-    with pytest.raises(SystemExit) as end:
-        growth.main(["--small", "--rounds", "1", "--publish"])
-    assert end.value.code == 0
-    out, err = capfd.readouterr()
-    assert err == ""
-    assert "runs of a run" in out
-    assert "| ant |" in page.read_text()
-    assert (tmp_path / "growth.png").stat().st_size > 10_000

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import models
-import pytest
 
 from taichi_ants.task import foraging
 
@@ -24,17 +23,3 @@ def test_its_table():
         ["foraging", "3", "1", "[1.00, 1.00]"],
         ["softmax", "1", "0.33", "[0.25, 0.50]"],
     ]
-
-
-@pytest.mark.long
-def test_the_command(capfd, tmp_path, monkeypatch):
-    page = tmp_path / "page.md"
-    page.write_text("<!-- models -->\n<!-- /models -->\n")
-    monkeypatch.setattr(models, "PAGE", page)
-    with pytest.raises(SystemExit) as end:
-        models.main(["--ants", "50", "--rounds", "1", "--publish"])
-    assert end.value.code == 0
-    out, err = capfd.readouterr()
-    assert err == ""
-    assert "all of these" in out
-    assert "| two pheromones |" in page.read_text()

@@ -7,11 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_worlds import random_world
 
 from taichi_ants import Task, TrainingConfig, continue_training, evaluate, train
 from taichi_ants.engines.runs import engine as run_engine
-from taichi_ants.worlds import World, paper
+from taichi_ants.worlds import paper
 
 # Uneven on purpose: some deliver within 34 steps, some walk in circles for all of an episode, a
 # step of Dyna-Q costs several of the others, and memories differ in size.
@@ -100,16 +99,6 @@ def test_training_that_is_continued_is_longer_training():
         assert result.state == whole.state
 
 
-def test_continued_training_with_evaporation():
-    world = random_world(6, 7)
-    falls = Task(evaporation_in_training=True)
-    whole = train(world, CONFIGS, SEEDS[:2], 30, 60, falls)
-    result = continue_training(train(world, CONFIGS, SEEDS[:2], 11, 60, falls), 19)
-    assert_same(result, whole)
-    without = train(world, CONFIGS, SEEDS[:2], 30, 60)
-    assert not np.array_equal(without.returns, whole.returns)
-
-
 def test_evaluation(expected):
     """On repeats, on any number of threads, table by table and rollout by rollout."""
     tables = expected.q_values
@@ -130,13 +119,6 @@ def test_evaluation(expected):
         assert np.array_equal(getattr(alone, name), getattr(whole, name)[3, 2])
 
 
-def test_evaluation_leaves_training_as_it_is(expected):
-    """Rollouts have streams of their own."""
-    first = train(paper(), CONFIGS, SEEDS, EPISODES // 2, MAX_STEPS, TRUNCATES)
-    evaluate(paper(), first.q_values, 5, SEEDS)
-    assert_same(continue_training(first, EPISODES - EPISODES // 2), expected)
-
-
 def test_seeds_and_rollouts_differ(expected):
     """The same numbers everywhere would pass all of the above."""
     for c in (0, 1, 2):
@@ -145,12 +127,3 @@ def test_seeds_and_rollouts_differ(expected):
     outcome = evaluate(paper(), np.zeros((2, 128, 5)), 30, (0, 1), 60)
     assert len({tuple(row) for row in outcome.returns.tolist()}) == 2
     assert all(len(set(row)) > 5 for row in outcome.returns.tolist())
-
-
-def test_worlds_without_trails_or_listed_ants_differ_by_seed():
-    world = World((7, 7, 7), queen=(3, 3, 0), foods=[(6, 0, 0)])
-    starts = {tuple(np.concatenate(world.start(seed)).tolist()) for seed in range(30)}
-    assert len(starts) > 10
-    outcome = evaluate(world, np.zeros((30, 128, 5)), 3, range(30), 40)
-    alone = [evaluate(world, np.zeros((128, 5)), 3, seed, 40).returns for seed in range(30)]
-    assert np.array_equal(outcome.returns, alone)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-import resource
 from dataclasses import replace
 
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import InvalidAction, ResetNeeded
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
@@ -19,7 +16,6 @@ from taichi_ants.envs import Event
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.task import Life
-from taichi_ants.task.constants import GIVE
 from taichi_ants.task.task import foraging
 
 ANTS = 6
@@ -136,18 +132,6 @@ def test_the_autoreset_modes_differ_in_when_they_begin_alone():
                 assert_same(final[name], theirs[-1][name])
 
 
-def test_the_step_that_only_begins_the_next_episode_pays_nothing():
-    env = ants_of(autoreset_mode=NEXT, max_steps=1)
-    env.reset(seed=1)
-    nothing_to_take = np.full(env.num_envs, 3)
-    for begins in (False, True, False, True):
-        _, rewards, terminated, truncated, infos = env.step(nothing_to_take)
-        assert not terminated.any()
-        assert (truncated != begins).all()
-        assert (rewards == (0 if begins else -1)).all()
-        assert (infos["event"] == (Event.NONE if begins else Event.FAILED)).all()
-
-
 def test_single_worlds_begin_anew_while_others_go_on():
     """With a mask; a world that is reset as another one ends at another time, and feels nothing."""
     env, alone = ants_of(autoreset_mode=DISABLED), ants_of(1, autoreset_mode=DISABLED)
@@ -173,22 +157,6 @@ def test_single_worlds_begin_anew_while_others_go_on():
         assert not told[3][ANTS:].any()
         told = env.step(actions)
     assert np.array_equal(told[3], mask)
-
-
-def test_worlds_that_were_seeded_anew_are_as_in_a_new_environment():
-    env, new = ants_of(), ants_of()
-    env.reset(seed=1)
-    for step in range(5):
-        env.step(np.full(env.num_envs, step % 3))
-    mask = np.arange(2 * ANTS) < ANTS
-    seen, _ = env.reset(seed=[9, None], options={"reset_mask": mask})
-    fresh, _ = new.reset(seed=9)
-    assert_same(seen[:ANTS], fresh[:ANTS])
-    seen, fresh = env.reset(seed=4), new.reset(seed=4)
-    assert_same(seen, fresh)
-    assert_same(play(env, 25), play(new, 25))
-    one, other = ants_of(), ants_of()
-    assert not np.array_equal(one.reset()[0], other.reset()[0])  # drawn seeds differ
 
 
 def test_an_ant_that_delivers_is_terminated_and_goes_on():
@@ -244,57 +212,6 @@ def test_what_users_register_and_wrap():
     assert infos[3]["episode"]["l"] == 5
 
 
-def test_copies_and_pickles_go_on_alike():
-    env = ants_of(task=foraging(), observation_format="cells", render_mode="rgb_array")
-    env.reset(seed=3)
-    play(env, 7)
-    assert env.render()[1].shape[2] == 3
-    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
-    expected = play(env, 25)
-    for other in others:
-        assert_same(play(other, 25), expected)
-
-
-def test_pictures_of_each_world():
-    env = ants_of(render_mode="rgb_array")
-    with pytest.raises(ResetNeeded):
-        env.render()
-    env.reset(seed=1)
-    pictures = env.render()
-    assert len(pictures) == env.num_envs  # as Gymnasium's RecordVideo expects
-    first, second = pictures[0], pictures[ANTS]
-    assert first is pictures[ANTS - 1]
-    assert first.dtype == np.uint8
-    assert (first != second).any()  # the ants stand elsewhere
-    assert ants_of().render() is None
-
-
-def test_steps_in_the_wrong_order_and_wrong_actions():
-    env = ants_of()
-    right = np.zeros(env.num_envs, int)
-    with pytest.raises(ResetNeeded):
-        env.step(right)
-    mask = np.zeros(env.num_envs, bool)
-    mask[:ANTS] = True
-    with pytest.raises(ResetNeeded):
-        env.reset(options={"reset_mask": mask})
-    env.reset()
-    for wrong in (right + 5, right - 1, right[:-1], right + 0.0, None):
-        with pytest.raises(InvalidAction, match=r"^(the actions are|an action is) .*\.$"):
-            env.step(wrong)
-    for wrong, error in (
-        (mask[:-1], ValueError),
-        (np.roll(mask, 1), ValueError),
-        (~mask & mask, ValueError),
-        (mask.astype(int), TypeError),
-        (mask.tolist(), TypeError),
-    ):
-        with pytest.raises(error, match=r"^reset_mask .*\.$"):
-            env.reset(options={"reset_mask": wrong})
-    with pytest.raises(ValueError, match=r"^seed is .*; give a whole number, or a list of 2\.$"):
-        env.reset(seed=[1, 2, 3])
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -322,29 +239,3 @@ def test_arguments_that_are_not_allowed(options, said):
     given = {"num_envs": 2 * ANTS, "ants": ANTS, "world": MEADOW, "task": GOES_ON, **options}
     with pytest.raises(AntsError, match=rf"^{said}.*\.$"):
         HexColonyVectorEnv(**given)
-
-
-def test_memory_does_not_grow_with_environments_that_are_closed():
-    def loop(times: int) -> int:
-        for _ in range(times):
-            env = ants_of(4)
-            env.reset(seed=1)
-            env.step(np.full(env.num_envs, GIVE))
-            env.close()
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-    first = loop(30)
-    assert loop(100) - first < 2000  # kibibytes
-
-
-def test_worlds_with_several_nests_and_kinds_of_food():
-    """Both kinds of food are picked up and delivered, with their own rewards."""
-    kinds = {"seed": {"deliver": 7}, "nectar": {"pick_up": 5, "deliver": 9}}
-    world = worlds.World(
-        (8, 8, 8), queen=[(0, 7, 7), (7, 0, 0)], foods=[((3, 0, 0), 0), ((0, 3, 0), 1)]
-    )
-    env = ants_of(1, task=GOES_ON.replace(foods=kinds), world=world, max_steps=3000, start="spread")
-    env.reset(seed=1)
-    made = env.rollout("trail_follower", 3000, epsilon=0.1)
-    paid = made.rewards[made.events == Event.PICKED_UP], made.rewards[made.events == 5]
-    assert [sorted(one) for one in paid] == [[3, 5], [7, 9]]

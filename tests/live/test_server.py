@@ -17,16 +17,15 @@ import numpy as np
 import pytest
 from attacks import ATTACKS, attack
 from command_lines import crowding
-from playback import played, unpack
+from playback import played
 from rooms import CHOSEN, Guest, running
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from taichi_ants import AntsError, Colony
+from taichi_ants import AntsError
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.exports import QUICK, SLOW
 from taichi_ants.live.session import Log, Session
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.viewer import Recording
@@ -107,21 +106,6 @@ def test_a_header_says_that_only_the_scripts_of_the_page_run(room):
         assert headers["Cross-Origin-Opener-Policy"] == "same-origin"
 
 
-def test_head_gives_the_headers_of_get_without_the_body(room):
-    pytest.importorskip("websockets", minversion="17")  # before, it closes the connection
-    for path in ("/", f"/?token={room.token}", "/?token=x", f"/none?token={room.token}"):
-        status, headers, text = get(room, path)
-        headed = get(room, path, "HEAD")
-        assert headed[0] == status
-        assert headed[2] == ""
-        for name in headers.keys() - {"Date"}:
-            assert headed[1][name] == headers[name]
-        assert int(headed[1]["Content-Length"]) == len(text.encode())
-    socket_path = f"/socket?token={room.token}"
-    status, headers, _ = get(room, socket_path, "HEAD", Origin=f"http://127.0.0.1:{room.port}")
-    assert (status, headers["Allow"]) == (405, "GET, HEAD")
-
-
 @pytest.mark.parametrize("method", ["POST", "OPTIONS"])
 def test_nothing_can_be_sent_but_over_the_socket(room, method):
     before = state_of(room)
@@ -132,14 +116,6 @@ def test_nothing_can_be_sent_but_over_the_socket(room, method):
             continue  # the library closes what announces a body
         assert (status, headers["Allow"]) == (405, "GET, HEAD")
     assert state_of(room) == before
-
-
-def test_a_method_may_arrive_letter_by_letter(room):
-    with socket.create_connection(("127.0.0.1", room.port), timeout=30) as line:
-        for letter in f"GET / HTTP/1.1\r\nHost: 127.0.0.1:{room.port}\r\n\r\n":
-            line.sendall(letter.encode())
-            time.sleep(0.001)
-        assert line.recv(100).startswith(b"HTTP/1.1 200")
 
 
 def test_sockets_are_for_pages_of_its_own(room):
@@ -355,27 +331,6 @@ def test_a_session_that_cannot_be_is_refused(room):
     assert state_of(room) == before
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"\0" * 100, b"PK\x03\x04" + b"x" * 1000, b"\xff" * 2**20], ids=len
-)
-def test_a_file_that_is_no_session_is_refused(room, content):
-    before = state_of(room)
-    with Guest(room) as guest:
-        guest.socket.send(content)
-        assert guest.until("error")["words"].endswith(".")
-    assert state_of(room) == before
-
-
-def test_a_file_that_is_too_large_is_not_even_read(room):
-    before = state_of(room)
-    with Guest(room) as guest:
-        with suppress(ConnectionClosed):
-            guest.socket.send(b"x" * (server._MOST_UPLOAD + 1))
-        guest.until_cut_off()
-    with Guest(room):
-        assert state_of(room) == before
-
-
 def test_bytes_that_are_no_websocket_harm_nobody(room):
     before = state_of(room)
     with Guest(room) as guest:
@@ -390,19 +345,6 @@ def test_bytes_that_are_no_websocket_harm_nobody(room):
         guest.until_cut_off()
     with Guest(room):
         assert state_of(room) == before
-
-
-def test_sockets_that_say_nothing_keep_nobody_out(room):
-    before = state_of(room)
-    lines = [socket.create_connection(("127.0.0.1", room.port)) for _ in range(60)]
-    for number, line in enumerate(lines):
-        line.sendall(b"GET /socket HTTP/1.1\r\nHost: "[: number % 30])
-    with Guest(room) as guest:
-        assert state_of(room) == before
-        guest.ask("step", ticks=1)
-        guest.until("frame")
-    for line in lines:
-        line.close()
 
 
 def test_fifty_pages_are_too_many_but_harm_nobody(room):
@@ -423,18 +365,6 @@ def test_fifty_pages_are_too_many_but_harm_nobody(room):
         time.sleep(0.01)
     with Guest(room):
         pass
-
-
-def test_who_asks_without_end_waits_its_turn(room):
-    """One page floods the room while another one works."""
-    with Guest(room) as flood, Guest(room) as guest:
-        for _ in range(3000):
-            flood.ask("pause")
-        for _ in range(5):
-            guest.ask("step", ticks=1)
-            guest.until("frame")
-            guest.seen(1)
-        assert room.session.ticks == 5
 
 
 def test_a_session_is_saved_and_loaded(room):
@@ -459,39 +389,6 @@ def test_a_session_is_saved_and_loaded(room):
         assert words.startswith("the loaded file is damaged")
         assert words.endswith("; load a file that Save session has written.")
         assert state_of(room) == before
-
-
-def test_a_change_is_undone_and_done_again(room):
-    with Guest(room) as guest:
-        guest.ask("step", ticks=3)
-        assert not guest.state["can_undo"]
-        first, second, third = np.flatnonzero(room.session.colony.snapshot().ground == EMPTY)[:3]
-        guest.edit({"place": {"what": "rock", "cells": [int(first)]}})
-        guest.ask("step", ticks=2)
-        before = state_after(guest, room, 5)
-        for cell in (second, third):  # of one stroke
-            guest.ask("edit", edit={"trail": {"level": 9, "cells": [int(cell)]}}, stroke=7)
-        guest.ask("step", ticks=4)
-        drawn, whole = room.session, state_after(guest, room, 9)
-        guest.ask("undo")
-        guest.until("whole")
-        assert room.session is not drawn
-        assert (room.session.ticks, len(room.session.edits)) == (5, 1)
-        assert state_of(room) == before
-        guest.ask("back")
-        guest.until("whole")
-        assert (room.session, state_of(room)) == (drawn, whole)
-        guest.ask("back")
-        guest.until("whole")
-        assert state_of(room) == before
-        guest.ask("undo")
-        guest.until("whole")
-        assert (room.session.ticks, room.session.edits) == (3, [])
-        guest.ask("undo")
-        assert guest.until("error")["words"].startswith("there is nothing to undo")
-        guest.until("state")
-        assert not guest.state["can_undo"]
-        assert guest.state["can_go_back"]
 
 
 def test_what_several_in_a_row_have_replaced_comes_back(room):
@@ -541,50 +438,6 @@ def state_after(guest: Guest, room, ticks: int) -> object:
     while guest.state["ticks"] < ticks:
         guest.until("state")
     return state_of(room)
-
-
-def test_the_first_session_has_none_before_it(shared):
-    with running(shared.choices) as one, Guest(one) as guest:
-        guest.ask("back")
-        assert guest.until("error")["words"] == (
-            "there is no session before this one to return to; continue with this one."
-        )
-
-
-@pytest.mark.long
-def test_a_session_can_be_taken_away_in_every_form(room, tmp_path):
-    from PIL import Image
-
-    from taichi_ants import load_policy
-
-    with Guest(room) as guest:
-        guest.ask("step", ticks=12)
-        for kind, (name, _) in {**QUICK, **SLOW}.items():
-            guest.ask("export", kind=kind)
-            (tmp_path / name).write_bytes(guest.until(name))
-    before = state_of(room)
-    assert (tmp_path / "session.html").read_text().startswith("<!doctype html>")
-    with Image.open(tmp_path / "session.gif") as animation:
-        assert animation.n_frames > 1
-    policy = load_policy(tmp_path / "policy.npz")
-    assert np.array_equal(policy.q_values, room.session.colony.q_values[0])
-    colony = Colony.load(tmp_path / "colony.npz")
-    assert colony.ticks == room.session.colony.ticks
-    assert state_of(room) == before
-
-
-@pytest.mark.long
-def test_time_goes_on_while_a_file_is_made(room):
-    with Guest(room) as guest:
-        guest.ask("export", kind="gif")
-        guest.ask("step", ticks=1)
-        kind = ""
-        while kind != "frame":
-            kind, _ = guest.hear()
-            assert kind != "session.gif"
-        guest.ask("export", kind="page")
-        assert "another file is being made" in guest.until("error")["words"]
-        guest.until("session.gif")
 
 
 @pytest.mark.parametrize("name", ATTACKS)
@@ -644,70 +497,6 @@ def working(guest: Guest, kind: str, done: int = 1) -> dict:
         guest.until("state")
 
 
-def test_pages_are_answered_while_a_session_is_replayed(room, endless):
-    with Guest(room) as guest, Guest(room) as other:
-        guest.ask("step", ticks=3)
-        guest.ask("play")
-        guest.until("frame")
-        before = room.session
-        guest.socket.send(endless)
-        done = working(other, "load")["done"]
-        stands = state_of(room)
-        assert working(guest, "load", done + 1)["total"] == 10**8
-        assert not guest.state["playing"]
-        with Guest(room) as late:  # sees the session that is still there
-            assert_same(late, before)
-            working(late, "load")
-        for what, more in {
-            "play": {},
-            "step": {"ticks": 1},
-            "edit": {"edit": {"episode": {}}, "stroke": 1},
-            "begin": {"chosen": CHOSEN},
-            **{"restart": {}, "undo": {}, "back": {}},
-        }.items():
-            guest.ask(what, **more)
-            assert guest.until("error")["words"].startswith("a session is being replayed; ")
-        guest.socket.send(endless)
-        assert guest.until("error")["words"].startswith("a session is being replayed; ")
-        guest.ask("export", kind="policy")
-        guest.until("policy.npz")
-        assert state_of(room) == stands
-        other.ask("cancel", kind="load")
-        both(guest, other, "cancelled")
-        assert room.session is before
-        guest.until("frame")  # time goes on where it stood
-        guest.seen(100)
-        guest.ask("pause")
-        while guest.state["playing"] or guest.state["works"]:
-            guest.hear()
-        assert room.session is before
-
-
-def test_a_replay_that_fails_leaves_the_session(room, tmp_path):
-    with Guest(room) as guest:
-        guest.ask("step", ticks=5)
-        guest.ask("export", kind="session")
-        guest.until("session.npz")
-        replace(room.session.log(), state="0").write(tmp_path / "x.npz")
-        before = room.session, state_of(room)
-        guest.socket.send((tmp_path / "x.npz").read_bytes())
-        assert "does not end as it did" in guest.until("error")["words"]
-        assert (room.session, state_of(room)) == before
-        guest.ask("cancel", kind="load")  # too late
-        guest.ask("step", ticks=1)
-        guest.until("frame")
-
-
-@pytest.mark.slow
-def test_it_ends_while_a_session_is_replayed(shared, tmp_path):
-    with running(shared.choices) as one, Guest(one) as guest:
-        replace(one.session.log(), steps=10**8, ticks=10**8).write(tmp_path / "x.npz")
-        guest.socket.send((tmp_path / "x.npz").read_bytes())
-        working(guest, "load")
-        guest.ask("quit")
-        guest.until("over")
-
-
 def test_a_file_that_is_made_can_be_cancelled(room, endless):
     with Guest(room) as guest, Guest(room) as other:
         room.session.log = lambda: Log.from_bytes(endless)
@@ -732,16 +521,6 @@ def test_a_file_that_is_made_can_be_cancelled(room, endless):
         assert not room._works
 
 
-@pytest.mark.slow
-def test_the_progress_of_a_file_is_told(room, endless):
-    with Guest(room) as guest:
-        room.session.log = lambda: Log.from_bytes(endless)
-        guest.ask("export", kind="gif")
-        working(guest, "gif")
-        guest.ask("cancel", kind="gif")
-        guest.until("cancelled")
-
-
 def test_pages_that_are_gone_are_not_counted(room):
     with Guest(room) as guest:
         for cut in ('{"do":"edit"}', None):
@@ -758,47 +537,11 @@ def test_pages_that_are_gone_are_not_counted(room):
                 guest.until("state")
 
 
-def test_what_the_page_would_choose_is_the_session(room):
-    with Guest(room) as guest:
-        for chosen in [
-            {**CHOSEN, "policy": "file mine", "world": "double_bridge"},
-            {**CHOSEN, "policy": "by hand", "world": "far_piles", "world_seed": 4, "size": 20},
-            {**CHOSEN, "world": "map", "map": "  .\n0   F\n  .\n    Q\n", "ants": 1},
-            {**CHOSEN, "policy": "learn double_q", "ticks": 0},
-        ]:
-            guest.ask("begin", chosen=chosen)
-            guest.until("begin")
-            guest.until("whole")
-            back = guest.chosen
-            wanted = {**chosen, "settings": {**back["settings"], **chosen["settings"]}}
-            if chosen["policy"] == "by hand":
-                wanted["policy"] = "file mine"  # the same values
-            assert back == wanted
-            guest.ask("step", ticks=1)
-            guest.until("frame")
-
-
 def test_it_ends_when_a_page_asks(shared):
     with running(shared.choices) as one, Guest(one) as guest:
         guest.ask("quit")
         guest.until("over")
         guest.until_cut_off()
-
-
-@pytest.mark.slow
-def test_the_fastest_pages_see_moments_from_inside_episodes(room):
-    with Guest(room) as guest:
-        guest.ask("speed", value=server.FASTEST)
-        guest.ask("play")
-        seen = []
-        while len(seen) < 60:
-            sections = unpack(guest.header["types"], guest.until("frame"))
-            seen.append(sections["clock"][:2].tolist())
-            guest.seen(1)
-        guest.ask("pause")
-    late = seen[20:]  # once it knows how many fill a frame
-    assert sum(tick in (0, 50) for _, tick in late) < len(late) / 4
-    assert len({tick for _, tick in late}) > 10
 
 
 @pytest.mark.parametrize(
@@ -810,28 +553,3 @@ def test_frames_show_the_phases_of_episodes_in_turn(piece, length, steps):
         _piece=piece, session=SimpleNamespace(setup=SimpleNamespace(ticks_per_episode=length))
     )
     assert server.SessionServer._leap(room) == steps
-
-
-def test_pages_are_told_that_kernels_are_prepared(room):
-    with Guest(room) as guest:
-        guest.ask("play")
-        while not guest.state.get("playing"):
-            guest.until("state")
-        assert [work["kind"] for work in guest.state["works"]] == ["kernels"]
-        guest.until("frame")
-        while guest.state["works"]:
-            guest.until("state")
-        assert guest.state["playing"]
-        guest.ask("restart")
-        guest.until("whole")
-        guest.ask("play")
-        guest.ask("pause")
-        while guest.state["playing"] or guest.state["works"]:
-            guest.until("state")
-
-
-def test_values_tell_how_many_ants_live(room):
-    cells = room.session.colony.snapshot().ant_cells[:3].tolist()
-    before = room.session.values()["ants"]["value"]
-    room.session.apply({"remove_ants": {"cells": cells}})
-    assert room.session.values()["ants"]["value"] == before - 3

@@ -6,15 +6,10 @@ import contextlib
 import functools
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
-from command_lines import ROOT, environment
-from interrupts import interrupted_after_launch
 from playback import played, unpack, unpacked
 from random_edits import random_edit
 
@@ -35,9 +30,8 @@ from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import session as session_module
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
-from taichi_ants.live.setup import check_cues
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
-from taichi_ants.viewer import Recording, recorder
+from taichi_ants.viewer import Recording
 from taichi_ants.viewer.frames import CLOCK, POINT
 from taichi_ants.worlds import text_map
 
@@ -194,53 +188,6 @@ def test_snapshots_are_bounded_by_time_and_memory(monkeypatch):
     assert len(session.edits) == 71
 
 
-def test_a_file_knows_what_was_one_change(tmp_path):
-    session = Session(SETUPS["paper"])
-    (cells,) = np.nonzero(session.colony.snapshot().ground == EMPTY)
-    for part, cell in enumerate(cells[:5].tolist()):
-        session.apply({"trail": {"level": 9, "cells": [cell]}}, goes_on=part not in (0, 2))
-    session.save(tmp_path / "session.npz")
-    again = Session.load(tmp_path / "session.npz")
-    assert again.changes == session.changes == [0, 2]
-    *_, again = again.undone()
-    assert len(again.edits) == 2
-
-
-@pytest.mark.long
-def test_threads_and_processes_do_not_matter(edited, tmp_path, kernels):
-    script = (
-        "import sys; from taichi_ants import runtime; from taichi_ants.live.session import Session;"
-        "runtime.start(int(sys.argv[1]));"
-        "print(*(Session.load(path).interventions.state() for path in sys.argv[2:]))"
-    )
-    names = ("foraging", "lively")
-    paths = [str(tmp_path / f"{name}.npz") for name in names]
-    for name, path in zip(names, paths, strict=True):
-        edited(name).save(path)
-    for threads in ("1", "2"):
-        done = subprocess.run(
-            [sys.executable, "-c", script, threads, *paths],
-            # Nor does it matter how kernels are compiled.
-            env=environment(kernels, TI_ADVANCED_OPTIMIZATION="1"),
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, done.stderr
-        assert done.stdout.split() == [edited(name).interventions.state() for name in names]
-
-
-def test_pieces_of_time_do_not_matter():
-    one, other = Session(SETUPS["foraging"]), Session(SETUPS["foraging"])
-    while one.steps < 60:
-        one.advance(100)  # not beyond the end of an episode
-    while other.steps < one.steps:
-        other.advance()
-    assert one.ticks == other.ticks == 3 * 25
-    assert one.colony.episode == 2
-    assert one.interventions.state() == other.interventions.state()
-
-
 @pytest.mark.parametrize("name", MARKED)
 def test_a_page_that_joins_late_sees_what_the_others_see(name):
     session, rng = Session(SETUPS[name]), np.random.default_rng(4)
@@ -274,20 +221,6 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
     snapshot = session.colony.snapshot()
     assert np.array_equal(joined[-1].ground, snapshot.ground)
     assert np.array_equal(joined[-1].trail, snapshot.fields[session.setup.pheromone])
-
-
-def test_states_have_names_before_they_are_seen_on_pages():
-    setup = replace(SETUPS["foraging"], task=Task(observation="six_cells"))
-    session = Session(setup)
-    names = dict(session.header()["names"])
-    assert 0 < len(names) < session.colony.task.n_states
-    session.news()
-    for _ in range(20):
-        session.advance()
-        names |= session.news()
-        assert set(session.colony.states[session.colony.living].tolist()) <= names.keys()
-    assert session.news() == {}
-    assert session.header()["names"] == names
 
 
 def test_a_recording_holds_what_happened(edited):
@@ -436,15 +369,6 @@ def test_sessions_replay_each_form_of_an_intervention(edit, tmp_path):
     assert Session.load(tmp_path / "session.npz").same(session)
 
 
-def test_files_with_the_names_of_regions_are_replayed():
-    """Earlier versions saved them, and refused to load them."""
-    session = Session(GATED)
-    session.apply({"clear": "gate"})
-    named = replace(session.log(), edits=((0, {"clear": {"cells": "gate"}}),))
-    *_, again = Session.replay(named)
-    assert again.same(session)
-
-
 def test_wrong_edits_change_nothing():
     session = Session(SETUPS["foraging"])
     session.advance(7)
@@ -453,20 +377,6 @@ def test_wrong_edits_change_nothing():
     follows = Session(SETUPS["queueing"])
     assert follows.values().keys() == {"ants", "epsilon", "deposit", "slope", "evaporation"}
     assert "no learning rate" in refused(follows, {"learning_rate": 0.5})
-
-
-def test_what_was_interrupted_is_counted(monkeypatch):
-    session = Session(SETUPS["foraging"])
-
-    def interrupted(n, tick=session.colony.tick):
-        tick(n)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(session.colony, "tick", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        session.advance(7)
-    assert (session.ticks, session.colony.ticks) == (7, 7)
-    assert replayed(session.to_bytes()).interventions.state() == session.interventions.state()
 
 
 def test_edits_without_room_change_nothing():
@@ -531,12 +441,6 @@ def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
         replayed(edited("foraging").to_bytes())
 
 
-@pytest.mark.parametrize("content", [b"", b"nothing", b"PK\3\4" + bytes(100)])
-def test_no_session_at_all(content):
-    with pytest.raises(AntsError, match=r"'the loaded file' .*\.$"):
-        replayed(content)
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -588,96 +492,6 @@ def test_setups_are_json(name):
     again = Setup.from_json(facts, None if setup.learns else setup.policy)
     assert again.to_json() == setup.to_json()
     assert Session(again).interventions.state() == Session(setup).interventions.state()
-
-
-@pytest.mark.parametrize("table", [np.zeros((3, 5)), np.zeros((2, 128, 5)), "paper", None, [[1j]]])
-def test_a_policy_is_a_training_or_one_table(table):
-    with pytest.raises(AntsError, match=r"^(policy|q_values) .*\.$"):
-        Setup("paper", Task(), table)
-
-
-def test_a_policy_of_several_nests_is_exported_if_they_share_it(tmp_path):
-    two = SETUPS["nests"]
-    with pytest.raises(AntsError, match=r"^each nest has its own table, but .* export the colony"):
-        Session(two).policy_bytes()
-    table = trail_follower("ants")
-    follows = Session(replace(two, policy=table))
-    (tmp_path / "policy.npz").write_bytes(follows.policy_bytes())
-    assert np.array_equal(load_policy(tmp_path / "policy.npz").q_values, table)
-
-
-GROUPS = tasks.foraging().replace(
-    castes={"nurse": {"threshold": 5.0}, "scout": {"share": 0.3, "epsilon": 0.4}, "guide": {}},
-    foods={"seed": {"deliver": 90, "regrowth": 5}, "sap": {"loads": 3}},
-    labour=tasks.Labour("thresholds", demand=0.05, relief=1, stop_probability=0.5),
-)
-OF_GROUPS = Setup(
-    text_map.to_text(World((7, 7, 7), (0, 6, 0), [(0, 0, 5), (1, 0, 5), (5, 5, 0)])).replace(
-        "F", "G", 1
-    ),
-    *(GROUPS.replace(castes={"guide": {"policy": "trail_follower"}}), LEARNS),
-    ants=20,
-)
-
-
-def test_what_the_task_or_the_page_lacks_is_refused_with_what_to_do():
-    with pytest.raises(AntsError, match=r"2 kinds of food, but the task 1; add the others to"):
-        Session(replace(SETUPS["nests"], world="Q   G   F\n"))
-    with pytest.raises(AntsError, match=r"castes.guide.policy` is '/etc/passwd', but the live pag"):
-        replace(OF_GROUPS, task=GROUPS.replace(castes={"guide": {"policy": "/etc/passwd"}}))
-    with pytest.raises(AntsError, match=r"the task has castes nurse, scout and guide, which the"):
-        check_cues(GROUPS)
-
-
-@pytest.mark.slow
-def test_a_session_with_castes_and_kinds_of_food_is_replayed(tmp_path):
-    session = Session(OF_GROUPS)
-    session.advance(40)
-    snapshot = session.colony.snapshot()
-    assert set(snapshot.ant_castes.tolist()) == {0, 1, 2}
-    assert snapshot.ant_idle.any()
-    free = np.flatnonzero(snapshot.ground == EMPTY).tolist()[:3]
-    session.apply({"place": {"what": "food", "cells": free, "kind": "sap"}})
-    assert set(session.colony.snapshot().food_kinds[free].tolist()) == {1}
-    session.apply({"task": {"castes.scout.epsilon": 0.1, "foods.seed.deliver": 50}})
-    session.advance(60)
-    session.apply({"episode": {}})
-    session.advance(20)
-    again = replayed(session.to_bytes())
-    assert again.interventions.state() == session.interventions.state()
-    assert gif_bytes(session.log(), most_frames=3).startswith(b"GIF")
-    frames = recording(session.log(), 9)
-    assert frames.header["castes"] == ["nurse", "scout", "guide"]
-    *_, before = session.undone()
-    assert before.colony.episode == 0
-
-
-def test_the_queen_of_any_nest_moves():
-    session = Session(SETUPS["nests"])
-    session.advance(10)
-    before = session.colony.snapshot().queens
-    empty = np.flatnonzero(session.colony.snapshot().ground == EMPTY)
-    cell = int(next(one for one in empty if session.interventions.is_empty(int(one))))
-    session.apply({"place": {"what": "queen", "nest": 1, "cells": [cell]}})
-    assert session.colony.snapshot().queens.tolist() == [before[0], cell]
-    session.apply({"episode": {}})
-    assert session.colony.snapshot().queens.tolist() == [before[0], cell]
-
-
-def test_what_a_hand_has_set_stays_in_later_episodes():
-    session = Session(SETUPS["foraging"])
-    session.apply({"epsilon": 0.25})
-    for _ in range(3):
-        session.apply({"episode": {}})
-    assert session.colony.epsilon == 0.25  # though it decays if nobody sets it
-    assert session.colony.learning_rate < LEARNS.learning_rate  # which nobody has set
-    session.apply({"learning_rate": 0.0})
-    tables = session.colony.q_values
-    session.advance(25)
-    session.advance(25)
-    session.advance(25)
-    assert session.colony.episode == 4
-    assert np.array_equal(session.colony.q_values, tables)
 
 
 def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
@@ -736,53 +550,3 @@ def test_a_late_page_is_told_of_the_whole_progress():
         assert points[ended][:, named].tolist() == ends
         assert points[0, POINT.index("ticks")] == 0
         assert (points[~ended][:, POINT.index("episode")] == 0).all()
-
-
-def test_a_long_progress_is_thinned(monkeypatch):
-    monkeypatch.setattr(recorder, "_MOST", 8)
-    session = Session(SETUPS["foraging"])
-    for _ in range(60):
-        session.apply({"episode": {}})
-    ends = [point for point in session._recorder.progress.points() if point[-1]]
-    assert 4 <= len(ends) <= 8
-    assert len({b[0] - a[0] for a, b in pairwise(ends)}) == 1
-
-
-def test_a_session_that_was_interrupted_after_a_launch_replays():
-    """While it ticks, between two episodes, and in an edit, which it refuses to go on from."""
-    session = Session(replace(GATED, ticks_per_episode=20))
-    session.leap(3)
-    with interrupted_after_launch():
-        session.leap(5)
-    assert session.ticks == session.colony.ticks > 3
-    session.leap(20 - session.ticks)
-    assert session.ended
-    with interrupted_after_launch():
-        session.advance()
-    session.apply({"episode": {}})
-    session.apply({"epsilon": 0.5})
-    session.leap(4)
-    *_, same = Session.replay(session.log())
-    assert same.steps == session.steps
-    with interrupted_after_launch():
-        session.apply({"place": {"what": "food", "cells": [(1, 1, 0)]}})
-    with pytest.raises(AntsError, match="an intervention was interrupted"):
-        session.leap(1)
-
-
-@pytest.mark.parametrize("policy", [TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9), trail_follower()])
-def test_ants_that_choose_without_action_values_need_no_policy(tmp_path, policy):
-    task = Task(choice=tasks.Choice("deneubourg"), life=tasks.Life(regrowth=0))
-    one = Session(Setup("paper", task, policy, ants=12))
-    one.advance(40)
-    assert {"ants", "deposit"} <= one.values().keys()
-    assert not {"epsilon", "learning_rate"} & one.values().keys()
-    assert one.header()["rule"] == "deneubourg"
-    with pytest.raises(AntsError, match="rule deneubourg has no policy"):
-        one.policy_bytes()
-    one.save(tmp_path / "one.npz")
-    assert Session.load(tmp_path / "one.npz").same(one)
-    alone = Colony(one.setup.build_world(), task, None, 0, ants=12, sharing="frozen")
-    alone.begin_episode()
-    alone.tick(40)
-    assert np.array_equal(alone.snapshot().ant_cells, one.colony.snapshot().ant_cells)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import runpy
 from dataclasses import replace
 
 import numpy as np
@@ -191,219 +192,134 @@ def test_nothing_is_nearer_without_a_compass(clean):
     assert moves > 30
 
 
-def no_return(level):
+# The kind of a rule, words of the message, and the rule.
+WRONG = r"""
+evaporation: its last line, and no other, must be a return
+def wrong(level):
     level = level + 1
 
-
-def two_returns(level):
-    if level > 1:
-        return level
-    return 0
-
-
-def forever(level):
+evaporation: line 2 of it, `while level >= 0:
+def wrong(level):
     while level >= 0:
         level = level + 1
     return level
 
-
-def endless(level):
+evaporation: must have literal whole numbers
+def wrong(level):
     for _ in range(10**9):
         level = level + 1
     return level
 
-
-def many_loops(level):
-    for _i in range(64):
-        for _j in range(64):
-            level = level + 0
-    return level
-
-
-def not_a_number(level):
+evaporation: it returns nan
+def wrong(level):
     return level * 1e308 * 1e308 * 0
 
-
-def too_large(level):
-    return level + 2e9
-
-
-def negative(level):
+evaporation: a number from 0 to 1000000000
+def wrong(level):
     return level - 300
 
-
-def unknown_input(levl):
+evaporation: has the argument 'levl', which is not an input
+def wrong(levl):
     return levl
 
-
-def calls(level):
-    return round(level)
-
-
-def imports(level):
+evaporation: `import math`, is not allowed
+def wrong(level):
     import math
 
     return math.floor(level)
 
-
-def writes(level):
-    level[0] = 3
-    return level
-
-
-def text(level):
+evaporation: `'level'`, is not a number
+def wrong(level):
     return "level" if level else 0
 
-
-def divides(level):
+evaporation: ZeroDivisionError: float division by zero, for level=
+def wrong(level):
     return 1 / (level - level)
 
-
-def roots(level):
+deposit: x must be above 0
+def wrong(level):
     return power(0 - level, 0.5)
 
+evaporation: `nowhere`, is not defined
+def wrong(level):
+    return level + nowhere
 
-def undefined(level):
-    return level + nowhere  # noqa: F821
-
-
-def bits(level):
+evaporation: `level & 3`, is not allowed
+def wrong(level):
     return level & 3
 
-
-def both(level, least=2.0):
-    return level and least
-
-
-def negated(level):
+evaporation: `not level`, is not a number; use it as a condition, as in
+def wrong(level):
     return 1 - (not level)
 
-
-def whole_vector(levels):
+choice: is a vector; use its entries
+def wrong(levels):
     return levels
 
-
-def outside(levels):
+choice: must have an index from 0 to 2
+def wrong(levels):
     return levels[3]
 
-
-def far_entry(levels, random):
-    return levels[3 + random] * 0
-
-
-def tuples(level):
-    level, other = 1, 2
-    return level + other
-
-
-def starred(*level):
-    return 0
-
-
-def bad_default(level, amount: float = -1.0, word: str = "x"):
-    return level
-
-
-def after_loop(level):
-    for i in range(3):
-        level = level + i
-    return i
-
-
-def square(level):
+evaporation: `level ** 2`, is not allowed; write power(x, y), of
+def wrong(level):
     return level**2
 
-
-def half(random):
+choice: an action, a whole number from 0 to 4
+def wrong(random):
     return random * 4
 
-
-def picks_a_number(level):
+deposit: `level`, is not a vector, for example `[0.2 * k for
+def wrong(level):
     return pick(level, 0.5)
 
-
-def filtered(level):
-    return 1 + pick([k for k in range(3) if k], level)
-
-
-def lengthens(level):
+deposit: `weights = [level, 1, 2]`, must have 2 entries, as before
+def wrong(level):
     weights = [level, 1]
     weights = [level, 1, 2]
     return 1 + pick(weights, 0.5)
 
-
-def changes(random):
+choice: `weights[1]`, is not allowed; assign to one name at a time
+def wrong(random):
     weights = [1, 1, 1]
     weights[1] = 0
     return pick(weights, random)
 
-
-def replaces_an_input(levels, random):
-    levels = [1, 1, 1]
-    return pick(levels, random)
-
-
-def any_entry(random):
-    weights = [1, 1, 1]
-    return weights[random * 3 // 1]
-
-
-def long_list(random):
+choice: repeats 257 times; at most 256 are allowed
+def wrong(random):
     return min(pick([1 for _i in range(257)], random), 4)
 
-
-def nothing_open(is_open, random):
+choice: it returns -1 for is_open=(0.0, 0.0, 0.0), random=
+def wrong(is_open, random):
     return pick(is_open, random)
 
+deposit: use plain arguments
+def wrong(*level):
+    return 0
 
-WRONG = [
-    ("evaporation", no_return, "its last line, and no other, must be a return"),
-    ("evaporation", two_returns, "its last line, and no other, must be a return"),
-    ("evaporation", forever, "line 2 of it, `while level >= 0:"),
-    ("evaporation", endless, "must have literal whole numbers"),
-    ("evaporation", many_loops, "repeats 4096 times; at most 256 are allowed"),
-    ("evaporation", not_a_number, "it returns nan"),
-    ("evaporation", too_large, "but must return the level of a cell after the tick"),
-    ("evaporation", negative, "a number from 0 to 1000000000"),
-    ("evaporation", unknown_input, "has the argument 'levl', which is not an input"),
-    ("evaporation", calls, "calls another function than exp, log, power, pick, min, max, abs"),
-    ("evaporation", imports, "`import math`, is not allowed"),
-    ("evaporation", writes, "assign to one name at a time"),
-    ("evaporation", text, "`'level'`, is not a number"),
-    ("evaporation", divides, "ZeroDivisionError: float division by zero, for level="),
-    ("deposit", roots, "x must be above 0"),
-    ("evaporation", undefined, "`nowhere`, is not defined"),
-    ("evaporation", bits, "`level & 3`, is not allowed"),
-    ("evaporation", both, "`level and least`, is not a number; use it as a condition, as in"),
-    ("evaporation", negated, "`not level`, is not a number; use it as a condition, as in"),
-    ("choice", whole_vector, "is a vector; use its entries"),
-    ("choice", outside, "must have an index from 0 to 2"),
-    ("choice", far_entry, "IndexError: there is no entry 3"),
-    ("evaporation", square, r"`level ** 2`, is not allowed; write power(x, y), of"),
-    ("choice", half, "an action, a whole number from 0 to 4"),
-    ("deposit", picks_a_number, "`level`, is not a vector, for example `[0.2 * k for"),
-    ("deposit", filtered, "if k]`, is not a vector"),
-    ("deposit", lengthens, "`weights = [level, 1, 2]`, must have 2 entries, as before"),
-    ("choice", changes, "`weights[1]`, is not allowed; assign to one name at a time"),
-    ("choice", replaces_an_input, "`levels`, cannot be assigned; choose another name"),
-    ("choice", any_entry, "must have a literal number or the name of a loop as index"),
-    ("choice", long_list, "repeats 257 times; at most 256 are allowed"),
-    ("choice", nothing_open, "it returns -1 for is_open=(0.0, 0.0, 0.0), random="),
-    ("evaporation", tuples, "assign to one name at a time"),
-    ("deposit", starred, "use plain arguments"),
-    ("deposit", bad_default, "declare a whole number (int) or a number (float)"),
-    ("evaporation", after_loop, "is used outside its loop"),
-    ("evaporation", lambda level: level, "it must be a function defined with def"),
-]
+deposit: declare a whole number (int) or a number (float)
+def wrong(level, amount: float = -1.0, word: str = "x"):
+    return level
+
+evaporation: is used outside its loop
+def wrong(level):
+    for i in range(3):
+        level = level + i
+    return i
+""".strip().split("\n\n")
 
 
-@pytest.mark.parametrize(("kind", "function", "says"), WRONG, ids=[f.__name__ for _, f, _ in WRONG])
-def test_wrong_rules_are_refused_in_one_sentence(kind, function, says, clean):
+@pytest.mark.parametrize("case", WRONG, ids=[case.partition("\n")[0] for case in WRONG])
+def test_wrong_rules_are_refused_in_one_sentence(case, clean, tmp_path):
+    head, _, source = case.partition("\n")
+    kind, _, says = head.partition(": ")
+    path = tmp_path / "wrong.py"
+    path.write_text(f"from taichi_ants.rules import pick, power\n\n\n{source}\n")
+    function = runpy.run_path(str(path))["wrong"]
     with pytest.raises(AntsError) as caught:
         rules.register(kind)(function)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert function.__name__ not in rules.names()
+    assert "wrong" not in rules.names()
 
 
 def same(level):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from browser import Page, started
 
-from taichi_ants import Colony, Field, Task, TrainingConfig, World, rules, worlds
+from taichi_ants import Colony, Field, Task, TrainingConfig, rules, worlds
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.rules import registry
 from taichi_ants.task import Caste, Choice, Life, Noise, Pheromone, foraging
@@ -120,33 +120,6 @@ def test_reasons_are_those_of_the_rule(browser, tmp_path, name):
     page.close()
 
 
-def test_only_castes_that_learn_show_what_they_learn(browser, tmp_path):
-    colony = begun("castes", epsilon=0.2)
-    save_page(tmp_path / "page.html", record_colony(colony, 30))
-    page = Page(browser, tmp_path / "page.html")
-    castes = dict(zip(colony.numbers[0].tolist(), colony.castes[0].tolist(), strict=True))
-    met = set()
-    for _, number, act, story, _ in page.read(STORIES):
-        learns = castes[number] == 1
-        assert ("Q(" in story) == ("TD error" in story) == learns
-        met.add((learns, act["why"]))
-    assert (True, "explored") in met
-    page.close()
-
-
-def test_a_slip_changes_the_entry_of_the_chosen_action(browser, tmp_path):
-    colony = begun("slipping", epsilon=0.5)
-    save_page(tmp_path / "page.html", recording := record_colony(colony, 30))
-    page = Page(browser, tmp_path / "page.html")
-    slipped = [one for one in page.read(STORIES) if one[2]["action"] != one[2]["executed"]]
-    assert len(slipped) > 20
-    assert any(act["before"] != act["after"] for *_, act, _, _ in slipped)
-    for *_, act, story, _ in slipped:
-        assert f", {ACTION_NAMES[act['action']]})" in story
-    assert recording.header["format"] == 4
-    page.close()
-
-
 SHORT = Pheromone("exponential", half_life=4)
 HOME = {"home": Field(deposited_when="without_food", deposit="add", level=100, cap=1000)}
 # The task, the pheromone that the page shows, and its view for ants without and with food; None if
@@ -208,38 +181,4 @@ def test_what_hides_a_trail_is_told(browser, tmp_path, task, shown, without, wit
         met.add((loaded, bool(hidden)))
     assert {(False, False), (True, False)} <= met
     assert any(hidden for _, hidden in met)
-    page.close()
-
-
-@pytest.mark.parametrize("name", ["misreading", "deneubourg", "an own rule"])
-def test_nothing_hides_trails_from_ants_that_know_more_than_letters(browser, tmp_path, name):
-    save_page(tmp_path / "page.html", record_colony(begun(name), 20))
-    page = Page(browser, tmp_path / "page.html")
-    assert not any(";" in said for _, said, *_ in page.read(MEANINGS))
-    page.close()
-
-
-def test_levels_above_the_scale_are_told_without_it(browser, tmp_path):
-    """With deposits that add up, a trail can be stronger than the darkest colour shows."""
-    task = Task(pheromone=Pheromone(deposit="add", level=1, cap=10_000))
-    world = World((6, 6, 6), (0, 0, 0), foods=[(5, 0, 0)], trails=[((2, 0, 0), 108)])
-    colony = Colony(world, task, learning("sarsa"), 1)
-    colony.begin_episode()
-    save_page(tmp_path / "page.html", record_colony(colony))
-    page = Page(browser, tmp_path / "page.html")
-    page.read("cell => viewer.chooseCell(cell)", int(world.grid.index((2, 0, 0))))
-    assert "trail 108 (darkest from 10)" in page.text("#cell")
-    page.close()
-
-
-def test_an_ant_that_may_take_one_of_several_foods_is_told_at_each(browser, tmp_path):
-    world = World((6, 6, 6), (0, 5, 5), foods=[(3, 0, 0), (3, 1, 0)], ants=[((2, 0, 0), 0)])
-    colony = Colony(world, Task(), learning("sarsa"), 1, sharing="frozen",
-                    q_values=trail_follower())  # fmt: skip
-    colony.begin_episode()
-    save_page(tmp_path / "page.html", record_colony(colony, 1))
-    page = Page(browser, tmp_path / "page.html")
-    for food in ((3, 0, 0), (3, 1, 0)):
-        page.read("cell => viewer.chooseCell(cell)", int(world.grid.index(food)))
-        assert "ant 0 (pick up, here or next to it)" in page.text("#cell")
     page.close()

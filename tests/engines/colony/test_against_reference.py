@@ -459,17 +459,6 @@ def test_ants_see_which_ants_stand_around_them_and_what_these_carry(seen_crowd):
     assert (loads > 100).all()
 
 
-def test_learners_whose_tables_cannot_be_shared_are_refused():
-    for name in learners.registry.BUILT_IN:
-        learner = learners.get(name)
-        training = TrainingConfig(name, 0.1, 0.9, 0.1, 1.0)
-        if learner.td_error is None:
-            with pytest.raises(
-                AntsError, match=rf"^learner '{name}' .* set sharing to \"independent\"\.$"
-            ):
-                Colony(worlds.paper(), Task(), training)
-
-
 def test_errors_below_the_last_place_of_the_sum_are_rounded():
     """Values of a quarter of 2^-32 that fall by themselves: the sum of the errors is 0."""
     task = Task(rewards=Rewards(0, 0, 0, 0, 0))

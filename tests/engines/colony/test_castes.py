@@ -51,11 +51,6 @@ def test_ants_of_a_nest_are_divided_by_shares(castes, n, numbers, chances):
     assert found == pytest.approx(chances or [one["share"] for one in castes.values()])
 
 
-def test_castes_are_blocks_of_ant_numbers():
-    rules = Task(castes={"minor": {"share": 0.75}, "major": {}})
-    assert follows(rules, ants=8).castes.tolist() == [[0] * 6 + [1] * 2]
-
-
 @pytest.mark.parametrize(
     ("threshold", "law"),
     [
@@ -162,29 +157,6 @@ def drawn() -> list:
         one = drawn_castes(one, seed, 2, True, None)
         found += [] if one is None else [one]
     return found[:1]
-
-
-@pytest.mark.slow
-def test_schedules_threads_and_files_change_nothing(tmp_path):
-    for one in drawn():
-        results = []
-        for schedule, threads in (("by_world", 1), ("by_chunk", 2)):
-            options = {**one.population, "schedule": schedule, "threads": threads}
-            colony = Colony(one.world, one.task, one.training, [3, 4], **options)
-            colony.begin_episode()
-            colony.tick(9)
-            colony.save(tmp_path / "colony.npz")
-            again = Colony.load(tmp_path / "colony.npz")
-            assert again == colony
-            for made in (colony, again):
-                made.tick(9)
-            assert again == colony
-            outcome = colony.outcome()
-            assert (outcome.caste_deliveries.sum(axis=2) == outcome.deliveries).all()
-            results.append((outcome, colony.q_values, colony.stimuli))
-        assert results[0][0] == results[1][0]
-        assert np.array_equal(results[0][1], results[1][1])
-        assert np.array_equal(results[0][2], results[1][2])
 
 
 def test_a_file_of_a_colony_needs_no_policy_file(tmp_path):

@@ -18,7 +18,7 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.interventions import from_dict
-from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
+from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At, Every, When
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.protocol import Protocol
@@ -177,19 +177,6 @@ def test_a_run_leaves_no_trace_of_its_protocol():
     assert followers([5]).run(2, 90) == followers([5]).run(2, 90, protocol=[])
 
 
-def test_half_of_the_ants_are_removed_and_food_is_added_in_each_episode():
-    colony = followers(range(3))
-    removals = [At(20, remove_ants=0.5), At(21, remove_ants=1), At(22, remove_ants=0.5)]
-    found = colony.run(2, 50, protocol=removals)
-    assert (found.living == 4).all()  # 20 - 10 - 1 - 5: a half of nine is rounded up
-    cells = [[1, 2, 0], [1, 3, 0]]
-    colony.run(1, 50, protocol=[At(10, place={"what": "food", "cells": cells})])
-    assert (colony.snapshot(1).ground[colony.grid.index(cells)] != OBSTACLE).all()
-    sources = colony.n_food_sources
-    colony.run(1, 50)
-    assert (sources, colony.n_food_sources) == (3, 3)
-
-
 def test_interventions_by_hand_change_the_worlds_that_are_named():
     colony = followers(range(3))
     colony.begin_episode()
@@ -230,20 +217,6 @@ def test_kernels_rely_on_stored_best_actions_and_on_slots_without_gaps(schedule)
         assert np.array_equal(stored, colony.arrays["q"])
     assert ants[1] < 30
     assert len(np.unique(stored.reshape(-1, ROW)[:, BEST_AT])) > 5
-
-
-def test_a_policy_comes_from_a_file_a_name_or_a_table(tmp_path):
-    table = random_policy("ants")
-    save_policy(tmp_path / "p.npz", table, {}, "ants")
-    found = [
-        followers([1]).run(1, 80, protocol=At(20, policy=one))
-        for one in (str(tmp_path / "p.npz"), "random", table)
-    ]
-    assert found[0] == found[1] == found[2]
-    one, two = (At(20, policy=table + k) for k in (0, 1))
-    assert one != two
-    assert hash(one) == hash(At(20, policy=table))
-    assert one.as_dict()["policy"].keys() == {"source", "sha256"}
 
 
 WRONG = [

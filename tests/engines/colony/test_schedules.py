@@ -121,32 +121,6 @@ def test_no_more_threads_wait_for_each_other_than_there_are(monkeypatch):
     assert ants.arrays["orders"][Order.PARTS] == 1
 
 
-def test_who_is_faster_goes_on():
-    """Other programs that use the processors delay threads that wait more than a single one."""
-    choice, alone = ThreadChoice(), []
-    paces = {4: 1.0, 1: 3.0}
-    for launch in range(90):
-        if launch == 40:  # the processors are busy from now on
-            paces[4] = 7.0
-        n, threads = choice.plan(80, 4)
-        assert (n, threads) in ((80, 1), (10, 1), (80, 4), (10, 4))
-        choice.took(threads, paces[threads])
-        alone.append(n if threads == 1 else 0)
-    assert 0 < sum(alone[:40]) < 0.02 * 80 * 40
-    assert sum(alone[50:]) > 0.9 * 80 * 35
-    assert ThreadChoice().plan(80, 1) == (80, 1)
-
-
-def test_threads_share_a_single_world_from_fewer_ants_on():
-    world = worlds.open_world(1, (35, 35, 35))
-    for n, seeds, schedule in (
-        (2047, 1, "by_world"),
-        (2048, 1, "by_chunk"),
-        (2048, (1, 2), "by_world"),
-    ):
-        assert Colony(world, None, TRAINING, seeds, ants=n).schedule == schedule
-
-
 def test_a_colony_does_not_feel_its_neighbours():
     """A world of a batch is what it is alone, and worlds may differ."""
     batch = history(seeds=(3, 8), world=[meadow(5), meadow(6)])

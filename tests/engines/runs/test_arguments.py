@@ -17,16 +17,13 @@ from taichi_ants import (
     train,
     worlds,
 )
-from taichi_ants.checks import checked_seeds, checked_seeds_for
+from taichi_ants.checks import checked_seeds
 from taichi_ants.engines.runs.engine import pieces, size_of_launch
-from taichi_ants.errors import checked_whole, shown
-from taichi_ants.rendering import Scene
 from taichi_ants.worlds import World, paper
 
 CONFIG = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
 PLANS = TrainingConfig("dyna_q", 0.1, 0.9, 0.3, 0.99, planning_steps=2)
 TABLE = np.zeros((128, 5))
-NO_ROOM = World((2, 1, 1), queen=(0, 0, 0), foods=[(1, 0, 0)])
 
 
 def says(text, function, *arguments, **options):
@@ -108,77 +105,6 @@ def test_seeds_that_are_fine(seeds, expected):
     assert all(type(seed) is int for seed in checked)
 
 
-def test_seeds_of_tables():
-    assert checked_seeds_for(4, ()).tolist() == [4]
-    assert checked_seeds_for(4, (2, 3)).tolist() == [4] * 6
-    assert checked_seeds_for([1, 2, 3], (2, 3)).tolist() == [1, 2, 3, 1, 2, 3]
-    for shape, words in {
-        (): "one table; give 1 seed.",
-        (2,): "2 tables; give 1 seed or 2 seeds.",
-        (3, 2): "3 x 2 tables; give 1 seed or 2 seeds.",
-    }.items():
-        says(f"there are 3 seeds for {words}", checked_seeds_for, [1, 2, 3], shape)
-
-
-NO_COUNTS = [(0, "0"), (-1, "-1"), (1.0, "1.0"), ("1", "'1'"), (None, "None"), (True, "True")]
-
-
-@pytest.mark.parametrize(("value", "shown"), [*NO_COUNTS, (2**31, str(2**31))])
-def test_counts(value, shown):
-    text = f"episodes is {shown}; it must"
-    says(text, train, paper(), CONFIG, 0, value, 1)
-    says(text, continue_training, train(paper(), CONFIG, 0, 1, 1), value)
-    says(text, trace_training, paper(), CONFIG, 0, value, 1)
-    says(f"rollouts is {shown}; it must", evaluate, paper(), TABLE, value)
-
-
-@pytest.mark.parametrize(("value", "shown"), [*NO_COUNTS, (10_000_001, "10000001")])
-def test_step_limits(value, shown):
-    text = f"max_steps is {shown}; it must"
-    says(text, train, paper(), CONFIG, 0, 1, value)
-    says(text, evaluate, paper(), TABLE, 1, 0, value)
-    says(text, rollout, paper(), TABLE, 0, 0, value)
-    says(text, trace_training, paper(), CONFIG, 0, 1, value)
-
-
-@pytest.mark.parametrize(("value", "shown"), [*NO_COUNTS[1:], (2**31, str(2**31))])
-def test_numbers_of_rollouts(value, shown):
-    says(f"number is {shown}; it must", rollout, paper(), TABLE, 0, value)
-
-
-def test_counts_of_any_kind_of_integer():
-    assert checked_whole("n", np.int64(3)) == 3
-    assert type(checked_whole("n", np.uint8(3))) is int
-    assert checked_whole("n", 0, least=0) == 0
-
-
-@pytest.mark.parametrize("value", ["none", "off", 0, 1, None, 0.5, [True]])
-def test_flags(value):
-    """Text such as "none" would count as True."""
-    text = f"is {value!r}; it must be True or False"
-    says(f"ends_at_delivery {text}", Colony, paper(), None, CONFIG, ends_at_delivery=value)
-    says(f"overlay is {value!r}", Scene, paper().grid, overlay=value)
-
-
-@pytest.mark.parametrize("task", ["paper", 3, Task])
-def test_tasks(task):
-    for function in (train, trace_training):
-        says(f"task is {shown(task)}; it must be a Task", function, paper(), CONFIG, 0, 1, 1, task)
-
-
-def test_tables_must_fit_the_observation():
-    task = Task("five_cells")
-    text = "q_values has shape (128, 5); for the observation 'five_cells' it must end in (2048, 5)"
-    says(text, evaluate, paper(), TABLE, task=task)
-    says(text, rollout, paper(), TABLE, task=task)
-
-
-@pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), "0.5", None, True, [0.5], 10**400])
-def test_epsilon(value):
-    for function in (evaluate, rollout):
-        says(f"epsilon is {shown(value)}", function, paper(), TABLE, epsilon=value)
-
-
 @pytest.mark.parametrize(
     ("table", "text"),
     [
@@ -202,11 +128,6 @@ def test_tables(table, text):
     says(text, rollout, paper(), table)
 
 
-def test_one_table_for_a_rollout():
-    several = np.stack([TABLE, TABLE])
-    says("q_values has shape (2, 128, 5), which is 2 tables; give one", rollout, paper(), several)
-
-
 @pytest.mark.parametrize("world", [None, "paper", ((2, 2, 2), (0, 0, 0))])
 def test_worlds(world):
     text = f"world is {world!r}; it must be a World"
@@ -214,13 +135,6 @@ def test_worlds(world):
     says(text, evaluate, world, TABLE)
     says(text, rollout, world, TABLE)
     says(text, trace_training, world, CONFIG)
-
-
-def test_worlds_without_room():
-    says("this world has room for 0", train, NO_ROOM, CONFIG, 0)
-    says("this world has room for 0", evaluate, NO_ROOM, TABLE)
-    says("this world has room for 0", rollout, NO_ROOM, TABLE)
-    says("this world has room for 0", trace_training, NO_ROOM, CONFIG)
 
 
 @pytest.mark.parametrize(
@@ -233,18 +147,6 @@ def test_worlds_without_room():
 def test_threads(threads, text):
     says(text, train, paper(), CONFIG, 0, 1, 1, threads=threads)
     says(text, evaluate, paper(), TABLE, threads=threads)
-
-
-@pytest.mark.parametrize("arch", ["gpu", "CPU", "", 3])
-def test_architectures(arch):
-    says(
-        f"arch is {arch!r}; it must be one of cpu, cuda", train, paper(), CONFIG, 0, 1, 1, arch=arch
-    )
-
-
-def test_traces_have_a_limit():
-    says("episodes * max_steps is 100200", trace_training, paper(), CONFIG, 0, 167, 600)
-    says("episodes * max_steps is 1000001", rollout, paper(), TABLE, max_steps=1_000_001)
 
 
 def test_arguments_are_left_as_they_are():
@@ -289,15 +191,6 @@ def test_progress_rises_to_one():
     shares.clear()
     evaluate(paper(), TABLE, 3, progress=shares.append)
     assert shares[-1] == pytest.approx(1)
-
-
-def test_a_world_to_learn_in_has_food():
-    bare = World((4, 4, 4), (0, 0, 0))
-    text = "the world has no food, so ants cannot learn in it"
-    says(text, train, bare, CONFIG, 0, 1, 1)
-    says(text, trace_training, bare, CONFIG)
-    assert evaluate(bare, TABLE, 2, max_steps=3).deliveries.sum() == 0
-    assert len(rollout(bare, TABLE, max_steps=3)) == 3
 
 
 @pytest.mark.parametrize(
