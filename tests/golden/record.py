@@ -31,8 +31,8 @@ sys.path[:0] = [path for path in map(str, (ROOT, HERE)) if path not in sys.path]
 os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")  # compiles faster, with equal results
 
 import drawing  # noqa: E402
+import frozen_rules  # noqa: E402, F401  registers rules
 import numpy as np  # noqa: E402
-import own_rules  # noqa: E402, F401  registers rules
 
 from taichi_ants import (  # noqa: E402
     PHYSICS,

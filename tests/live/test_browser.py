@@ -256,7 +256,7 @@ def test_a_change_is_undone_and_the_session_before_comes_back(page, room):
     page.press("Shift+ArrowRight")
     wait(page, "viewer.history.frames.at(-1).tick === 10")
     assert page.tab.is_disabled("#undo")
-    assert page.tab.is_hidden("#go-back") == (room._former is None)
+    assert page.tab.is_hidden("#go-back") == (room._previous is None)
     ground = room.session.colony.snapshot().ground
     page.press("2", "]")
     page.tab.mouse.move(*place(page, cell_of(room, 5, 5, 0)))

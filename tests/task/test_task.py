@@ -59,11 +59,6 @@ def always_zero(view):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"name": "two words"}, "the name of the observation is 'two words'; it must"),
-        (
-            {"name": "paper"},
-            "'paper' is the name of a built-in observation, which",
-        ),
         ({"n_states": 0}, "n_states of 'mine' is 0; it must lie between 1"),
         ({"encode": 3}, "encode of 'mine' is 3; it must be a function of one argument"),
         ({"encode": lambda view, more: 0}, "it must be a function of one argument"),
