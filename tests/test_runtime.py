@@ -276,13 +276,6 @@ def temporary(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_the_fallback_folder_is_the_users_alone(temporary):
-    folder = Path(fallback_folder())
-    assert folder.parent == temporary
-    assert folder.stat().st_mode & 0o777 == 0o700
-    assert fallback_folder() == str(folder)
-
-
 def test_a_fallback_folder_of_somebody_else_is_not_used(temporary, monkeypatch):
     """Somebody could have put kernels there that do as they like."""
     usual = fallback_folder()

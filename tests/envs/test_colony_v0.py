@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
 import warnings
 from dataclasses import replace
 
@@ -119,26 +117,6 @@ def test_the_state_is_a_map_of_the_world():
         assert not headings[ants == 0].any()
     assert trail.max() > 0
     assert (ground == FOOD).sum() < len(MEADOW.foods)
-
-
-def test_copies_and_pickles_go_on_alike():
-    env = colony(render_mode="rgb_array", observation_format="one_hot")
-    _, infos = env.reset(seed=3)
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        *_, infos = env.step(guided({name: infos[name] for name in env.agents}, rng))
-    assert env.render().dtype == np.uint8
-    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
-    while env.agents:
-        actions = guided({name: infos[name] for name in env.agents}, rng)
-        observations, *rest, infos = env.step(actions)
-        for other in others:
-            theirs, *more, _ = other.step(actions)
-            assert {k: v.tolist() for k, v in theirs.items()} == {
-                k: v.tolist() for k, v in observations.items()
-            }
-            assert more == rest
-            assert other.agents == env.agents
 
 
 def test_steps_in_the_wrong_order_and_wrong_actions(capsys):

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
-from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 from taichi_ants import AntsError, Task, worlds
 from taichi_ants.envs import Event
@@ -132,33 +129,6 @@ def test_the_autoreset_modes_differ_in_when_they_begin_alone():
                 assert_same(final[name], theirs[-1][name])
 
 
-def test_single_worlds_begin_anew_while_others_go_on():
-    """With a mask; a world that is reset as another one ends at another time, and feels nothing."""
-    env, alone = ants_of(autoreset_mode=DISABLED), ants_of(1, autoreset_mode=DISABLED)
-    env.reset(seed=8)
-    alone.reset(seed=8)
-    rng, before = np.random.default_rng(2), np.zeros(0)
-    mask = np.arange(2 * ANTS) >= ANTS  # the second world
-    for step in range(20):
-        if step == 9:
-            seen, infos = env.reset(options={"reset_mask": mask})
-            assert np.array_equal(infos["_state"], mask)
-            assert_same(seen[:ANTS], before)
-        actions = rng.integers(0, 5, env.num_envs)
-        told, other = env.step(actions), alone.step(actions[:ANTS])
-        for k in range(4):
-            assert_same(told[k][:ANTS], other[k])
-        before = other[0]
-    assert np.array_equal(told[3], ~mask)
-    with pytest.raises(ResetNeeded, match=r"^the episode of environment 0 has ended; "):
-        env.step(actions)
-    env.reset(options={"reset_mask": ~mask})
-    for _ in range(9):
-        assert not told[3][ANTS:].any()
-        told = env.step(actions)
-    assert np.array_equal(told[3], mask)
-
-
 def test_an_ant_that_delivers_is_terminated_and_goes_on():
     """Where delivery terminates; a batch in which food lies beside the nest."""
     env = ants_of(task=Task(), max_steps=300)
@@ -184,55 +154,17 @@ def test_an_ant_that_delivers_is_terminated_and_goes_on():
     assert delivered > 5
 
 
-def test_what_users_register_and_wrap():
-    """Made by Gymnasium without a warning; its wrappers read infos and episodes."""
-    gymnasium.register(
-        "tests/Colony-v0", vector_entry_point="taichi_ants.envs.colony:HexColonyVectorEnv"
-    )
-    env = gymnasium.make_vec("tests/Colony-v0", num_envs=64, max_steps=5)
-    assert (env.num_envs, env.metadata["autoreset_mode"]) == (64, SAME)
-    seen, _ = env.reset(seed=1)
-    assert seen in env.observation_space
-    assert env.single_observation_space.shape == (4,)
-    env.action_space.seed(1)
-    listed = DictInfoToList(RecordEpisodeStatistics(env))
-    listed.reset(seed=1)
-    for _ in range(5):
-        *_, infos = listed.step(env.action_space.sample())
-    assert len(infos) == 64
-    assert set(infos[0]) == {
-        *("state", "action_mask", "event", "deliveries", "final_obs", "final_info", "episode")
-    }
-    assert infos[0]["final_info"]["event"] in (
-        Event.ENTERED_EMPTY,
-        Event.ENTERED_CUE,
-        Event.BLOCKED,
-        Event.FAILED,
-    )
-    assert infos[3]["episode"]["l"] == 5
-
-
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         ({"num_envs": 7}, "num_envs is 7; .* a multiple of ants, 6"),
-        ({"ants": 0}, "ants is 0; "),
         ({"task": Task(life=Life(births=True))}, "life of the task is Life.*leave out births"),
-        ({"task": Task(life=Life(lifespan=9))}, "life of the task is Life.*lifespan"),
         ({"autoreset_mode": "never"}, "autoreset_mode is 'never'; it must be one of NextStep"),
         (
             {"task": Task(), "autoreset_mode": NEXT},
             "autoreset_mode is 'NextStep', but the next episode of an ant",
         ),
         ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
-        ({"world": "nowhere"}, "there is no world 'nowhere'"),
-        ({"world": []}, "world is .*; give the name of a world"),
-        ({"world": 3}, "world is 3; give the name of a world"),
-        ({"start": "there"}, "start is 'there'; "),
-        ({"max_steps": 0}, "max_steps is 0; "),
-        ({"observation_format": "text"}, "observation_format is 'text'; "),
-        ({"evaporation": "off"}, "evaporation is 'off'; it must be True or False"),
-        ({"render_mode": "human"}, "render_mode is 'human'; it must be one of rgb_array"),
     ],
 )
 def test_arguments_that_are_not_allowed(options, said):

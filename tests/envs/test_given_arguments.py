@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from taichi_ants import AntsError, Life, World, task, worlds
-from taichi_ants.envs import Event
+from taichi_ants import AntsError, World, task, worlds
 
 ID, COLONY = "taichi_ants/HexForage-v0", "taichi_ants/HexColony-v0"
 MAZE = [1] * 16 + [3] + [1] * 16 + [4]  # delivers in the paper's world
@@ -101,21 +100,3 @@ def test_deliveries_are_counted_by_step_and_by_rollout(mode: str, delivery: str)
     if mode != "Disabled":
         infos, others = (env.step([1, 1])[4]["deliveries"] for env in (stepped, rolled))
         assert infos.tolist() == others.tolist() == [int(delivery == "continues")] * 2
-
-
-def test_deliveries_of_ants_in_colonies() -> None:
-    """Each trip is an episode if deliveries terminate; else an ant counts all of them."""
-    world = World((4, 1, 1), (0, 0, 0), foods=[(3, 0, 0)], ants=[((2, 0, 0), 0)])
-    for delivery in ("terminates", "truncates"):
-        rules = task.Task(life=Life(regrowth=0), delivery=delivery, turns_at_queen=True)
-        env = gymnasium.make_vec(COLONY, num_envs=1, ants=1, world=world, task=rules)
-        env.reset(seed=0)
-        expected = 0
-        for action in [3, 1, 4, 1, 3, 1, 4, 1]:
-            infos = env.step([action])[4]
-            if infos["event"][0] == Event.DELIVERED:
-                expected += 1
-            if "final_info" in infos:
-                assert infos["final_info"]["deliveries"][0] == 1
-            assert infos["deliveries"][0] == expected
-        assert expected == (0 if delivery == "terminates" else 2)

@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plain_runs import rollout
 
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import load_policy, random_policy, save_policy, trail_follower
 from taichi_ants.task import Task, foraging, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT
-from taichi_ants.worlds import paper
 
 
 def best_actions(q_values: np.ndarray, name: str, observation: str = "paper") -> set[int]:
@@ -48,40 +46,6 @@ def test_what_the_trail_follower_does(name: str, actions: set[int]) -> None:
     assert best_actions(trail_follower(), name) == actions
 
 
-@pytest.mark.parametrize(
-    ("observation", "name", "actions"),
-    [
-        # An ant without food waits to be pushed; giving fails, and does not turn it.
-        ("ants", "foraging T P E", {GIVE}),
-        ("ants", "foraging E E P", {GIVE}),
-        ("queues", "foraging T P E", {FORWARD}),
-        ("queues", "foraging T E P", {LEFT}),
-        ("queues", "foraging p E P", {GIVE}),
-        ("queues", "foraging E E P", {RIGHT}),
-        ("queues", "foraging P E P", {LEFT, RIGHT}),
-        ("queues", "foraging E p E", {GIVE}),
-        ("queues", "foraging T p p", {LEFT}),
-        # With food, picking up fails.
-        ("queues", "carrying p E A", {PICK_UP}),
-        ("queues", "carrying p P E", {FORWARD}),
-        ("queues", "carrying p p S", {RIGHT}),
-    ],
-)
-def test_where_the_trail_follower_waits_for_others(
-    observation: str, name: str, actions: set[int]
-) -> None:
-    assert best_actions(trail_follower(observation), name, observation) == actions
-
-
-@pytest.mark.parametrize("evaporation", [False, True])
-def test_the_trail_follower_takes_the_shortest_way_in_the_world_of_the_paper(
-    evaporation: bool,
-) -> None:
-    task = Task(evaporation_in_evaluation=evaporation)
-    run = rollout(paper(), trail_follower(), task=task)
-    assert (run.returns, run.steps, run.deliveries) == ([45], [34], [1])
-
-
 # Files.
 
 
@@ -102,18 +66,6 @@ def write(path: Path, q_values: Any = random_policy(), **changes: Any) -> None: 
     """Write a policy file as other programs do, with some facts exchanged."""
     facts = {"kind": "policy", "version": 2, "observation": "paper", "metadata": {}, **changes}
     np.savez(path, q_values=q_values, facts=json.dumps(facts))
-
-
-@pytest.mark.parametrize("observation", observations.names())
-def test_a_policy_of_any_observation_comes_back_with_its_name(
-    tmp_path: Path, observation: str
-) -> None:
-    n_states = observations.get(observation).n_states
-    q_values = np.random.default_rng(2).normal(size=(n_states, 5)).astype(np.float32)
-    save_policy(tmp_path / "policy.npz", q_values, {}, observation)
-    policy = load_policy(tmp_path / "policy.npz")
-    assert policy.observation == observation
-    np.testing.assert_array_equal(policy.q_values, q_values)
 
 
 def task_of(path, metadata, observation="ants"):

@@ -32,8 +32,6 @@ WORLD = """() => {
            tick: frame.tick, deliveries: frame.deliveries };
 }"""
 
-LINES = """[...document.querySelectorAll(".curve .line")].map((line) => line.getAttribute("d"))"""
-
 
 @pytest.fixture(scope="module")
 def browser():
@@ -147,24 +145,6 @@ def test_steps_and_play_show_the_world_of_the_engine(page, room):
     page.click("#forward")
     wait(page, f"viewer.history.frames.at(-1).tick === {ticks + 1}")
     assert_same(page, room)
-
-
-def test_an_ant_is_followed_and_explained(page, room):
-    page.tab.focus("#world")
-    page.press("n")
-    assert "It has not acted yet." in page.text("#ant")
-    page.click("#forward")
-    wait(page, "document.querySelector('#ant').innerText.includes('In the last tick')")
-    said = page.text("#ant")
-    assert "Chooses" in said
-    assert "TD error" in said
-    page.tab.fill("#speed", "100")
-    page.tab.click("#play")
-    wait(page, "viewer.history.frames.at(-1).episode >= 2")
-    page.tab.click("#play")
-    wait(page, "!live.running && viewer.history.frames.at(-1).acts.length === 0")
-    if page.read("viewer.history.frames.at(-1).tick"):
-        assert "At this speed, actions are not shown." in page.text("#ant")
 
 
 @pytest.mark.parametrize("how", ["mouse", "keyboard"])
@@ -542,52 +522,3 @@ def test_nothing_leaves_its_card(browser, room, width):
     assert opened.read(OVERFLOWING) == []
     assert opened.read("document.documentElement.scrollWidth") == width
     opened.close()
-
-
-def test_curves_are_over_time_and_a_late_page_has_them(page, browser, room):
-    """A point for the return of each episode, and ticks over all of them as the axis."""
-    page.tab.fill("#speed", "100")
-    page.tab.click("#play")
-    wait(page, "viewer.history.frames.at(-1).episode >= 4")
-    page.tab.click("#play")
-    wait(page, "!live.running")
-    page.settle()
-    late = Page(browser, room.url)
-    session = room.session
-    for one in (page, late):
-        assert one.read("viewer.history.frames.at(-1).ticks") == session.ticks
-        assert one.tab.get_attribute("#time", "max") == str(session.ticks)
-        assert one.tab.get_attribute("#time", "min") == "0"
-        names = one.tab.locator(".curve .label span").all_inner_texts()
-        assert names == ["delivered in total", "return per episode", "epsilon"]
-        assert "delivered this episode" in one.text("#now")
-        lines = [
-            [float(point.split()[0]) for point in line.removesuffix("h0").lstrip("M").split("L")]
-            for line in one.read(LINES)
-        ]
-        ended = 50 * np.arange(1, session.colony.episode + 1) / session.ticks * 100
-        assert np.abs(ended[:, None] - lines[1]).min(axis=0).max() < 0.01
-        if len(ended) < 500:  # a longer one is thinned
-            assert len(lines[1]) == len(ended)
-        for line in lines:
-            assert line == sorted(line)
-        assert (lines[0][0], lines[0][-1]) == (0, 100)
-    late.close()
-
-
-def test_play_pressed_while_a_session_begins_is_kept(page, room):
-    page.tab.click("#play")
-    wait(page, "live.running")
-    open_new(page)
-    page.read("""() => {
-      [window.told, window.old] = [[], viewer];
-      const note = ({ detail }) => told.push(...detail.works.map((one) => one.kind));
-      live.news.addEventListener("state", note);
-    }""")
-    page.tab.click("#begin")
-    page.tab.click("#play")
-    wait(page, "viewer !== old && viewer.history.frames.at(-1).tick > 2")
-    assert page.tab.get_attribute("#play", "aria-label") == "Pause"
-    assert "kernels" in page.read("told")
-    page.tab.click("#play")
-    wait(page, "!live.running")

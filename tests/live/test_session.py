@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -283,54 +282,20 @@ def test_what_a_hand_has_put_stays_and_what_is_of_an_episode_goes():
 
 WRONG = [
     (None, "an intervention is None"),
-    ([], "an intervention is []"),
-    ({}, "with the name of one intervention"),
     ({"explode": {}}, "name of an intervention is 'explode'"),
     ({"policy": "random"}, "cannot change the policy"),
-    ({"place": {}}, "`place.what` is missing"),
-    ({"episode": {"now": 1}}, "`episode.now` is not a setting"),
     ({"episode": {}, "ants": 1}, "with the name of one intervention"),
     ({"remove_ants": [0]}, "the cell 0 is outside the world"),
-    ({"clear": {"cells": [[1, 2]]}}, "has the cell [1, 2]"),
-    ({"clear": [[10**9, 0, 0]]}, "the cell (1000000000, 0, 0) is outside the world"),
-    ({"clear": "gate"}, "there is no region 'gate'"),
     ({"place": {"what": "queen", "cells": [60, 61]}}, "a single cell for the queen"),
     ({"task": {"observation": "paper"}}, "the task cannot change observation from"),
-    ({"place": {"what": "lava", "cells": [60]}}, "what` is 'lava'"),
-    ({"place": {"what": 5, "cells": [60]}}, "what` is 5"),
     ({"place": {"what": "rock", "cells": []}}, "cells` is empty"),
-    ({"place": {"what": "rock", "cells": "60"}}, "no region '60'"),
-    ({"place": {"what": "rock", "cells": {"60": 1}}}, "cells` is"),
     ({"place": {"what": "rock", "cells": [60] * 10**6}}, "at most 10000 edits of"),
-    ({"place": {"what": "rock", "cells": [60, True]}}, "cells` is True"),
-    ({"place": {"what": "rock", "cells": [60.0]}}, "cells` is 60.0"),
-    ({"place": {"what": "rock", "cells": [math.nan]}}, "cells` is nan"),
-    ({"place": {"what": "rock", "cells": [-1]}}, "the cell -1 is"),
-    ({"place": {"what": "rock", "cells": [0]}}, "the cell 0 is"),  # of the border
-    ({"place": {"what": "rock", "cells": [10**30]}}, "the cell 10000"),
-    ({"place": {"what": "rock", "cells": "all"}}, "no region 'all'"),
-    ({"trail": {"level": -1, "cells": [60]}}, "level` is -1"),
-    ({"trail": {"level": True, "cells": [60]}}, "level` is True"),
-    ({"trail": {"level": 1.5, "cells": [60]}}, "level` is 1.5"),
-    ({"trail": {"level": 10**7, "cells": [60]}}, "level` is 10000000"),
+    ({"place": {"what": "rock", "cells": [0]}}, "the cell 0 is"),
     ({"add_ants": {"cells": [60], "heading": 6}}, "heading` is 6"),
-    ({"add_ants": {"cells": [60], "heading": "up"}}, "heading` is 'up'"),
-    ({"place": {"what": "queen", "cells": [None]}}, "cells` is None"),
     ({"place": {"what": "queen", "cells": [[60]]}}, "has the cell [60]"),
-    ({"gravity": 1}, "'gravity'"),
-    ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),  # trails fall by 1
-    ({"epsilon": [1]}, "`epsilon.value` is [1]"),
-    ({"epsilon": math.nan}, "`epsilon.value` is nan"),
-    ({"epsilon": math.inf}, "`epsilon.value` is inf"),
-    ({"epsilon": 1.01}, "`epsilon.value` is 1.01"),
-    ({"epsilon": True}, "`epsilon.value` is True"),
+    ({"task": {"pheromone.half_life": 9}}, "half_life` is 9.0; leave"),
     ({"epsilon": "0.1"}, "`epsilon.value` is '0.1'"),
-    ({"epsilon": 10**400}, "`epsilon.value` is 1000"),
-    ({"ants": 0}, "`ants.number` is 0"),
-    ({"ants": 2.0}, "`ants` is 2.0"),
     ({"ants": 41}, "ants is 41"),
-    ({"evaporation": 2}, "'evaporation'"),
-    ({"task": {"pheromone.slope": 0}}, "slope` is 0"),
 ]
 
 
@@ -379,47 +344,16 @@ def test_wrong_edits_change_nothing():
     assert "no learning rate" in refused(follows, {"learning_rate": 0.5})
 
 
-def test_edits_without_room_change_nothing():
-    session = Session(SETUPS["foraging"])
-    session.advance(7)
-    snapshot = session.colony.snapshot()
-    free = np.flatnonzero(session.colony.arrays["ground"] == EMPTY).tolist()
-    foods = np.flatnonzero(snapshot.ground == FOOD).tolist()
-    cells = np.flatnonzero(session.colony.grid.exists).tolist()
-    said = refused(session, {"add_ants": {"cells": free, "heading": None}})
-    assert "the capacity of this colony is 40" in said
-    queen = int(np.flatnonzero(snapshot.ground == 13)[0])
-    for cell in (queen, foods[0], int(snapshot.ant_cells[0])):
-        assert "the queen cannot move to cell" in refused(
-            session, {"place": {"what": "queen", "cells": [cell]}}
-        )
-    # What has been eaten is at the start of the next episode, so that only this takes all.
-    assert "the last food" in refused(session, {"clear": {"cells": cells}})
-    session = Session(SETUPS["queueing"])  # nobody learns
-    session.apply({"remove_ants": {"cells": cells}})
-    assert "would leave" in refused(session, {"place": {"what": "rock", "cells": cells}})
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
         ({"steps": 10}, "steps is"),
-        ({"steps": 10**12}, "steps is"),
-        ({"steps": None}, "steps is None"),
         ({"edits": [], "changes": []}, "does not end as it did"),
         ({"edits": [[0, {"explode": {}}]], "changes": [0]}, "explode"),
         ({"edits": [[5, {"episode": {}}], [4, {"episode": {}}]]}, "steps is 4"),
-        ({"edits": 7}, "damaged"),
-        ({"edits": []}, "changes is "),
-        ({"changes": 7}, "damaged"),
         ({"changes": [1]}, "damaged"),
-        ({"changes": [0, 0]}, "damaged"),
-        ({"changes": [0, 1.0]}, "changes is 1.0"),
         ({"changes": [0, 10**6]}, "changes is 1000000"),
         ({"setup": {"world": "/etc/passwd"}}, "policy is None"),
-        ({"state": "0"}, "does not end as it did"),
-        ({"state": None}, "state is None"),
-        ({"setup": None}, "setup is None"),
     ],
 )
 def test_files_that_were_altered_are_refused(edited, changes, said, tmp_path):
@@ -445,36 +379,18 @@ def test_a_file_that_unpacks_to_much_more_is_refused(edited, monkeypatch):
     ("changes", "said"),
     [
         ({"world": "nowhere"}, "the world is 'nowhere'"),
-        ({"world": "pyproject.toml"}, "the world is 'pyproject.toml'"),
-        ({"world": 3}, "world is 3"),
         ({"world": "Q ?\n"}, "'?'"),
-        ({"world": "Q" + " " * 4999 + "F\n"}, "a world of ranges ("),
         ({"world": "open", "world_settings": {"ranges": [9000, 9000, 1]}}, "81036004 cells"),
         ({"world": "open", "world_settings": {"size": 3}}, "`world.size` is not a setting"),
-        ({"world": "open", "world_settings": {"ranges": "abc"}}, "ranges are 'abc'"),
-        ({"task": {"observation": "none"}}, "none"),
         ({"task": {"gravity": 1}}, "gravity"),
-        ({"task": 4}, "`task` is 4"),
-        ({"policy": "table"}, "policy is 'table'"),
-        ({"policy": {"learner": "sarsa"}}, "policy is"),
         ({"policy": {**LEARNS.as_dict(), "epsilon": 3}}, "`training.epsilon` is 3"),
-        ({"policy": {**LEARNS.as_dict(), "learner": "mine"}}, "no learner 'mine'"),
-        ({"policy": "file.npz"}, "policy is 'file.npz'"),
         ({"ants": 0}, "ants is 0"),
-        ({"ants": True}, "ants is True"),
-        ({"ants": 10**9}, "ants is"),
-        ({"ants": 9, "capacity": 8}, "capacity is 8"),
-        ({"ants": 9999}, "9999 ants"),
         (
             {"capacity": 100_000, "sharing": "independent", "task": {"observation": "six_cells"}},
             "memory",
         ),
-        ({"seed": 2**70}, "a seed"),
-        ({"seed": 1.5}, "a seed"),
-        ({"ticks_per_episode": -1}, "ticks_per_episode is -1"),
         ({"sharing": "frozen"}, "sharing is 'frozen'"),
         ({"colour": "red"}, "'colour' is not a field of a setup"),
-        ({"epsilon": math.nan}, "epsilon is nan"),
     ],
 )
 def test_wrong_setups_say_why(changes, said):
@@ -485,53 +401,9 @@ def test_wrong_setups_say_why(changes, said):
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", MARKED)
-def test_setups_are_json(name):
-    setup = SETUPS[name]
-    facts = json.loads(json.dumps(setup.to_json()))
-    again = Setup.from_json(facts, None if setup.learns else setup.policy)
-    assert again.to_json() == setup.to_json()
-    assert Session(again).interventions.state() == Session(setup).interventions.state()
-
-
-def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
-    """And a page that joins late is told the same."""
-    session = edited("foraging")
-    counted, again = 0, Session(session.setup)
-    for steps, edit in session.edits:
-        while again.steps < steps:
-            counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
-            again.leap(1)
-        counted += int(again.colony.outcome().deliveries[0, 0]) * ("episode" in edit)
-        again.apply(edit)
-    while again.steps < session.steps:
-        counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
-        again.leap(1)
-    counted += int(again.colony.outcome().deliveries[0, 0])
-    few = recording(session.log(), most_frames=20)
-    types = few.header["types"]
-    told = [
-        unpack(types, frame)["clock"][CLOCK.index("delivered")]
-        for frame in (few.frames[-1], session.snapshot())
-    ]
-    assert told == [counted, counted]
-    assert counted > 0
-
-
 def clock(session: Session, frame: bytes) -> dict[str, float]:
     types = session.header()["types"]
     return dict(zip(CLOCK, unpack(types, frame)["clock"].tolist(), strict=True))
-
-
-def test_a_leap_is_as_many_steps_through_episodes():
-    slow, quick = Session(SETUPS["foraging"]), Session(SETUPS["foraging"])
-    while slow.steps < 57:  # two episodes of 25 ticks, and some
-        slow.advance()
-    told = clock(quick, quick.leap(57))
-    assert quick.interventions.state() == slow.interventions.state()
-    assert (told["episode"], told["tick"]) == (2, 5)
-    assert told["ticks"] == quick.ticks == slow.ticks == 55
-    assert clock(quick, quick.snapshot())["ticks"] == 55
 
 
 def test_a_late_page_is_told_of_the_whole_progress():

@@ -56,14 +56,6 @@ def test_a_food_given_becomes_an_ant_that_faces_away(seed):
     assert n_draws(born.stream.state, stream_state(seed, STREAM_BORN, 1)) == 1
 
 
-def test_the_one_free_neighbour_takes_a_draw_too():
-    colony = begun(around(0, 1, 2, 3, 4), births=True)
-    load(colony, 0)
-    act(colony, *[GIVE] * 5)
-    assert colony.ants[5].cell == neighbour(QUEEN, 5)
-    assert n_draws(colony.queen_stream.state, stream_state(0, STREAM_QUEEN, 0)) == 1
-
-
 def test_the_food_waits_while_no_neighbour_is_free():
     colony = begun(around(*range(6)), births=True)
     load(colony, *range(6))

@@ -67,16 +67,6 @@ def test_td_errors_by_delivery_setting(learner, delivery, last):
     assert run.deliveries == [1]
 
 
-@pytest.mark.parametrize("delivery", ["terminates", "truncates"])
-@pytest.mark.parametrize("learner", LEARNERS)
-def test_truncation_bootstraps(learner, delivery):
-    run = train_once(training(learner), delivery, max_steps=1)
-    [step] = run.trace
-    assert (step.truncated, step.terminated) == (True, False)
-    assert step.td_error == 3.0  # as without the limit
-    assert (run.returns, run.steps, run.deliveries) == ([3], [1], [0])
-
-
 @pytest.mark.parametrize(
     ("learner", "delivery", "max_steps", "expected"),
     [
@@ -124,9 +114,3 @@ def test_the_model_holds_the_last_outcome_in_the_order_of_first_visit():
         outcomes[pair] = outcome
     assert outcomes_of(run) == list(outcomes.items())
     assert changed > 0  # the test would not see the difference otherwise
-
-
-def test_epsilon_decays_to_its_floor():
-    learning = training(epsilon=0.5, epsilon_decay=0.5, min_epsilon=0.2)
-    epsilons = [train(TWO_STEPS, learning, 0, n, 5).epsilon for n in range(4)]
-    assert epsilons == [0.5, 0.25, 0.2, 0.2]

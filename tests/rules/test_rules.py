@@ -108,16 +108,6 @@ def test_pick_draws_by_weights_and_never_what_is_closed(clean):
     assert abs(drawn[2] - 7500) < 5 * np.sqrt(10_000 * 0.75 * 0.25)
 
 
-def births(level):
-    return max(level, 4)
-
-
-def test_rules_of_evaporation_leave_rocks_and_the_outside_alone(clean):
-    rules.register("evaporation")(births)
-    check = check_rule("births", 10)
-    assert (check.difference, check.ticks) == ("", 360)
-
-
 def homeward(nearer, codes, carries, random):
     action = pick([1, 1, 1], random)
     if carries:
@@ -176,20 +166,6 @@ def test_a_cell_with_an_ant_is_open_by_traffic_with_and_without_a_compass(traffi
             enters = traffic == "following" or (traffic == "right_of_way" and carries[ant])
             assert (colony.actions[0, ant] == 1) == enters
     assert min(seen.values()) > 5
-
-
-def test_nothing_is_nearer_without_a_compass(clean):
-    rules.register("choice")(homeward)
-    world = worlds.open_world(1, ranges=(7, 7, 7))
-    task = Task(choice="homeward", homing_cue="trail").replace(life={"regrowth": 0})
-    colony, moves = Colony(world, task, None, 0, 50, sharing="frozen"), 0
-    colony.begin_episode()
-    for _ in range(60):
-        carries = colony.carrying[0].copy()
-        colony.tick()
-        moves += np.count_nonzero(carries & (colony.actions[0] < 3))
-        assert not (carries & (colony.actions[0] == 1)).any()
-    assert moves > 30
 
 
 # The kind of a rule, words of the message, and the rule.

@@ -8,15 +8,12 @@ from scipy.stats import chisquare
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, train, worlds
 from taichi_ants.analysis.bounds.episodes import EpisodeBounds
-from taichi_ants.envs.colony import ColonyWorlds
 from taichi_ants.envs.forage import LoneAnts
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
 from taichi_ants.offline import record_colony
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.choice import weighted
-from taichi_ants.reference.numbers import power
 from taichi_ants.task import Choice, Field, Noise, Pheromone
 from taichi_ants.task.constants import FORWARD, N_ACTIONS
 
@@ -131,17 +128,6 @@ def test_ants_with_food_and_without_a_compass_weigh_all_open_cells(homing, outbo
     assert GRID.index(plain.ants[0].cell) == colony.cells[0, 0]
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "share"), [(0, 0, 0.5), (20, 0, 0.8), (60, 20, 0.8), (100, 0, 0.973)]
-)
-def test_choice_function_of_the_literature(one, other, share):
-    """P(A) = (k + A)^n / ((k + A)^n + (k + B)^n) with k = 20 and n = 2."""
-    weights = [power(20.0 + level, 2.0) for level in (one, other)]
-    assert weights[0] / sum(weights) == pytest.approx(share, abs=5e-4)
-    last = [weighted(weights, word) for word in (0, int(2**32 * share * 0.999), 2**32 - 1)]
-    assert last == [0, 0, 1]
-
-
 def test_slips():
     rules = Task(noise=Noise(slip=0.4))
     chosen, executed, _ = first_actions(rules, lone_ant(), training=PLAIN, q_values=GREEDY_VALUES)
@@ -172,31 +158,11 @@ def test_a_task_without_noise_draws_nothing():
     assert one == two
 
 
-def test_worlds_that_begin_again_do_not_misread_twice():
-    """A world that has begun but not ticked keeps what its ants see while others begin."""
-    rules = Task(noise=Noise(misread=0.5))
-    colony = Colony(worlds.paper(), rules, PLAIN, (1, 2), 9)
-    colony.begin_episode()
-    seen, streams = colony.states[1].copy(), colony.streams[1].copy()
-    colony.reset_worlds(np.array([True, False]))
-    assert (colony.states[1] == seen).all()
-    assert (colony.streams[1] == streams).all()
-
-
 CELLS = Task(choice="deneubourg")
 GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
 REFUSED = [
     (lambda: Choice("greedy", temperature=2.0), "`task.choice.temperature` is 2.0; leave it out"),
-    (lambda: Choice("softmax", temperature=0), "`task.choice.temperature` is 0; it must be"),
-    (lambda: Choice("deneubourg", k=0), "`task.choice.k` is 0; it must be"),
-    (lambda: Choice("deneubourg", exponent=-1), "`task.choice.exponent` is -1; it must be"),
-    (lambda: Task(choice="boltzmann"), "`task.choice` is 'boltzmann'; it must be a Choice, or one"),
     (lambda: Noise(slip=1.5), "`task.noise.slip` is 1.5; it must be between 0 and 1."),
-    (lambda: Choice(carriers_follow="trail"), "`task.choice.carriers_follow` is 'trail'; leave it"),
-    (
-        lambda: Task(choice=Choice("deneubourg", carriers_follow="home")),
-        "`task.choice.carriers_follow` is 'home'; it must be one of trail, or the name of a field",
-    ),
     (
         lambda: Task(choice=Choice("deneubourg", carriers_follow="trail"), homing_cue="trail"),
         "but `task.homing_cue` is 'trail', which ants with food follow already",
@@ -222,20 +188,8 @@ REFUSED = [
         "learner 'expected_sarsa' takes the mean over epsilon-greedy actions",
     ),
     (
-        lambda: Colony(
-            worlds.paper(),
-            Task(choice="softmax"),
-            TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0),
-        ),
-        "learner 'expected_sarsa'",
-    ),
-    (
         lambda: LoneAnts(1, Task(choice="softmax"), None, GIVEN),
         "the actions of an environment are given; leave `task.choice` out",
-    ),
-    (
-        lambda: ColonyWorlds(1, CELLS, GIVEN, ants=1, start="nest"),
-        "the actions of an environment are given",
     ),
     (lambda: EpisodeBounds(worlds.paper(), Task(noise=Noise(slip=0.1))), "a task without noise"),
     (

@@ -11,11 +11,11 @@ import pytest
 from browser import Page, started
 from playback import played
 
-from taichi_ants import Colony, Task, TrainingConfig, World, worlds
+from taichi_ants import Colony, Task, TrainingConfig, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
-from taichi_ants.task import Caste, Food, Labour, Life, Pheromone, Threshold, foraging
-from taichi_ants.task.constants import ACTION_NAMES, FOOD
+from taichi_ants.task import Life, Pheromone
+from taichi_ants.task.constants import ACTION_NAMES
 from taichi_ants.task.events import Event
 from taichi_ants.viewer import Recording, page, record_colony, record_episode
 from taichi_ants.viewer.page import SCRIPTS, part
@@ -169,31 +169,6 @@ def test_buttons_and_keys_move_through_time(ant):
     ]:
         ant.press(key)
         assert ant.moment == moment, key
-
-
-def test_it_plays_pauses_and_starts_again(ant):
-    ant.tab.keyboard.press("Space")
-    assert ant.tab.get_attribute("#play", "aria-label") in ("Play", "Pause")
-    ant.tab.wait_for_function("viewer.player.moment >= 2")
-    assert ant.tab.get_attribute("#play", "aria-label") == "Pause"
-    ant.click("#play")
-    stopped = ant.moment
-    ant.tab.wait_for_timeout(200)
-    assert ant.moment == stopped
-    for _ in range(20):
-        ant.tab.keyboard.press("ArrowUp")
-    assert ant.read("viewer.player.speed") == 200
-    assert ant.text("#speed-value") == "200 ticks/s"
-    ant.click("#play")  # until its end
-    assert ant.moment == 34
-    ant.tab.keyboard.press("ArrowDown")
-    assert ant.read("viewer.player.speed") == 160
-    ant.tab.fill("#speed", "0")
-    assert ant.read("viewer.player.speed") == 0.5
-    ant.tab.keyboard.press("Space")
-    assert ant.moment == 0
-    ant.tab.keyboard.press("Space")
-    ant.settle()
 
 
 def test_a_click_follows_an_ant_or_looks_at_a_cell(crowd, colony):
@@ -359,40 +334,6 @@ def test_cells_have_the_colours_of_what_they_hold(crowd, colony):
         assert colour == [*expected, 255]
 
 
-def test_castes_and_kinds_of_food_have_names_colours_and_tables(browser, folder):
-    castes = {"nurse": Caste(threshold=Threshold("fixed", value=5)), "scout": Caste(share=0.5)}
-    foods = {"seed": Food(deliver=90, regrowth=2), "sap": Food(deliver=40, regrowth=2)}
-    labour = Labour("thresholds", demand=0.05, relief=1, stop_probability=0.5)
-    task = foraging().replace(castes=castes, foods=foods, labour=labour, life={"regrowth": None})
-    world = World((8, 8, 8), (6, 0, 0), [(5, 0, 1), (3, 1, 0), (4, 1, 0)], food_kinds=[0, 1, 1])
-    many = Colony(world, task, TrainingConfig("q_learning", 0.2, 0.9, 0.3, 1.0), 3, ants=16)
-    many.begin_episode()
-    many.tick(60)
-    opened = Page(browser, written(folder, "groups", record_colony(many, 40)))
-    opened.read("viewer.player.go(40)")
-    opened.settle()
-    legend = opened.text("#legend")
-    assert all(name in legend for name in ("idle ant", "seed", "sap"))
-    snapshot = many.snapshot()
-    for kind in (0, 1):
-        there = np.flatnonzero((snapshot.ground == FOOD) & (snapshot.food_kinds == kind)).tolist()
-        assert opened.read("kind => viewer.stage.foods[kind] ?? []", kind) == there
-    met = set()
-    for slot, number in enumerate(many.numbers[0].tolist()):
-        shown = opened.read("number => viewer.history.ant(40, number)", number)
-        caste, idle = int(many.castes[0, slot]), bool(many.idle[0, slot])
-        assert (shown["caste"], shown["idle"]) == (caste, idle)
-        values = many.q_values[0, caste, many.states[0, slot]]
-        assert np.array_equal(np.float32(shown["values"]), values)
-        met.add((caste, idle))
-    assert {(0, True), (1, False)} <= met
-    slot = int(np.flatnonzero(many.idle[0])[0])
-    opened.read("number => viewer.follow(number)", int(many.numbers[0, slot]))
-    opened.settle()
-    assert opened.text("#ant .groups") == "nurse · idle"
-    opened.close()
-
-
 def test_the_page_asks_for_nothing_and_runs_no_text(browser, episode):
     """Its policy forbids the network and all scripts but its own; it plays all the same."""
     context = browser.new_context()
@@ -427,35 +368,3 @@ def test_the_script_is_whole():
                 "Error",
             ),
         )
-
-
-def test_what_lies_between_moments_is_not_made_up(browser, folder):
-    """The pace is in ticks, and there is no way from a cell to one far away."""
-    rules = TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0)
-    one = Colony(worlds.paper(), Task("queues", life=Life(births=True)), rules)
-    one.begin_episode()
-    recording = record_colony(one, 60, frame_interval=10)
-    assert recording.header["title"].startswith("Ants in a world of ")
-    opened = Page(browser, written(folder, "thinned", recording))
-    opened.read("viewer.player.go(6)")
-    assert opened.read("viewer.history.path(6, 0).length") == 1
-    assert opened.tab.get_attribute("#time", "max") == "60"
-    assert opened.tab.locator("#events .gaps").get_attribute("d") == "M0.0 7H1000.0"
-    opened.read("viewer.timeline.setSpeed(12)")
-    assert opened.text("#speed-value") == "120 ticks/s"
-    opened.tab.focus("#time")
-    opened.press("ArrowLeft")
-    assert opened.moment == 5
-    opened.press("ArrowRight")
-    assert opened.moment == 6
-    opened.read("viewer.follow(0)")
-    meaning = opened.text("#ant .sees small")
-    assert re.match(r"[A-Z] \w+(, [A-Z] [\w ]+)*", meaning)
-    letters = (
-        "P ant with the other load on a better cell, A on a cell that is not better, "
-        "p ant with the same load on a better cell"
-    )
-    view = {"task": "", "rest": "EPA", "letters": ["E", "P", "A"]}
-    opened.read("view => { viewer.history.stateName = () => view; viewer.dirty = true; }", view)
-    assert opened.text("#ant .sees small") == f"E empty; {letters}"
-    opened.close()

@@ -124,11 +124,6 @@ def test_a_hundred_worlds_without_food_are_an_error(ranges: tuple) -> None:
         open_world(0, ranges)
 
 
-def test_shares_leave_room() -> None:
-    with pytest.raises(AntsError, match=r"rock_share 0\.5 and food_share 0\.5 .* smaller shares"):
-        open_world(0, (20, 20, 20), rock_share=0.5, food_share=0.5)
-
-
 def test_piles_lie_along_the_first_ranges_and_may_be_all_food() -> None:
     three, one = (far_piles(3, (30, 30, 30), piles=n) for n in (3, 1))
     assert set(map(tuple, three.foods.tolist())) == pile_cells(three)

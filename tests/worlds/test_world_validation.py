@@ -78,14 +78,9 @@ def test_the_queen_is_one_cell(queen: object) -> None:
     [
         ([(1, 0, 0), (2.0, 0, 0)], "[1] is (2.0, 0, 0)"),
         ([(1, 0)], "[0] is (1, 0)"),
-        ([(True, 0, 0)], "[0] is (True, 0, 0)"),
-        ((1, 0, 0), "[0] is 1"),
         ("100", " is '100'"),
-        ({(1, 0, 0): 2}, " is {"),
         ([(HUGE, 0, 0)], "[0] is a huge number"),
-        (np.array([1, 0, 0]), " is an array of shape (3,)"),
         (np.ones((2, 3)), " is an array of shape (2, 3) and type float64"),
-        (np.array([[2**64 - 1, 0, 0]], dtype=np.uint64), "[0] is (18446744073709551615"),
     ],
 )
 def test_cells_are_three_whole_numbers(name: str, cells: object, named: str) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_castes import drawn_castes
-from random_colonies import random_colony
 from scipy.stats import kstest, lognorm, truncnorm, uniform
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, task, train, worlds
@@ -150,15 +148,6 @@ def test_a_caste_with_a_policy_does_not_learn():
     assert (followed == trail_follower()).all()
 
 
-def drawn() -> list:
-    found = []
-    for seed in range(30):
-        one = random_colony(seed, sharing="shared", learner="sarsa", dense=False, changes=True)
-        one = drawn_castes(one, seed, 2, True, None)
-        found += [] if one is None else [one]
-    return found[:1]
-
-
 def test_a_file_of_a_colony_needs_no_policy_file(tmp_path):
     policy = tmp_path / "policy.npz"
     save_policy(policy, random_policy(), {})
@@ -213,16 +202,8 @@ GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
             r"^`task\.castes\.a\.policy` is 'random', but sharing is \"independent\"",
         ),
         (
-            lambda: follows(Task(castes={"a": {"policy": "no_such"}})),
-            r"^`task\.castes\.a\.policy` is 'no_such'; it must be one of",
-        ),
-        (
             lambda: follows(Task(castes={"a": {"ants": 3}}), ants=5),
             "the castes have 3 ants in nest 0, but 5 ants start there",
-        ),
-        (
-            lambda: follows(Task(castes={"a": {"nest": 1}}), ants=5),
-            "`task.castes.a.nest` is 1, but the world has 1 nest, numbered from 0; choose one",
         ),
     ],
 )

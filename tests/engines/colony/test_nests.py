@@ -208,24 +208,18 @@ def test_changes_by_hand_keep_nests_and_kinds_in_later_episodes():
 
 @pytest.mark.parametrize(
     ("make", "message"),
-    [
-        (lambda: train(WORLD, TRAINING, 1, 1), "the world has 2 nests and 2 kinds of food; only"),
-        (lambda: limits_of(WORLD), "the world has 2 nests and 2 kinds of food"),
-        (lambda: limits_of(replace(WORLD, other_queens=(), food_kinds=()), Task(foods=KINDS)),
+    [(lambda: train(WORLD, TRAINING, 1, 1), "the world has 2 nests and 2 kinds of food; only"),
+(lambda: limits_of(replace(WORLD, other_queens=(), food_kinds=()), Task(foods=KINDS)),
          "`task.foods` has the kinds seed and sugar; a bound on deliveries does not support kinds"),
-        (lambda: record_colony(two_nests(), 1, 5), "record_colony supports one nest"),
-        (lambda: AddAnts(number=1, nest=2).apply(Interventions(begun())), "nest is 2"),
-        (lambda: Place("food", [[1, 0, 0]], kind="wax").apply(Interventions(begun())),
-         "`place.kind` is 'wax'"),
-        (lambda: begun().run(1, 5, protocol=[At(2, remove_ants={"share": 0.5, "nest": 2})]),
+(lambda: record_colony(two_nests(), 1, 5), "record_colony supports one nest"),
+(lambda: AddAnts(number=1, nest=2).apply(Interventions(begun())), "nest is 2"),
+(lambda: begun().run(1, 5, protocol=[At(2, remove_ants={"share": 0.5, "nest": 2})]),
          "`remove_ants.nest` is 2, but the world has 2 nests"),
-        (lambda: Colony(WORLD, Task(), TRAINING), "the world has 2 kinds of food, but the task 1"),
-        (lambda: Colony([WORLD, replace(WORLD, other_queens=())], Task(foods=KINDS), TRAINING,
+(lambda: Colony(WORLD, Task(), TRAINING), "the world has 2 kinds of food, but the task 1"),
+(lambda: Colony([WORLD, replace(WORLD, other_queens=())], Task(foods=KINDS), TRAINING,
                         [1, 2]), "all worlds of a colony must have the same number"),
-        (lambda: Task(foods=KINDS, life=Life(regrowth=3)), "set the regrowth of each kind instead"),
-        (lambda: Task(foods=KINDS, life=Life(pile_move_interval=3)), "with one load in a cell"),
-        (lambda: Task(foods={f"kind_{k}": Food() for k in range(9)}), "at most 8 are allowed"),
-    ],
+(lambda: Task(foods=KINDS, life=Life(regrowth=3)), "set the regrowth of each kind instead"),
+(lambda: Task(foods={f"kind_{k}": Food() for k in range(9)}), "at most 8 are allowed"),],
 )  # fmt: skip
 def test_refusals(make, message):
     with pytest.raises(AntsError) as caught:

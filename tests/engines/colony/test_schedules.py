@@ -24,7 +24,6 @@ LIVELY = Task(
     life=Life(births=True, lifespan=60, regrowth=2, pile_move_interval=9),
 )
 TRAINING = TrainingConfig("dyna_q", 0.2, 0.9, 0.4, 0.9, planning_steps=2)
-CALM = TrainingConfig("q_learning", 0.2, 0.9, 0.4, 0.9)
 
 
 def all_threads(choice: ThreadChoice, ticks: int, most: int) -> tuple[int, int]:
@@ -106,28 +105,6 @@ def test_giving_up_at_any_barrier_gives_the_same(spins, monkeypatch):
     monkeypatch.setattr(stepping, "_SPINS", spins)
     monkeypatch.setattr(ThreadChoice, "plan", all_threads)
     assert_same(history(threads=2), history(threads=2, schedule="by_chunk"))
-
-
-def test_no_more_threads_wait_for_each_other_than_there_are(monkeypatch):
-    monkeypatch.setattr(ThreadChoice, "plan", all_threads)
-    ants = Colony(meadow(), None, CALM, 3, ants=30, threads=2, schedule="by_chunk")
-    ants.begin_episode()
-    for threads in (2, 8):  # somebody starts Taichi anew; eight are more than processors
-        runtime.start(threads)
-        ants.tick(3)
-        assert ants.arrays["orders"][Order.PARTS] == min(threads, runtime.available_threads(), 4)
-    monkeypatch.setattr(runtime, "available_threads", lambda: 1)
-    ants.tick(3)
-    assert ants.arrays["orders"][Order.PARTS] == 1
-
-
-def test_a_colony_does_not_feel_its_neighbours():
-    """A world of a batch is what it is alone, and worlds may differ."""
-    batch = history(seeds=(3, 8), world=[meadow(5), meadow(6)])
-    alone = history(seeds=(8,), world=meadow(6))
-    for name in ("ground", "level", "q", "streams", "integers", "totals"):
-        half = batch[name].shape[-1] // 2
-        assert np.array_equal(batch[name][..., half:], alone[name]), name
 
 
 def test_the_internal_order_of_the_ants_does_not_matter():

@@ -17,7 +17,6 @@ from taichi_ants import (
     train,
     worlds,
 )
-from taichi_ants.checks import checked_seeds
 from taichi_ants.engines.runs.engine import pieces, size_of_launch
 from taichi_ants.worlds import World, paper
 
@@ -42,22 +41,11 @@ def with_more(learner, **more):
     ("configs", "text"),
     [
         ([], "configs is empty"),
-        (None, "configs is None"),
-        (3, "configs is 3"),
-        ("q_learning", "configs is 'q_learning'"),
         ([CONFIG, None], "a configuration is None"),
         (TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99), "there is no learner 'td_zero'"),
         (
-            with_more("dyna_q", planning_steps=0),
-            "`training.planning_steps` is 0; it must be between 1 and",
-        ),
-        (
             [CONFIG, with_more("sarsa", n=7)],
             "`training.n` is not a setting of sarsa",
-        ),
-        (
-            with_more("sarsa_lambda", trace_decay=1.5),
-            "`training.trace_decay` is 1.5; it must be between 0 and 1",
         ),
     ],
 )
@@ -67,18 +55,10 @@ def test_configurations(configs, text):
 
 BAD_SEEDS = [
     ([], "seeds is empty"),
-    (np.zeros(0, int), "seeds is empty"),
     (0.5, "a seed is 0.5"),
-    ([0, 1.0], "a seed is 1.0"),
-    (np.array([0.0]), "a seed is 0.0"),
-    (True, "a seed is True"),
-    (None, "a seed is None"),
-    ("12", "a seed is '12'"),
     ([[0, 1]], "a seed is [0, 1]"),
     (2**64, f"seeds contains {2**64}; a seed must fit into 64 bits"),
-    ([-(2**63) - 1], f"seeds contains {-(2**63) - 1}"),
     ([4, 5, 4], "seeds contains 4 more than once"),
-    ([-1, 2**64 - 1], f"seeds contains {2**64 - 1} more than once; give seeds that differ"),
 ]
 
 
@@ -89,36 +69,12 @@ def test_seeds(seeds, text):
 
 
 @pytest.mark.parametrize(
-    ("seeds", "expected"),
-    [
-        (5, (5,)),
-        (range(3), (0, 1, 2)),
-        ((seed for seed in (2, 1)), (2, 1)),
-        (np.array([3, 2], np.uint8), (3, 2)),
-        (np.array(7), (7,)),
-        ([-(2**63), 2**64 - 1], (-(2**63), 2**64 - 1)),
-    ],
-)
-def test_seeds_that_are_fine(seeds, expected):
-    checked = checked_seeds(seeds)
-    assert checked == expected
-    assert all(type(seed) is int for seed in checked)
-
-
-@pytest.mark.parametrize(
     ("table", "text"),
     [
         (np.zeros((128, 4)), "q_values has shape (128, 4)"),
-        (np.zeros((5, 128)), "q_values has shape (5, 128)"),
-        (np.zeros(640), "q_values has shape (640,)"),
         (np.zeros((0, 128, 5)), "q_values has shape (0, 128, 5)"),
-        (3.0, "q_values has shape ()"),
         (np.full((128, 5), np.nan), "q_values is nan for state 0"),
-        (np.full((128, 5), np.inf), "q_values is inf for state 0"),
-        (np.full((128, 5), 1e39), "q_values is inf for state 0"),
-        (None, "q_values"),
         ("policy", "q_values is 'policy'; it must be an array of real numbers"),
-        (np.zeros((128, 5), complex), "q_values is an array of shape (128, 5) and type complex"),
         ([[1, 2], [3]], "q_values is [[1, 2], [3]]; it must be an array of real"),
     ],
 )
@@ -135,18 +91,6 @@ def test_worlds(world):
     says(text, evaluate, world, TABLE)
     says(text, rollout, world, TABLE)
     says(text, trace_training, world, CONFIG)
-
-
-@pytest.mark.parametrize(
-    ("threads", "text"),
-    [
-        *((0, "threads is 0"), (1025, "threads is 1025"), (1.5, "threads is 1.5")),
-        *((True, "threads is True"), ("2", "threads is '2'")),
-    ],
-)
-def test_threads(threads, text):
-    says(text, train, paper(), CONFIG, 0, 1, 1, threads=threads)
-    says(text, evaluate, paper(), TABLE, threads=threads)
 
 
 def test_arguments_are_left_as_they_are():
@@ -180,17 +124,6 @@ def test_results_have_the_documented_forms():
         outcome = evaluate(paper(), np.zeros((*shape, 128, 5)), 6, max_steps=20)
         for array in (outcome.returns, outcome.steps, outcome.deliveries):
             assert (array.shape, array.dtype) == ((*shape, 6), np.int32)
-
-
-def test_progress_rises_to_one():
-    shares = []
-    train(paper(), [CONFIG, PLANS, CONFIG], range(4), 3, 20, progress=shares.append)
-    assert shares == sorted(shares)
-    assert shares[-1] == pytest.approx(1)
-    assert len(shares) >= 2
-    shares.clear()
-    evaluate(paper(), TABLE, 3, progress=shares.append)
-    assert shares[-1] == pytest.approx(1)
 
 
 @pytest.mark.parametrize(

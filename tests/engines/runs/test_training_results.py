@@ -11,7 +11,6 @@ import pytest
 
 from taichi_ants import (
     AntsError,
-    Colony,
     Task,
     TrainingConfig,
     TrainingResult,
@@ -24,7 +23,6 @@ from taichi_ants import (
 )
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.files import archives
-from taichi_ants.records import same
 
 CONFIGS = (
     TrainingConfig("sarsa", 0.1, 0.9, 0.5, 0.99),
@@ -80,15 +78,10 @@ def test_damaged_arrays(stored, tmp_path, name, value, said):
     [
         ({"configs": []}, ""),
         ({"configs": [{"learner": "sarsa"}]}, ""),
-        ({"seeds": [1]}, ""),
         ({"seeds": [1, 1, 2]}, "more than once"),
-        ({"max_steps": 0}, "max_steps is 0"),
         ({"task": {"delivery": "never"}}, "`task.delivery` is 'never'"),
         ({"task": {"observation": "paper"}}, "of shape (2, 3, 1, 128, 8)"),
-        ({"task": {"observation": "own"}}, "`task.observation` is 'own'; "),
         ({"world": {**WORLD, "ranges": [0, 1, 2]}}, "ranges are"),
-        ({"world": None}, ""),
-        ({"seconds": "long"}, ""),
     ],
 )
 def test_damaged_facts(stored, tmp_path, changes, said):
@@ -121,25 +114,6 @@ def test_results_compare_by_content(result):
     for record in (result, result.state, greedy, followed):
         with pytest.raises(TypeError, match="unhashable"):
             hash(record)
-
-
-def test_colonies_compare_by_content(tmp_path):
-    def begun(seed: int = 3) -> Colony:
-        colony = Colony(worlds.paper(), None, CONFIGS[1], (seed, 9), ants=4)
-        colony.begin_episode()
-        colony.tick(20)
-        return colony
-
-    one = begun()
-    assert (one == begun(), one == begun(4), one == 3) == (True, False, False)
-    one.save(tmp_path / "x.npz")
-    assert Colony.load(tmp_path / "x.npz") == one
-    assert one.outcome() == begun().outcome()
-    assert one.snapshot() == begun().snapshot()
-    one.tick()
-    assert one != begun()
-    with pytest.raises(TypeError, match="unhashable"):
-        hash(one)
 
 
 def test_configurations_that_follow_one_another_are_not_copied_to_be_trained():
