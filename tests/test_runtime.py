@@ -73,33 +73,6 @@ assert runtime.start() == runtime.Runtime("cpu", runtime.available_threads())
     assert list((tmp_path / "kernels" / "taichi_ants" / "kernels").iterdir())
 
 
-def test_variables_of_taichi_change_no_results_and_may_name_the_cache(tmp_path):
-    script = """
-import os
-import taichi as ti
-before = dict(os.environ)
-trained()
-config = ti.lang.impl.current_cfg()
-assert (config.arch in (ti.x64, ti.arm64), config.fast_math) == (True, False)
-assert config.cpu_max_num_threads == runtime.available_threads()
-assert dict(os.environ) == before
-"""
-    python(
-        BEGINNING + script,
-        tmp_path,
-        TI_ARCH="cuda",
-        TI_FAST_MATH="1",
-        TI_LOG_LEVEL="debug",
-        TI_CPU_MAX_NUM_THREADS="17",
-        TI_DEFAULT_FP="64",
-        TI_DEFAULT_IP="64",
-        TI_OFFLINE_CACHE_FILE_PATH=str(tmp_path / "chosen"),
-        XDG_CACHE_HOME=str(tmp_path / "kernels"),
-    )
-    assert list((tmp_path / "chosen").iterdir())
-    assert not (tmp_path / "kernels").exists()
-
-
 def test_beside_a_taichi_of_the_callers(tmp_path):
     """It is used as it is, and refused if it would change results."""
     script = """
@@ -147,52 +120,6 @@ for types in ({"default_fp": ti.f64}, {"default_fp": ti.f16}, {"default_ip": ti.
         assert all(getattr(now, name) == one for name, one in types.items())  # still the caller's
 """
     python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
-
-
-@pytest.mark.slow
-def test_all_goes_on_after_a_reset_of_the_callers(tmp_path):
-    """With kernels, colonies and pictures made before; a colony goes on bit for bit."""
-    script = """
-import contextlib
-import io
-import taichi as ti
-from taichi_ants import Colony
-from taichi_ants.rendering import Scene
-
-def quietly(init, **settings):
-    with contextlib.redirect_stdout(io.StringIO()):
-        init(**settings)
-
-def colony():
-    made = Colony(paper(), None, config, ants=4, threads=2)
-    made.begin_episode()
-    made.tick(40)
-    return made
-
-def finished(colony):
-    colony.tick(40)
-    return colony.q_values, picture(colony)
-
-def picture(colony):
-    return scene.draw(colony.snapshot())
-
-scene = Scene(paper().grid, (200, 160))
-expected, (values, pixels) = trained(), finished(colony())
-changes = (
-    ti.reset,
-    lambda: runtime.start(threads=1),
-    lambda: quietly(ti.init, arch=ti.cpu, fast_math=False, log_level=ti.ERROR),
-)
-for change in changes:
-    made = colony()
-    change()
-    now_values, now_pixels = finished(made)
-    assert np.array_equal(now_values, values)
-    assert np.array_equal(now_pixels, pixels)
-    change()
-    assert np.array_equal(trained().q_values, expected.q_values)
-"""
-    python(BEGINNING + script, tmp_path)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing is forked here")
@@ -274,22 +201,6 @@ def test_a_container_grants_time(contents, threads, monkeypatch, tmp_path):
 def temporary(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
-
-
-def test_a_fallback_folder_of_somebody_else_is_not_used(temporary, monkeypatch):
-    """Somebody could have put kernels there that do as they like."""
-    usual = fallback_folder()
-    real = os.lstat
-
-    def of_somebody_else(path):
-        values = list(real(path))
-        values[4] = 12345
-        return os.stat_result(values)
-
-    monkeypatch.setattr(os, "lstat", of_somebody_else)
-    other = fallback_folder()
-    assert other != usual
-    assert Path(other).parent == temporary
 
 
 @pytest.mark.parametrize("home", [None, "", "/proc/nope"])

@@ -12,7 +12,7 @@ from interrupts import interrupted_after_launch
 from taichi_ants import Task
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
-from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
+from taichi_ants.envs.forage import HexForageVectorEnv
 
 
 def lone(mode: str) -> Any:
@@ -43,18 +43,6 @@ def test_vector_environments_know_who_has_ended(make: Any, rolls: bool, mode: st
     for _ in range(6):
         one, two = ours.step(actions[0]), theirs.step(actions[0])
         assert all(np.array_equal(one[k], two[k]) for k in range(4))
-
-
-def test_a_lone_ant_does_not_go_on_after_its_last_step() -> None:
-    env = HexForageEnv(max_steps=2)
-    env.reset(seed=1)
-    env.step(1)
-    with interrupted_after_launch():
-        env.step(1)
-    with pytest.raises(ResetNeeded):
-        env.step(1)
-    env.reset()
-    env.step(1)
 
 
 def test_the_last_step_of_a_colony_ends_it() -> None:

@@ -31,30 +31,6 @@ def test_gymnasiums_wrapper_returns_all_infos_as_tensors() -> None:
         assert infos["event"].tolist() == [Event.NONE if step == 3 else Event.ENTERED_EMPTY] * 3
 
 
-def test_torchrl_reads_each_info_and_trains_a_dqn() -> None:
-    torch = pytest.importorskip("torch")
-    pytest.importorskip("torchrl")
-    from torchrl.envs import GymWrapper, check_env_specs
-    from torchrl.modules import QValueActor
-    from torchrl.objectives import DQNLoss
-
-    env = GymWrapper(gymnasium.make(ID, **HOW), categorical_action_encoding=True)
-    env.auto_register_info_dict()
-    check_env_specs(env)
-    actor = QValueActor(torch.nn.Linear(14, 5), in_keys=["observation"], spec=env.action_spec)
-    loss = DQNLoss(actor, action_space=env.action_spec, delay_value=False)
-    optimiser = torch.optim.Adam(loss.parameters(), lr=1e-2)
-    before = actor.module[0].module.weight.detach().clone()
-    for _ in range(3):
-        batch = env.rollout(80, actor)  # an episode
-        assert {"state", "action_mask", "event", "reason"} <= set(batch["next"].keys())
-        assert batch["next", "truncated"].any() == (len(batch) == 60)
-        optimiser.zero_grad()
-        loss(batch)["loss"].backward()
-        optimiser.step()
-    assert (before != actor.module[0].module.weight).any()
-
-
 def sb3_envs(name: str = ID, n: int = 4, **more: object):
     """A vector environment of this package, as Stable-Baselines3 takes it."""
     pytest.importorskip("stable_baselines3")
@@ -62,23 +38,6 @@ def sb3_envs(name: str = ID, n: int = 4, **more: object):
 
     envs = gymnasium.make_vec(name, num_envs=n, autoreset_mode="SameStep", **HOW, **more)
     return SB3VecEnv(envs)
-
-
-def test_agents_of_sb3_train() -> None:
-    """On-policy and off-policy, with SB3's monitor of episodes around it."""
-    envs = sb3_envs()
-    from stable_baselines3 import DQN, PPO
-    from stable_baselines3.common.evaluation import evaluate_policy
-    from stable_baselines3.common.vec_env import VecMonitor
-
-    watched = VecMonitor(envs)
-    model = PPO("MlpPolicy", watched, n_steps=64, batch_size=64, n_epochs=1, device="cpu")
-    model.learn(256)
-    assert len(model.ep_info_buffer) == 4
-    assert all(info["l"] <= 60 for info in model.ep_info_buffer)
-    DQN("MlpPolicy", sb3_envs(), learning_starts=32, buffer_size=500, device="cpu").learn(128)
-    mean, _ = evaluate_policy(model, watched, n_eval_episodes=4)
-    assert np.isfinite(mean)
 
 
 @pytest.mark.parametrize("kind", ["single", "vector", "colony"])

@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import inspect
 import runpy
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
-from ant_system import Search
 from command_lines import EXPERIMENTS
 from matplotlib.figure import Figure
-from utility import Foraging
 
-from taichi_ants import World
 from taichi_ants.learners import registry as learners
 from taichi_ants.worlds import double_bridge
 
@@ -179,102 +175,13 @@ def test_shares_of_foragers_by_hand(script):
 # experiments/goss.py
 
 
-def test_the_table_of_goss_by_hand(script, capsys):
-    found = script("goss")
-
-    def took(short, long, colonies, ants, opens, **others):
-        """Of four colonies, one takes the short branch at last, and one each second time."""
-        choices = np.zeros((colonies, ants), np.uint8)
-        choices[0, ants - 2 :] = 1
-        choices[1, ants - 1] = 1
-        return choices
-
-    found["choices"] = took
-    found["print_table"](found["parse_arguments"](["--colonies", "4", "--choices", "4"]))
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "Percentage of colonies by the share of ants 3 to 4 on the short branch."
-    assert lines[1] == "If that branch opens after ant 4: ants 7 to 8."
-    rows = [line.split()[-5:] for line in lines if " ours " in line]
-    assert rows == [["50.0", "0.0", "25.0", "0.0", "25.0"]] * 4
-    assert lines[-1].endswith("at most 25.0 percentage points.")
-
-
 # experiments/ant_system.py
-
-# A ring around obstacles, with two ways from the queen to food: 5 and 7 steps.
-WAYS = World((3, 3, 3), (2, 0, 0), foods=[(0, 2, 1)], obstacles=[CENTRE, *RING])
-
-
-def test_the_row_of_ant_system_by_hand(script):
-    found = script("ant_system")
-    best = np.array([[5, 4, 4], [5, 5, 5], [4, 6, 4]], np.int32)
-    mean = np.array([[8.0, 6.0, 4.0], [np.nan, 6.0, 5.0], [9.0, 6.0, np.nan]])
-    found["search"] = lambda *given, **settings: Search(4, best, mean, 0 * best)
-    settings = found["parse_arguments"](["--colonies", "3"])
-    row = found["row"](settings, WAYS, "max_min").split()
-    assert row == ["4", "2/3", "2", "8.5", "4.5"]  # found in the iterations 2 and 1
-    found["search"] = lambda *given, **settings: Search(3, best, mean, 0 * best)
-    assert found["row"](settings, WAYS, "max_min").split() == ["3", "0/3", "-", "8.5", "4.5"]
 
 
 # experiments/fixed_rules.py
 
 
-def test_the_rules_and_rows_of_fixed_rules_by_hand(script):
-    found = script("fixed_rules")
-    assert found["rule"]("paper") == (
-        "paper: without food F take, P stay, T straight, E open, else left; with food Q take, "
-        "S any, E any, else left"
-    )
-    # Two episodes of two seeds; one episode is without any delivery.
-    outcome = SimpleNamespace(
-        deliveries=np.array([[10, 0], [20, 2]]),
-        first_delivery=np.array([[4, -1], [6, 90]]),
-        blocked=np.array([[1, 2], [3, 4]]),
-        moves=np.array([[10, 10], [10, 10]]),
-    )
-    cells = found["row"](outcome, {}).split()
-    assert cells == ["8", "1", "to", "15", "1", "275", "25", "%"]
-    cells = found["row"](outcome, {0: 25.0, 1: 11.0, 2: 99.0}).split()
-    assert cells[8:] == ["18", "+10", "[10", "to", "10]"]
-    with pytest.raises(found["AntsError"], match="the study has no seed 1"):
-        found["row"](outcome, {0: 25.0})
-    assert found["NETLOGO"].half_life == pytest.approx(6.57881)  # 0.9^6.57881 = 1 / 2
-
-
-def test_the_study_of_fixed_rules_by_hand(script, tmp_path):
-    (tmp_path / "seeds.csv").write_text(
-        "world_kind,rules,regime,ants,seed,deliveries,greedy\n"
-        "paper,foraging,joint,64,0,50,60\n"
-        "paper,foraging,open,64,0,1,1\n"
-        "rocks,foraging,open,64,1,70,80\n"
-        "rocks,foraging,joint,64,1,2,2\n",
-        "utf-8",
-    )
-    assert script("fixed_rules")["read_study"](tmp_path) == {
-        ("paper", "foraging", 64, "deliveries"): {0: 50},
-        ("paper", "foraging", 64, "greedy"): {0: 60},
-        ("rocks", "foraging", 64, "deliveries"): {1: 70},
-        ("rocks", "foraging", 64, "greedy"): {1: 80},
-    }
-
-
 # experiments/utility.py
-
-
-def test_the_row_of_utilities_by_hand(script):
-    found = script("utility")
-    first = Foraging(
-        8, np.array([[0, 2, 0, 2], [0, 0, 0, 0]]), np.array([[9, 8], [0, 12]]), np.zeros(1)
-    )
-    second = Foraging(
-        4, np.array([[1, 1, 1, 1], [0, 0, 0, 4]]), np.array([[4, 4], [0, 0]]), np.zeros(1)
-    )
-    # Per 1000 ticks, the colonies of the seeds deliver 500 and 1000 food items. First deliveries
-    # are in the ticks 2, 1 and 4; one colony has none, and counts with 4. Paths are shortest from
-    # the ticks 20 and 10 on. At the end, three have the lengths 8 / 8, 12 / 8 and 4 / 4.
-    expected = ["750", "500", "to", "1000", "3", "2/4", "15", "1.17", "3"]
-    assert found["row"]([first, second]).split() == expected
 
 
 # experiments/bridge.py
@@ -291,3 +198,28 @@ def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, large
     td_error = script("plugins/hysteretic")["td_error"].__wrapped__
     next_values = np.array([-9.0, largest, -9.0, -9.0, -9.0])
     assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
+
+
+@pytest.mark.slow
+def test_the_share_of_foragers_is_demand_by_relief_whatever_the_thresholds(script):
+    """The closed form of Bonabeau et al. (1996): of thresholds of ratio 8, a third is active."""
+    # Three ants, each in the only cell between the queen and a food, deliver equally often.
+    grid = World((3, 3, 3), CENTRE).grid
+    cells = {tuple(cell) for cell in grid.cells(np.flatnonzero(grid.exists)).tolist()}
+    foods = [(2, 0, 0), (0, 2, 0), (0, 0, 2)]
+    rock = sorted(cells - {CENTRE, *RING[::2], *foods})
+    corridors = World((3, 3, 3), CENTRE, foods=foods, obstacles=rock)
+    worlds = SimpleNamespace(open_world=lambda seed, ranges: corridors)
+    found = script("models/division_of_labour", worlds=worlds, ANTS=3, TICKS=10_000, STEP=1)
+    found["WORKERS"] = {
+        "major": Caste(share=1 / 3, threshold=Threshold("fixed", value=80)),
+        "minor": Caste(share=2 / 3, threshold=Threshold("fixed", value=10)),
+    }
+    forages, _, deliveries = found["foraging_over_time"](range(4), 100.0)
+    rate = deliveries.sum() / forages.sum()  # of a forager, per tick
+    demand = rate  # a third of what three foragers would deliver
+    forages, thresholds, _ = found["foraging_over_time"](range(4), demand)
+    assert np.allclose(forages[:, 1000:].mean(axis=(1, 2)), 1 / 3, atol=0.005)
+    majors = np.where(thresholds == 80, forages.mean(axis=1), np.nan)
+    minors = np.where(thresholds == 10, forages.mean(axis=1), np.nan)
+    assert (np.nanmean(minors, axis=1) > 3 * np.nanmean(majors, axis=1)).all()

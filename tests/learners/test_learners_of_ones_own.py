@@ -18,7 +18,6 @@ from taichi_ants import (
     trace_training,
     train,
 )
-from taichi_ants.engines import plugin_check
 from taichi_ants.learners import (
     Hyperparameters,
     Learner,
@@ -97,23 +96,6 @@ def test_what_is_natural_works(like, td_error, engine):
 
 
 @ti.func
-def checks_the_next_action(value, reward, discount, next_values, next_action, epsilon):
-    valid = ti.cast(next_action >= 0, ti.f32) * ti.cast(next_action < 5, ti.f32)
-    return 1.0 - valid
-
-
-def test_the_next_action_is_always_a_valid_index():
-    """Also after a delivery, where none is drawn."""
-    register(td_learner("mine", checks_the_next_action, draws_next_action=True))
-    result = train(paper(), config(), range(5), 30)
-    assert result.deliveries.any()
-    assert not result.q_values.any()
-    colony = Colony(paper(), None, config(), ants=5)
-    assert colony.run(5, 600).deliveries.any()
-    assert not colony.q_values.any()
-
-
-@ti.func
 def of_a_vector(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * next_values - value
 
@@ -174,21 +156,6 @@ def test_what_cannot_work_is_refused_and_the_process_lives(td_error, says, engin
     assert message.endswith(".")
     assert capfd.readouterr() == ("", "")
     assert in_runs("q_learning").any()  # Taichi goes on
-
-
-@ti.func
-def that_never_ends(value, reward, discount, next_values, next_action, epsilon):
-    error = reward - value
-    while error < 1000:
-        error *= 0.5
-    return error
-
-
-def test_one_that_never_ends_is_stopped(monkeypatch):
-    monkeypatch.setattr(plugin_check, "_SECONDS", 1)
-    register(td_learner("mine", that_never_ends))
-    with pytest.raises(AntsError, match="'mine' cannot be used: it does not finish within"):
-        in_runs()
 
 
 @ti.func

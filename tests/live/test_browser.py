@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Page, assert_policy_holds, started
+from browser import Page, started
 from rooms import CHOSEN, Guest, running
 
-from taichi_ants import Colony, TrainingConfig, load_policy
+from taichi_ants import Colony, load_policy
 from taichi_ants.commands import watch
 from taichi_ants.learners.expected_sarsa import EXPECTED_SARSA
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.server import SessionServer
-from taichi_ants.live.session import Session
-from taichi_ants.live.setup import Setup
-from taichi_ants.task import Labour, foraging
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
 
 pytestmark = pytest.mark.browser
@@ -194,44 +189,6 @@ def test_each_tool_changes_the_world_of_the_engine(page, room, how):
     assert "contains food" in page.text("#cell")
 
 
-def test_castes_and_kinds_of_food_are_shown_and_drawn(browser):
-    task = foraging().replace(
-        castes={"nurse": {"threshold": 5.0}, "scout": {"share": 0.5}},
-        foods={"seed": {}, "sap": {"loads": 3}},
-        labour=Labour("thresholds", demand=1.0, relief=1, stop_probability=0.1),
-    )
-    learner = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9)
-    with running(Choices({}), setup=Setup("paper", task, learner, 12)) as room:
-        page = Page(browser, room.url)
-        try:
-            page.press("Shift+ArrowRight")
-            wait(page, "viewer.history.frames.at(-1).tick === 11")
-            assert_same(page, room)
-            colony = room.session.colony
-            legend = page.text("#legend")
-            assert all(name in legend for name in ("seed", "sap", "idle ant"))
-            slot = int(np.flatnonzero(colony.castes[0] == 1)[0])
-            page.read("number => viewer.follow(number)", int(colony.numbers[0, slot]))
-            page.settle()
-            assert page.text("#ant .groups") == "scout"
-            assert page.tab.is_hidden("#kind")
-            page.press("3")
-            assert page.tab.is_visible("#kind")
-            page.tab.select_option("#kind", "sap")
-            there = cell_of(room, 5, 4, 0)
-            page.read("cell => viewer.chooseCell(cell, true)", there)
-            page.tab.focus("#world")
-            page.tab.keyboard.press("Enter")
-            (edit,) = edits(room, 1)
-            assert edit == {"place": {"what": "food", "cells": [there], "kind": "sap"}}
-            wait(page, "viewer.history.worldAt(viewer.history.length - 1).kinds.includes(1)")
-            page.settle()
-            assert "sap" in page.text("#cell")
-            assert page.read("cell => viewer.stage.foods[1].includes(cell)", there)
-        finally:
-            page.close()
-
-
 def test_a_change_is_undone_and_the_session_before_comes_back(page, room):
     page.press("Shift+ArrowRight")
     wait(page, "viewer.history.frames.at(-1).tick === 10")
@@ -269,29 +226,6 @@ def test_a_change_is_undone_and_the_session_before_comes_back(page, room):
     wait(page, "viewer.history.frames.at(-1).tick > 11")
     page.tab.click("#play")
     wait(page, "!live.running")
-
-
-def test_sliders_change_the_colony(page, room):
-    shown = page.read("Object.keys(live.state.values)")
-    assert set(shown) == set(room.session.values())
-    for name, value in [("epsilon", 0.5), ("learning_rate", 0.25), ("ants", 20), ("slope", 30)]:
-        page.tab.fill(f"#set-{name}", str(value))
-        edits(room, 1)
-        wait(page, f"live.state.values['{name}'].value === {value}")
-        sent = {"ants": {"ants": {"number": 20}}, "slope": {"task": {"pheromone.slope": 30}}}
-        assert room.session.edits[-1][1] == sent.get(name, {name: {"value": value}})
-    assert room.session.colony.epsilon == 0.5
-    page.tab.uncheck("#set-evaporation")
-    wait(page, "live.state.values.evaporation.value === 0")
-    page.click("#forward")
-    wait(page, "viewer.history.frames.at(-1).tick === 1")
-    assert_same(page, room)
-    page.click("#next-episode")
-    wait(page, "viewer.history.frames.at(-1).episode === 1")
-    page.click("#restart")
-    wait(page, "viewer.history.length === 1")
-    assert room.session.ticks == 0
-    assert room.session.edits == []
 
 
 def test_a_new_session_is_what_was_chosen(page, room):
@@ -451,54 +385,6 @@ def test_every_control_is_reached_by_keyboard_and_has_a_name(page):
         assert control in reached
     del reached["BODY"]
     assert [name for name, good in reached.items() if not good] == []
-
-
-def test_a_page_keeps_what_it_has_when_the_server_is_killed(browser, shared, tmp_path):
-    world = """moment => { const { ground, trail } = viewer.history.worldAt(moment);
-      const ant = viewer.history.ant(moment, 3);
-      return [[...ground], [...trail], [...viewer.history.frames[moment].cells], ant]; }"""
-    with running(shared.choices) as one:
-        port, token = one.port, one.token
-        page = Page(browser, one.url, accept_downloads=True)
-        for ticks in (11, 21, 31, 41):
-            page.press("Shift+ArrowRight")
-            wait(page, f"viewer.history.frames.at(-1).tick === {ticks}")
-        page.read("() => { viewer.history.bytes += 2 ** 27; }")  # it forgets its beginning
-        page.press("ArrowRight")
-        wait(page, "viewer.history.first > 0 && viewer.history.frames.at(-1).tick === 42")
-        page.read("live.socket.close()")  # so that a later moment is whole, too
-        page.tab.wait_for_selector("#lost:not([hidden])")
-        wait(page, "live.open && byId('lost').hidden")
-        page.press("ArrowRight")
-        wait(page, "viewer.history.frames.at(-1).tick === 43")
-    page.tab.wait_for_selector("#lost:not([hidden])")
-    with page.tab.expect_download() as got:
-        page.tab.click("#keep")
-    got.value.save_as(tmp_path / "kept.html")
-    assert_policy_holds(browser, tmp_path / "kept.html")
-    first, length = page.read("[viewer.history.first, viewer.history.length]")
-    kept = Page(browser, tmp_path / "kept.html")
-    assert kept.read("viewer.history.length") == length - first
-    for moment in range(first, length):
-        one, other = kept.read(world, moment - first), page.read(world, moment)
-        if moment == first:  # what was drawn ahead, in a moment before, is not known any more
-            one[-1]["act"] = other[-1]["act"] = None
-        assert one == other, moment
-    assert kept.read("document.querySelector('.controls, .palette, #lost')") is None
-    kept.close()
-    other = SessionServer(Session(shared.choices.setup(CHOSEN)), shared.choices, port)
-    other.token = token
-    thread = threading.Thread(target=other.run, daemon=True)
-    thread.start()
-    wait(page, "byId('lost').innerText.includes('another session')")
-    assert page.read("viewer.history.length") == length  # nothing is taken from it
-    page.tab.click("#again")
-    wait(page, "byId('lost').hidden && viewer.history.length === 1")
-    assert_same(page, other)
-    other.end()
-    thread.join()
-    page.faults.clear()  # Chromium tells of each attempt in vain
-    page.close()
 
 
 # Elements beyond the sides of their card, and words that do not fit into their button or label.

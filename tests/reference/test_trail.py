@@ -120,18 +120,6 @@ def test_the_deposit_of_a_carrying_ant(pheromone, bare, trodden):
     assert colony.world.trail.level(second) == trodden
 
 
-def test_the_first_observation_sees_the_start_undiminished_and_the_next_a_tick_later():
-    # Levels 1 and 2 to the left and to the right: seen E E T, then 0 and 1, and nothing at last.
-    cells = [(neighbour(MIDDLE, 0), 1), (neighbour(MIDDLE, 2), 2)]
-    world = World((5, 5, 5), FAR_QUEEN, trails=cells, ants=[(MIDDLE, 1)])
-    colony = begun(world)
-    seen = [colony.ants[0].state]
-    for _ in range(2):
-        act(colony, GIVE)
-        seen.append(colony.ants[0].state)
-    assert seen == [2 * 16 + 2, 2, 0]
-
-
 def test_dense_levels_are_seen_from_one_on_and_from_half_of_the_strongest():
     # 250 * 0.5 = 125 is half of 250, 124.9 is not; a level of 0.9 is no trail at all.
     world = World((5, 5, 5), FAR_QUEEN, ants=[(MIDDLE, 1)])

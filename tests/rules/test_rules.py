@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pickle
 import runpy
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -106,66 +105,6 @@ def test_pick_draws_by_weights_and_never_what_is_closed(clean):
     drawn = np.bincount([pick((1, 0, 3), one) for one in rng.random(10_000)], minlength=3)
     assert drawn[1] == 0
     assert abs(drawn[2] - 7500) < 5 * np.sqrt(10_000 * 0.75 * 0.25)
-
-
-def homeward(nearer, codes, carries, random):
-    action = pick([1, 1, 1], random)
-    if carries:
-        action = 1 if nearer[1] else 2 * pick([1, 1], random)
-    for k in range(3):
-        if codes[k] == 3:
-            action = 3 + carries
-    return action
-
-
-@pytest.mark.parametrize("traffic", ["blocking", "following"])
-def test_a_cell_with_an_ant_is_as_near_as_without_it(traffic, clean):
-    rules.register("choice")(homeward)
-    world = worlds.open_world(1, ranges=(7, 7, 7))
-    task = Task(choice="homeward", traffic=traffic).replace(life={"regrowth": 0})
-    colony = Colony(world, task, None, 0, 50, sharing="frozen")
-    colony.begin_episode()
-    far, occupied = colony.grid.distances((0, 0, 0)), 0  # from the queen, by cell
-    for _ in range(60):
-        cells, headings = colony.cells[0].copy(), colony.headings[0].copy()
-        carries = colony.carrying[0].copy()
-        colony.tick()
-        for ant in np.flatnonzero(carries & (colony.actions[0] < 3)):
-            ahead = cells[ant] + colony.grid.offsets[headings[ant]]
-            if ahead in cells:
-                occupied += 1
-                assert (colony.actions[0, ant] == 1) == (far[ahead] < far[cells[ant]])
-    assert occupied > 30
-
-
-def straight(is_open, codes, carries, random):
-    action = 1 if is_open[1] else 2 * pick([1, 1], random)
-    for k in range(3):
-        if codes[k] == 3:
-            action = 3 + carries
-    return action
-
-
-@pytest.mark.parametrize("cue", ["compass", "trail"])
-@pytest.mark.parametrize(
-    "traffic",
-    ["right_of_way", *(pytest.param(t, marks=pytest.mark.slow) for t in ("blocking", "following"))],
-)
-def test_a_cell_with_an_ant_is_open_by_traffic_with_and_without_a_compass(traffic, cue, clean):
-    rules.register("choice")(straight)
-    world = worlds.open_world(1, ranges=(7, 7, 7))
-    task = Task(choice="straight", traffic=traffic, homing_cue=cue).replace(life={"regrowth": 0})
-    colony, seen = Colony(world, task, None, 0, 50, sharing="frozen"), {False: 0, True: 0}
-    colony.begin_episode()
-    for _ in range(60):
-        cells, carries = colony.cells[0].copy(), colony.carrying[0].copy()
-        ahead = cells + colony.grid.offsets[colony.headings[0]]
-        colony.tick()
-        for ant in np.flatnonzero(np.isin(ahead, cells) & (colony.actions[0] < 3)):
-            seen[bool(carries[ant])] += 1
-            enters = traffic == "following" or (traffic == "right_of_way" and carries[ant])
-            assert (colony.actions[0, ant] == 1) == enters
-    assert min(seen.values()) > 5
 
 
 # The kind of a rule, words of the message, and the rule.
@@ -373,16 +312,6 @@ def test_parameters_change_without_other_kernels_and_in_an_episode(clean):
     assert colony.deliveries[0] > 0
 
 
-def test_a_colony_file_keeps_the_rule(tmp_path, clean):
-    colony = Colony(worlds.paper(), Task(choice="weber"), None, 0, 3, sharing="frozen")
-    colony.begin_episode()
-    colony.save(tmp_path / "colony.npz")
-    assert Colony.load(tmp_path / "colony.npz") == colony
-    del registry.RULES.yours["weber"]
-    with pytest.raises(AntsError, match="weber"):
-        Colony.load(tmp_path / "colony.npz")
-
-
 def wrong_twin(level):
     return level / 2
 
@@ -395,24 +324,6 @@ def test_a_rule_that_differs_from_its_twin_is_refused(clean):
     task = Task(pheromone=Pheromone("same"), evaporation_in_training=True)
     with pytest.raises(AntsError, match="rule 'same' cannot be used: its kernel returns"):
         Colony(worlds.paper(), task, own_config(), 0).run(1, 1)
-
-
-def fails_at_large(level):
-    if level > 5e8:
-        raise KeyError("a twin")
-    return level
-
-
-def differs_in_places(level):
-    return level if not 1e6 < level < 2e6 else 0
-
-
-def test_twins_are_asked_for_all_levels_that_occur_and_named_if_they_fail(clean):
-    rules.register("evaporation", reference=fails_at_large)(same)
-    says = "its Python function fails (KeyError: 'a twin') for level="
-    assert check_rule("same").difference.startswith(says)
-    registry.RULES.yours["same"] = replace(rules.get("same"), reference=differs_in_places)
-    assert "but its Python function 0.0" in check_rule("same").difference
 
 
 def test_rules_that_read_labour_or_fields_need_them(clean):

@@ -9,7 +9,6 @@ from playback import unpack
 from taichi_ants import Colony, TrainingConfig, World
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import Place
-from taichi_ants.learners.config import update_weights
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import Caste, Food, Labour, Threshold, foraging
 from taichi_ants.viewer import Recorder
@@ -78,29 +77,3 @@ def test_frames_have_castes_kinds_of_food_and_rewards(sharing):
     header = recorder.header()
     assert (header["castes"], header["foods"]) == ([*CASTES], [*FOODS])
     assert header["idles"]
-
-
-def test_td_errors_are_those_of_the_caste():
-    """Changes of values are the errors times the learning rate; guides and idle ants have none."""
-    colony = begun()
-    recorder, met = Recorder(colony), set()
-    recorder.snapshot()
-    for _ in range(60):
-        order = np.argsort(colony.numbers[0])
-        before, states = colony.q_values[0], colony.states[0, order]
-        castes, nests = colony.castes[0, order], colony.nests[0, order]
-        frame = unpack(recorder.types, recorder.tick())
-        actions = (frame["acts"] & 15).tolist()
-        at = list(zip(nests, castes, states, actions, strict=True))
-        for place, (error, where) in enumerate(zip(frame["td_errors"], at, strict=True)):
-            caste = castes[place]
-            if actions[place] == 15 or caste == 2:
-                assert np.isnan(error)
-                met.add("none")
-                continue
-            n = at.count(where)
-            weight = update_weights(0.5 if caste == 1 else 0.1, 30)[n]
-            moved = float(colony.q_values[0][where]) - float(before[where])
-            assert error * weight == pytest.approx(moved, abs=1e-5)
-            met.add((int(caste), n > 1, bool(moved)))
-    assert {"none", (0, False, True), (1, False, True), (1, True, True)} <= met

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pickle
 
-import numpy as np
 import pytest
 
 from taichi_ants import AntsError, At, Colony, Task, World, worlds
@@ -78,15 +77,6 @@ def test_a_wrong_line_of_a_region_is_named(text, says):
 def test_a_wrong_region_is_named(regions, says):
     with pytest.raises(AntsError, match=says):
         worlds.paper().with_regions(regions)
-
-
-def test_a_disc_has_the_cells_within_a_radius():
-    world = worlds.paper().with_regions({"disc": {"centre": (-1, -1, 0), "radius": 2}})
-    far = world.grid.distances((0, 0, 1))
-    assert set(world.region("disc")) == set(np.flatnonzero(world.grid.exists & (far <= 2)))
-    both = world.with_regions({"one": [(0, 0, 0), (1, 1, 1)]})
-    assert list(both.regions) == ["disc", "one"]
-    assert len(both.regions["one"]) == 1
 
 
 def test_interventions_take_the_regions_of_each_world(tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import HEADING_STEPS
 from taichi_ants.task.constants import EMPTY
-from taichi_ants.worlds import World, from_text, load_map, to_text
+from taichi_ants.worlds import World, from_text, load_map
 
 GUIDE = Path(__file__).parents[2] / "docs" / "worlds.md"
 
@@ -72,12 +72,6 @@ def test_damaged_maps(text: str, message: str) -> None:
     with pytest.raises(AntsError, match=message) as caught:
         from_text(text)
     assert "\n" not in str(caught.value)
-
-
-def test_ants_are_numbered_in_reading_order() -> None:
-    world = World((3, 3, 3), (0, 0, 0), ants=[((0, 2, 0), 1), ((2, 0, 0), 2), ((0, 0, 1), 3)])
-    in_reading_order = World((3, 3, 3), (0, 0, 0), ants=world.ants[[1, 2, 0]])
-    assert from_text(to_text(world)) == in_reading_order
 
 
 def test_the_examples_of_the_guide_work() -> None:

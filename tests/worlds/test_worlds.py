@@ -149,12 +149,3 @@ def test_reachable_foods() -> None:
     assert corridor.reachable_foods().tolist() == [True, False, False]
     assert dataclasses.replace(corridor, foods=[(1, 0, 0)]).reachable_foods().tolist() == [False]
     assert World((8, 1, 1), (0, 0, 0)).reachable_foods().shape == (0,)
-
-
-def test_a_wall_is_tight_along_hexagons() -> None:
-    # In a rhombus of rows r, a full row of rocks keeps the far side apart; one gap opens it.
-    wall = [(i, 2, 0) for i in range(5)]
-    world = World((5, 5, 1), (0, 0, 0), foods=[(0, 4, 0), (0, 1, 0)], obstacles=wall)
-    assert world.reachable_foods().tolist() == [True, False]
-    gap = dataclasses.replace(world, obstacles=wall[:-1])
-    assert gap.reachable_foods().tolist() == [True, True]

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
-from taichi_ants.engines import arguments
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import Life, Pheromone, Task, foraging
 from taichi_ants.task.constants import FOOD
@@ -103,25 +102,6 @@ def test_episodes_may_take_place_in_other_worlds():
         moved.end_episode()
     assert moved == listed
     assert len(set(outcome.returns[:, 0].tolist())) > 1
-
-
-def test_kernels_are_told_only_what_has_changed(monkeypatch):
-    """Taichi keeps some bytes for good each time, which made long lives grow."""
-    colony = Colony(worlds.paper(), None, TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.5), 0, 3)
-    colony.begin_episode()
-    told, tell = [], arguments._Pack.__setitem__
-
-    def telling(pack, name, value):
-        told.append(name)
-        tell(pack, name, value)
-
-    monkeypatch.setattr(arguments._Pack, "__setitem__", telling)
-    for _ in range(3):
-        colony.tick()
-    assert told == []
-    colony.end_episode()
-    colony.begin_episode()
-    assert sorted(told) == ["epsilon", "explore_below"]
 
 
 @pytest.mark.parametrize(("task", "most"), [(Task(), 44), (foraging(), 49)])

@@ -11,7 +11,7 @@ import pickle
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
+from taichi_ants import AntsError, Colony, Task, worlds
 from taichi_ants.task import Life
 
 MEADOW = worlds.open_world(5, (9, 8, 7))
@@ -69,38 +69,3 @@ def test_copies_pickles_and_files_go_on_alike(tmp_path):
     for other in others:
         assert other.is_given_actions
         assert pass_ticks(other, seed=2) == expected
-
-
-def test_what_is_not_allowed():
-    colony = given()
-    right = np.zeros((3, colony.capacity), int)
-    with pytest.raises(AntsError, match=r"^no episode has begun; "):
-        colony.act(right)
-    colony.begin_episode()
-    for wrong in (right[:2], right + 0.5, right.ravel(), None):
-        with pytest.raises(AntsError, match=r"^actions is .*; give whole numbers of shape \(3, "):
-            colony.act(wrong)
-    for action in (-1, 5):
-        with pytest.raises(AntsError, match=rf"^an action is {action}; it must lie between 0 and"):
-            colony.act(right + action)
-    colony.act(np.where(colony.living, 2, 99))  # nobody lives in the other slots
-    with pytest.raises(AntsError, match=r"^training is None, so ants do not choose actions; "):
-        colony.tick()
-    with pytest.raises(AntsError, match=r"^which is .*; give a bool for each of the \d+ worlds\.$"):
-        colony.reset_worlds(np.ones(2, bool))
-    with pytest.raises(AntsError, match=r"^there are 2 seeds for 1 world; give 1 seed\.$"):
-        colony.reset_worlds(np.array([True, False, False]), [1, 2])
-    with pytest.raises(AntsError, match=r"^a seed is 0\.5; "):
-        colony.reset_worlds(np.array([True, False, False]), [0.5])
-    training = TrainingConfig("sarsa", 0.1, 0.9, 0.2, 0.9)
-    learning = Colony(MEADOW, Task(), training, ants=9)
-    learning.begin_episode()
-    with pytest.raises(AntsError, match=r"^the ants of this colony choose their own actions"):
-        learning.act(np.zeros((1, 9), int))
-    for options in (
-        {},
-        {"sharing": "independent"},
-        {"sharing": "frozen", "q_values": np.zeros((128, 5))},
-    ):
-        with pytest.raises(AntsError, match=r"^training is None; it must be one TrainingConfig, "):
-            Colony(MEADOW, Task(), None, ants=9, **options)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from taichi_ants import Colony, TrainingConfig, runtime, train, worlds
-from taichi_ants.engines.colony import kernels, layout, stepping
+from taichi_ants import Colony, TrainingConfig, train, worlds
+from taichi_ants.engines.colony import layout, stepping
 from taichi_ants.engines.colony.layout import Order
 from taichi_ants.engines.colony.stepping import ThreadChoice
 from taichi_ants.task import Field, Life, Pheromone, Task
@@ -58,26 +56,6 @@ def test_threads_and_schedules_give_the_same(monkeypatch):
     # Another number of threads starts Taichi anew.
     for schedule in ("by_world", "by_chunk"):
         assert_same(expected, history(threads=2, schedule=schedule))
-
-
-@pytest.mark.parametrize(("n_worlds", "threads"), [(1, 2), (2, 2), (7, 2), (20, 3), (256, 16)])
-def test_threads_take_distant_worlds(n_worlds, threads, monkeypatch):
-    """The counts of neighbours share cache lines, which slows threads down that write to them."""
-    monkeypatch.setattr(runtime, "start", lambda: runtime.Runtime("cpu", threads))
-    orders = []
-    monkeypatch.setattr(stepping.Stepper, "launch", lambda *given: orders.append(given[1].orders()))
-    state = SimpleNamespace(schedule="by_world", seeds=range(n_worlds), capacity=8, ticks=0)
-    state.arrays = {"orders": np.zeros(len(Order), int), "barrier": np.zeros(24, int)}
-    state.orders = lambda: state.arrays["orders"].tolist()
-    stepping.Stepper().advance(state, 5)
-    ((_, parts, n_threads, *_),) = orders
-    found = [kernels.world_of.__wrapped__(part, parts, n_threads) for part in range(parts)]
-    assert sorted(one for one in found if one < n_worlds) == list(range(n_worlds))
-    assert n_threads == min(threads, n_worlds)
-    for first in range(0, parts, n_threads):
-        together = sorted(found[first : first + n_threads])  # worlds that threads take at a time
-        assert all(np.diff(together) == parts // n_threads)
-    assert parts - n_worlds < n_threads
 
 
 def test_threads_that_do_not_come_are_not_waited_for_without_end(monkeypatch):
