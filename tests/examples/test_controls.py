@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import runpy
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,9 @@ import pytest
 from command_lines import EXPERIMENTS
 from matplotlib.figure import Figure
 
+from taichi_ants import World
 from taichi_ants.learners import registry as learners
+from taichi_ants.task import Caste, Threshold
 from taichi_ants.worlds import double_bridge
 
 # The centre of a world and the six cells around it, in order.
