@@ -220,3 +220,34 @@ def test_wrong_arguments_are_named(arguments, told):
         with pytest.raises(AntsError) as caught:
             HexForageEnv(**arguments)
         assert told in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("delivery", "ends"),
+    [
+        ("terminates", (True, False)),
+        ("truncates", (False, True)),
+        ("continues", (False, False)),
+        (None, (False, True)),  # as the task says
+    ],
+)
+def test_a_delivery_ends_an_episode_as_is_asked_for(delivery, ends):
+    q_values, rng = trail_follower(), np.random.default_rng(0)
+    rules, foods = Task(delivery="truncates"), len(worlds.paper().foods)
+    env = gymnasium.make(ID, task=rules, delivery=delivery, render_mode="ansi")
+    _, info = env.reset(seed=0)
+    delivered = 0
+    for step in range(600):
+        values = q_values[info["state"]]
+        action = rng.choice(np.flatnonzero(values == values.max()))
+        _, _, *ended, info = env.step(int(action))
+        if info["event"] == Event.DELIVERED:
+            delivered += 1
+            assert tuple(ended) == ends
+        elif step < 599:
+            assert not any(ended)
+        if any(ended):
+            break
+    assert delivered >= (3 if delivery == "continues" else 1)
+    left = worlds.from_text(env.render()).foods
+    assert len(left) == (foods if delivery == "continues" else foods - 1)

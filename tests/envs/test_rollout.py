@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from taichi_ants import AntsError, Pheromone, Task, TrainingConfig, task, train, worlds
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.forage import HexForageVectorEnv
-from taichi_ants.envs.formats import ObservationFormat
+from taichi_ants.envs.formats import FORMATS, ObservationFormat
 from taichi_ants.envs.rollout import Rollout
 from taichi_ants.learners.policies import action_probabilities, save_policy, trail_follower
-from taichi_ants.task import Noise
+from taichi_ants.task import Life, Noise
 
 SAME, NEXT, DISABLED = AutoresetMode.SAME_STEP, AutoresetMode.NEXT_STEP, AutoresetMode.DISABLED
 MEADOWS = [worlds.open_world(seed, (8, 8, 8)) for seed in range(3)]
@@ -26,6 +26,12 @@ TASKS: dict[str, tuple[Task, ObservationFormat]] = {
     "adding": (Task(pheromone=Pheromone(deposit="add"), delivery="truncates"), "cells"),
     "fading, slips": (task.foraging().replace(noise=Noise(slip=0.2)), "one_hot"),
     "misread": (Task(observation="trail_levels", noise=Noise(0.1, 0.2)), "index"),
+}
+
+COLONY_TASKS = {
+    "foraging": task.foraging(),
+    "truncates": task.foraging().replace(delivery="truncates", life=Life(regrowth=0)),
+    "noise": Task(delivery="truncates", noise=Noise(0.2, 0.1)),
 }
 
 
@@ -230,3 +236,15 @@ def test_refuses(make, tmp_path):
         with pytest.raises(error, match=message):
             env.rollout(policy, **options)
     assert np.array_equal(env._ants.states(), where)
+
+
+@settings(max_examples=10, deadline=None)
+@given(rules=st.sampled_from(list(COLONY_TASKS)), form=st.sampled_from(FORMATS), **CASES)
+def test_colonies_equal_steps(mode, form, before, lengths, seed, rules):
+    if COLONY_TASKS[rules].delivery == "terminates":
+        mode = SAME
+
+    def make() -> HexColonyVectorEnv:
+        return colony(task=COLONY_TASKS[rules], autoreset_mode=mode, observation_format=form)
+
+    compare(make, before, lengths, seed)

@@ -422,3 +422,27 @@ def test_a_late_page_is_told_of_the_whole_progress():
         assert points[ended][:, named].tolist() == ends
         assert points[0, POINT.index("ticks")] == 0
         assert (points[~ended][:, POINT.index("episode")] == 0).all()
+
+
+def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
+    """And a page that joins late is told the same."""
+    session = edited("foraging")
+    counted, again = 0, Session(session.setup)
+    for steps, edit in session.edits:
+        while again.steps < steps:
+            counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
+            again.leap(1)
+        counted += int(again.colony.outcome().deliveries[0, 0]) * ("episode" in edit)
+        again.apply(edit)
+    while again.steps < session.steps:
+        counted += int(again.colony.outcome().deliveries[0, 0]) * again.ended
+        again.leap(1)
+    counted += int(again.colony.outcome().deliveries[0, 0])
+    few = recording(session.log(), most_frames=20)
+    types = few.header["types"]
+    told = [
+        unpack(types, frame)["clock"][CLOCK.index("delivered")]
+        for frame in (few.frames[-1], session.snapshot())
+    ]
+    assert told == [counted, counted]
+    assert counted > 0

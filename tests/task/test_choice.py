@@ -204,3 +204,14 @@ def test_refusals_name_the_setting(make, says):
     with pytest.raises(AntsError) as caught:
         make()
     assert says in str(caught.value)
+
+
+def test_worlds_that_begin_again_do_not_misread_twice():
+    """A world that has begun but not ticked keeps what its ants see while others begin."""
+    rules = Task(noise=Noise(misread=0.5))
+    colony = Colony(worlds.paper(), rules, PLAIN, (1, 2), 9)
+    colony.begin_episode()
+    seen, streams = colony.states[1].copy(), colony.streams[1].copy()
+    colony.reset_worlds(np.array([True, False]))
+    assert (colony.states[1] == seen).all()
+    assert (colony.streams[1] == streams).all()

@@ -283,3 +283,16 @@ def test_wrong_protocols_are_refused_in_one_sentence():
     learns = Colony(worlds.paper(), FORAGING, TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0))
     with pytest.raises(AntsError, match="do not follow a policy"):
         learns.run(1, 100, protocol=At(3, policy="random"))
+
+
+def test_half_of_the_ants_are_removed_and_food_is_added_in_each_episode():
+    colony = followers(range(3))
+    removals = [At(20, remove_ants=0.5), At(21, remove_ants=1), At(22, remove_ants=0.5)]
+    found = colony.run(2, 50, protocol=removals)
+    assert (found.living == 4).all()  # 20 - 10 - 1 - 5: a half of nine is rounded up
+    cells = [[1, 2, 0], [1, 3, 0]]
+    colony.run(1, 50, protocol=[At(10, place={"what": "food", "cells": cells})])
+    assert (colony.snapshot(1).ground[colony.grid.index(cells)] != OBSTACLE).all()
+    sources = colony.n_food_sources
+    colony.run(1, 50)
+    assert (sources, colony.n_food_sources) == (3, 3)
