@@ -18,6 +18,7 @@ from taichi_ants import AntsError, Pheromone, Task, World, task, worlds
 from taichi_ants.envs import Event, Reason
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
 from taichi_ants.envs.formats import FORMATS
+from taichi_ants.learners.policies import trail_follower
 
 ID = "taichi_ants/HexForage-v0"
 SMALL = [worlds.open_world(seed, (8, 8, 8)) for seed in range(3)]
