@@ -93,7 +93,9 @@ Block = str | Table
 
 def markdown(blocks: Sequence[Block]) -> str:
     """Return blocks as a Markdown document."""
-    return "\n".join(one.markdown() if isinstance(one, Table) else f"{one}\n" for one in blocks)
+    return "\n".join(
+        block.markdown() if isinstance(block, Table) else f"{block}\n" for block in blocks
+    )
 
 
 def plain_text(blocks: Sequence[Block], width: int) -> str:

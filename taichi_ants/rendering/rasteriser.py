@@ -91,12 +91,12 @@ def cell(letter: str, centre: npt.ArrayLike, hexagon: float) -> np.ndarray:
 
 def numbered(centre: npt.ArrayLike, hexagon: float, mark: Mark, number: int) -> list[np.ndarray]:
     """Return marks of a cell with a queen or food of this number of nest or kind."""
-    floor, several = (colours.FLOOR_QUEEN, colours.QUEENS)
+    floor, of_nests = (colours.FLOOR_QUEEN, colours.QUEENS)
     if mark == Mark.FOOD:
-        floor, several = (colours.FLOOR_FOOD, colours.FOODS)
-    n = number % len(several)
-    cell = marks(centre, hexagon, Mark.HEXAGON, int(colours.floors(several, floor)[n]))
-    return [cell, thing(centre, hexagon, mark, several[[n]])]
+        floor, of_nests = (colours.FLOOR_FOOD, colours.FOODS)
+    n = number % len(of_nests)
+    cell = marks(centre, hexagon, Mark.HEXAGON, int(colours.floors(of_nests, floor)[n]))
+    return [cell, thing(centre, hexagon, mark, of_nests[[n]])]
 
 
 def ants(
@@ -290,7 +290,7 @@ class Rasteriser:
         seen = levels[levels >= 1]
         most = float(np.quantile(seen, 0.95)) if len(seen) else 1.0
         power = 10 ** math.floor(math.log10(most))
-        return next(one * power for one in (1, 2, 5, 10) if one * power >= most)
+        return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= most)
 
     def _places(self, cells: np.ndarray) -> np.ndarray:
         """Pixel coordinates (n, 2) of flat indices (n,)."""

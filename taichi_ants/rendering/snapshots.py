@@ -190,7 +190,7 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
         return snapshot, Status(tuple(lines))
     # Pictures mark the view of the first ant, so the followed ant must be first.
     order = np.argsort(~followed, kind="stable")
-    of_ants = [one.name for one in dataclass_fields(snapshot) if one.name.startswith("ant_")]
+    of_ants = [array.name for array in dataclass_fields(snapshot) if array.name.startswith("ant_")]
     snapshot = replace(snapshot, **{name: getattr(snapshot, name)[order] for name in of_ants})
     # All lines together do not fit into the panel.
     lines = [lines[0], lines[3], ("ant", str(follow))]

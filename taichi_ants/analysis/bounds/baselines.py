@@ -58,9 +58,9 @@ def policy_rows(
     note = f"mean over {count(len(seeds), 'seed')} of {count(rollouts, 'rollout')}"
     rows = []
     for name, policy in (("random policy", random_policy()), ("trail follower", trail_follower())):
-        found = evaluate(world, np.repeat(policy[None], len(seeds), axis=0), **how)
+        result = evaluate(world, np.repeat(policy[None], len(seeds), axis=0), **how)
         outcome = ExpectedEpisode(
-            *map(float, map(np.mean, (found.returns, found.steps, found.deliveries)))
+            *map(float, map(np.mean, (result.returns, result.steps, result.deliveries)))
         )
         rows.append(Baseline(name, None, *outcome, note))
     return rows
