@@ -22,7 +22,7 @@ LAYERS = (
     {"files", "grid", "registry", "settings"},
     {"rules"},
     {"task"},
-    {"runtime", "worlds", "learners"},
+    {"runtime", "worlds", "learners", "records"},
     {"checks", "measures"},
     {"interventions"},
     {"protocol"},

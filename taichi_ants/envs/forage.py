@@ -13,7 +13,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from taichi_ants import checks
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Rollout, TablePolicy
@@ -30,6 +29,7 @@ from taichi_ants.envs.vector import (
     task_of,
 )
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
+from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
 from taichi_ants.worlds import text_map
 
@@ -85,8 +85,8 @@ class LoneAnts(Ants):
         begins = waiting if mode is AutoresetMode.NEXT_STEP else 0
         self.batched.step(actions, begins, same_step=mode is AutoresetMode.SAME_STEP)
         arrays = self.batched.arrays
-        ends = (arrays[name].astype(bool) for name in ("terminations", "truncations"))
-        return arrays["rewards_of"].copy(), *ends
+        results = arrays["results"]
+        return arrays["rewards_of"].copy(), results & TERMINATED != 0, results & TRUNCATED != 0
 
     def play(
         self,
@@ -100,9 +100,9 @@ class LoneAnts(Ants):
         rows = {
             "taken": into.actions,
             "seen": into.observations[1:],
-            "paid": into.rewards,
-            "results": into.events,
-            "finals": finals,
+            "rewards_of": into.rewards,
+            "result_rows": into.events,
+            "final_states": finals,
         }
         self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[mode], policy)
         np.not_equal(into.events & TERMINATED, 0, out=into.terminated)
@@ -110,19 +110,18 @@ class LoneAnts(Ants):
         np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
 
     def over(self) -> np.ndarray:
-        arrays = self.batched.arrays
-        return (arrays["terminations"] | arrays["truncations"]) != 0
+        return self.batched.arrays["results"] >= TRUNCATED
 
     def states(self) -> np.ndarray:
         return self.batched.arrays["states"]
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
         arrays, when = self.batched.arrays, "final_" if last else ""
-        packed = _PACKED_MASKS.take(arrays[f"{when}percepts"], mode="clip")
+        packed = _PACKED_MASKS.take(arrays[f"{when}paper_states"], mode="clip")
         return {
             "state": arrays[f"{when}states"].astype(np.int64),
             "action_mask": packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS],
-            "event": arrays["events"].astype(np.int64),
+            "event": (arrays["results"] & (TRUNCATED - 1)).astype(np.int64),
             "reason": arrays["reasons"].astype(np.int64),
             "deliveries": arrays[f"{when}deliveries"].astype(np.int64),
         }
@@ -250,21 +249,20 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
         self._ants.batched.step(action)
         arrays = self._arrays
-        terminated, truncated = bool(arrays["terminations"][0]), bool(arrays["truncations"][0])
+        result, reward = int(arrays["results"][0]), float(arrays["rewards_of"][0])
         observation, info = self._seen()
-        return observation, float(arrays["rewards_of"][0]), terminated, truncated, info
+        return observation, reward, result & TERMINATED != 0, result & TRUNCATED != 0, info
 
     @property
     def _over(self) -> bool:
-        arrays = self._arrays
-        return not self._begun or bool(arrays["terminations"][0] or arrays["truncations"][0])
+        return not self._begun or bool(self._arrays["results"][0] >= TRUNCATED)
 
     def _seen(self) -> tuple[Any, dict[str, Any]]:
         arrays = self._arrays
         return self._ants.shown.show(arrays["states"])[0], {
             "state": np.int64(arrays["states"][0]),
             "action_mask": ACTION_MASKS[arrays["paper_states"][0]].copy(),
-            "event": np.int64(arrays["events"][0]),
+            "event": np.int64(arrays["results"][0] & (TRUNCATED - 1)),
             "reason": np.int64(arrays["reasons"][0]),
             "deliveries": np.int64(arrays["deliveries"][0]),
         }

@@ -264,7 +264,7 @@ class World:
         free, (index,) = free.copy(), np.nonzero(free)
         words = stream_state(seed, STREAM_START_CELL, self.grid.number(self.grid.cells(index)))
         far = (self._far(nest)[index] for nest in range(self.n_nests))
-        queues = [iter(index[np.lexsort((words, distance))].tolist()) for distance in far]
+        queues = [iter(index[np.lexsort((words, steps))].tolist()) for steps in far]
         cells = np.empty(n, np.int64)
         for i, nest in enumerate(self.nests_of(n_taken + n)[n_taken:].tolist()):
             cells[i] = next(cell for cell in queues[nest] if free[cell])
