@@ -28,10 +28,9 @@ def seed_rows(
     settings: Sequence[Settings], seeds: Sequence[int], values: Mapping[str, np.ndarray]
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each point and seed: settings, seed and measures, from float64 (P, S)."""
-    for p, setting in enumerate(settings):
+    for p, row in enumerate(settings):
         for s, seed in enumerate(seeds):
-            measured = {name: float(array[p, s]) for name, array in values.items()}
-            yield {**setting, "seed": seed, **measured}
+            yield {**row, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
 def centre_columns(
@@ -79,8 +78,8 @@ def report(
     """
     names = columns_of(settings)
     lines = []
-    for setting, centres in zip(settings, centres_of(values), strict=True):
-        cells = [_shown(setting.get(name, MISSING)) for name in names]
+    for row, centres in zip(settings, centres_of(values), strict=True):
+        cells = [_shown(row.get(name, MISSING)) for name in names]
         for centre in centres.values():
             ends = f" [{centre.ci_low:.4g}, {centre.ci_high:.4g}]"
             without = f" ({centre.left_out} left out)" if centre.left_out else ""
@@ -108,18 +107,13 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
         AntsError: The file (.png) cannot be written.
     """
     names = columns_of(settings)
-    others = [
-        name for name in names[1:] if len({str(setting.get(name)) for setting in settings}) > 1
-    ]
+    others = [name for name in names[1:] if len({str(row.get(name)) for row in settings}) > 1]
     alike = [f"{short(n, names)} {_shown(settings[0][n])}" for n in names[1:] if n not in others]
-    numbers = [
-        (estimator.mean, estimator.ci_low, estimator.ci_high)
-        for estimator in estimates(values, uses_iqm=False)
-    ]
+    means = [estimator[:3] for estimator in estimates(values, uses_iqm=False)]  # with intervals
     lines: dict[str, list[tuple[Any, ...]]] = {}
-    for setting, point in zip(settings, numbers, strict=True):
-        label = ", ".join(f"{short(n, names)} {_shown(setting[n])}" for n in others if n in setting)
-        lines.setdefault(label or words, []).append((setting.get(names[0]), *point))
+    for row, mean in zip(settings, means, strict=True):
+        label = ", ".join(f"{short(n, names)} {_shown(row[n])}" for n in others if n in row)
+        lines.setdefault(label or words, []).append((row.get(names[0]), *mean))
     with style.styled():
         figure = style.new_figure(4.5)
         axes = figure.subplots()
@@ -162,10 +156,8 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
         style.logarithmic(axes.xaxis, (1,))
         axes.set_xticks(sorted(set(places)))
     means = [point[1] for points in lines.values() for point in points if np.isfinite(point[1])]
-    drawn = (
-        bounds for each in (lines, *shared) for points in each.values() for _, *bounds in points
-    )
-    if numbers and _far_apart(means) and not any(y <= 0 for bounds in drawn for y in bounds):
+    rows = [row for each in (lines, *shared) for points in each.values() for row in points]
+    if numbers and _far_apart(means) and not any(y <= 0 for _, *ys in rows for y in ys):
         style.logarithmic(axes.yaxis, (1, 2, 5) if max(means) < 1000 * min(means) else (1,))
 
 

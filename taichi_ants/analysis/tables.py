@@ -93,9 +93,8 @@ Block = str | Table
 
 def markdown(blocks: Sequence[Block]) -> str:
     """Return blocks as a Markdown document."""
-    return "\n".join(
-        block.markdown() if isinstance(block, Table) else f"{block}\n" for block in blocks
-    )
+    texts = (item.markdown() if isinstance(item, Table) else f"{item}\n" for item in blocks)
+    return "\n".join(texts)
 
 
 def plain_text(blocks: Sequence[Block], width: int) -> str:

@@ -95,10 +95,8 @@ class _Pack(ArgPack):
     """
 
     def __init__(self, kind: Any, values: dict[str, Any]) -> None:
-        is_array = (
-            isinstance(member, ndarray_type.NdarrayType) for member in kind.members.values()
-        )
-        self.places = list(accumulate((not one for one in is_array), initial=0))
+        is_number = (not isinstance(t, ndarray_type.NdarrayType) for t in kind.members.values())
+        self.places = list(accumulate(is_number, initial=0))
         super().__init__(kind.members, kind.dtype, values)
 
     def _calc_element_true_index(self, old_index: int) -> int:

@@ -138,11 +138,8 @@ def difference(rule: Rule, n: int = TRIES) -> str:
             said = f"{type(error).__name__}: {error}"
             return f"its Python function fails ({said}) for {values_shown(inputs, parameters)}"
         if result != reference:
-            values = values_shown(inputs, parameters)
-            return (
-                f"its kernel returns {result!r}, but its Python function "
-                f"{reference!r}, for {values}"
-            )
+            said = f"its kernel returns {result!r}, but its Python function {reference!r}"
+            return f"{said}, for {values_shown(inputs, parameters)}"
     return ""
 
 

@@ -77,9 +77,7 @@ class Model:
             if name.startswith(("task.", "training.")) or name in (*_OF_POINTS, "protocol")
         }
         varies = {name for name, value in values.items() if isinstance(value, list)}
-        if not any(
-            event is None or isinstance(event, list) for event in values.get("protocol") or ()
-        ):
+        if all(isinstance(event, dict) for event in values.get("protocol") or ()):
             varies -= {"protocol"}
         for n in range(max([1, *(len(values[name]) for name in varies)])):
             row = {name: value[n] if name in varies else value for name, value in values.items()}
@@ -98,10 +96,8 @@ class Model:
         if group != ["training", "hyperparameters"]:
             return declaration_of(name, self.world)
         learner = row["training.learner"]
-        known = (
-            declared(learners.get(learner).hyperparameters) if learner in learners.names() else ()
-        )
-        return next((setting for setting in known if setting.name == own), None)
+        known = learner in learners.names() and declared(learners.get(learner).hyperparameters)
+        return next((setting for setting in known or () if setting.name == own), None)
 
     def uses(self, row: Mapping[str, Any], name: str, setting: DeclaredSetting | None) -> bool:
         """Return whether a setting has an effect at a point, as far as declarations tell."""
@@ -255,9 +251,7 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
         _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
         _table(("File", "SHA-256 begins"), sources),
     ]
-    return markdown(
-        [block for block in blocks if (block if isinstance(block, str) else block.rows)]
-    )
+    return markdown([item for item in blocks if (item if isinstance(item, str) else item.rows)])
 
 
 def _table(heads: Row, rows: Iterable[Row]) -> Table:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
+from taichi_ants.analysis.bounds.episodes import EpisodeBounds
 from taichi_ants.errors import AntsError, count
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Task
@@ -59,10 +59,8 @@ def policy_rows(
     rows = []
     for name, policy in (("random policy", random_policy()), ("trail follower", trail_follower())):
         result = evaluate(world, np.repeat(policy[None], len(seeds), axis=0), **how)
-        outcome = ExpectedEpisode(
-            *map(float, map(np.mean, (result.returns, result.steps, result.deliveries)))
-        )
-        rows.append(Baseline(name, None, *outcome, note))
+        means = map(np.mean, (result.returns, result.steps, result.deliveries))
+        rows.append(Baseline(name, None, *map(float, means), note))
     return rows
 
 

@@ -133,15 +133,13 @@ class Variant:
         self.slots_matter = features.ants_change or features.own_tables or features.is_given_actions
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
-        rule_named, none = partial(own_rule, features.rules), ("",) * len(features.dense)
-        self.own_choice = own_inputs.choice(rule_named(features.choice))
-        self.own_reward = own_inputs.reward(rule_named(features.reward))
+        named, none = partial(own_rule, features.rules), ("",) * len(features.dense)
+        self.own_choice = own_inputs.choice(named(features.choice))
+        self.own_reward = own_inputs.reward(named(features.reward))
         self.has_own_choice = self.own_choice is not None
         self.has_own_reward = self.own_reward is not None
-        self.own_deposits = tuple(
-            own_inputs.deposit(rule_named(name)) for name in features.deposits or none
-        )
-        self.own_evaporations = tuple(map(rule_named, features.evaporations or none))
+        self.own_deposits = tuple(map(own_inputs.deposit, map(named, features.deposits or none)))
+        self.own_evaporations = tuple(map(named, features.evaporations or none))
         self.field_numbers = {name: number for number, name in enumerate(features.fields)}
         # Whether pheromones are laid one after the other, because rules of deposits read others.
         lay = [rule for rule in features.rules if rule.kind == "deposit"]
