@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds
+from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
 from taichi_ants.errors import AntsError, count
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Task
@@ -60,7 +60,7 @@ def policy_rows(
     for name, policy in (("random policy", random_policy()), ("trail follower", trail_follower())):
         result = evaluate(world, np.repeat(policy[None], len(seeds), axis=0), **how)
         means = map(np.mean, (result.returns, result.steps, result.deliveries))
-        rows.append(Baseline(name, None, *map(float, means), note))
+        rows.append(Baseline(name, None, *ExpectedEpisode(*map(float, means)), note))
     return rows
 
 
