@@ -225,7 +225,7 @@ def planning_phases(v: Variant) -> Iterator[Phase]:
 def last_phases(v: Variant) -> Iterator[Phase]:
     """Yield the phases at the end of a tick."""
     if v.ants_change:
-        yield Phase(ANTS, life.retire)
+        yield Phase(ANTS, life.update_slots)
     yield Phase(WORLD, life.end_tick)
 
 

@@ -165,7 +165,7 @@ def trace_training(
         raise AntsError(f"config has {len(several)} configurations; pass a single one.")
     checks.check_choices(several, task)
     seeds = checks.checked_seeds_for(seed, ())
-    state = RunState.fresh(several, seeds.tolist(), task.n_states).part([0])
+    state = RunState.initial(several, seeds.tolist(), task.n_states).part([0])
     runs = Runs.learning(several, seeds.tolist(), state)
     trace = _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
     return replace(

@@ -130,7 +130,7 @@ def test_who_is_faster_goes_on():
             paces[4] = 7.0
         n, threads = choice.plan(80, 4)
         assert (n, threads) in ((80, 1), (10, 1), (80, 4), (10, 4))
-        choice.took(threads, paces[threads])
+        choice.record(threads, paces[threads])
         alone.append(n if threads == 1 else 0)
     assert 0 < sum(alone[:40]) < 0.02 * 80 * 40
     assert sum(alone[50:]) > 0.9 * 80 * 35
