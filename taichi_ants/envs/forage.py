@@ -13,7 +13,6 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 
 from taichi_ants import checks
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Rollout, TablePolicy
@@ -32,6 +31,7 @@ from taichi_ants.envs.vector import (
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
 from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
 from taichi_ants.worlds import text_map
+from taichi_ants.worlds.snapshot import Snapshot
 
 DELIVERIES = ("terminates", "truncates", "continues")
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "ansi"], "render_fps": 10}

@@ -19,8 +19,8 @@ from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.records import Snapshot
     from taichi_ants.task import Task
+    from taichi_ants.worlds.snapshot import Snapshot
     from taichi_ants.worlds.world import World
 
 Counts = Mapping[str, Any]

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.checks import checked_seeds, checked_share
-from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_array, checked_whole, expect
 from taichi_ants.files import PathLike, smallest
 from taichi_ants.files.archives import Kind
+from taichi_ants.records import Record
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.world import World

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from taichi_ants.engines.records import Record
 from taichi_ants.measures.series import Series
 from taichi_ants.measures.tidy import Measured, Tidy, seed_array
+from taichi_ants.records import Record
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -13,11 +13,11 @@ import numpy as np
 
 from taichi_ants import checks, runtime
 from taichi_ants.engines.layout import OUTCOMES, STEPS, TRACE
-from taichi_ants.engines.records import Record
 from taichi_ants.engines.runs.engine import Launcher, Progress, Runs, pieces
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.records import Record
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
 from taichi_ants.task.events import Event

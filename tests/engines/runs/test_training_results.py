@@ -24,9 +24,9 @@ from taichi_ants import (
     train,
     worlds,
 )
-from taichi_ants.engines.records import same
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.files import archives
+from taichi_ants.records import same
 
 CONFIGS = (
     TrainingConfig("sarsa", 0.1, 0.9, 0.5, 0.99),
