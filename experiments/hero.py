@@ -26,6 +26,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants import Colony, Interventions, TrainingConfig, World, task
     from taichi_ants.grid.hexgrid import AxialGrid, centre_of
     from taichi_ants.interventions import Place
+    from taichi_ants.records import Snapshot
     from taichi_ants.rendering import text
     from taichi_ants.rendering.colours import Mark, channels
     from taichi_ants.rendering.rasteriser import draw_marks, marks
@@ -33,7 +34,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.command_line import Parser, run_command
     from taichi_ants.task.constants import FOOD, OBSTACLE
     from taichi_ants.task.events import Event
-    from taichi_ants.worlds.snapshot import Snapshot
 
 ROOT = Path(__file__).parents[1]
 # The dots of an ant, (x, y, radius) in sizes of a hexagon: it looks along y.

@@ -19,10 +19,11 @@ import taichi_ants
 # From the ground up: a part imports parts of lower layers only. Each part stands here.
 LAYERS = (
     {"errors", "environment", "subnormals"},
-    {"files", "grid", "records", "registry", "settings"},
+    {"files", "grid", "registry", "settings"},
     {"rules"},
     {"task"},
     {"runtime", "worlds", "learners"},
+    {"records"},
     {"checks", "measures"},
     {"interventions"},
     {"protocol"},

@@ -29,9 +29,9 @@ from taichi_ants.envs.vector import (
     task_of,
 )
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
+from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
 from taichi_ants.worlds import text_map
-from taichi_ants.worlds.snapshot import Snapshot
 
 DELIVERIES = ("terminates", "truncates", "continues")
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "ansi"], "render_fps": 10}
@@ -56,25 +56,27 @@ _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64
 class LoneAnts(Ants):
     """Many ants, each alone in its world; a single launch steps all of them."""
 
-    def __init__(self, n: int, task: Rules | None, delivery: str | None, given: Arguments) -> None:
+    def __init__(
+        self, n: int, task: Rules | None, delivery: str | None, arguments: Arguments
+    ) -> None:
         task = checks.checked_runs_task(task_of(task))
         checks.check_given_actions(task)
-        super().__init__(n, task, given, METADATA["render_modes"])
+        super().__init__(n, task, arguments, METADATA["render_modes"])
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size
         if n > most:
             raise AntsError(f"num_envs is {n}; it must be at most {most} for a world of this size.")
-        self._text = given.render_mode == "ansi"
+        self._text = arguments.render_mode == "ansi"
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, self.evaporates
         )
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
         """Begin an episode of the ants `which`, bool (n,), with their seeds if they have one."""
-        given = {i: one for i, one in enumerate(seeds) if which[i] and one is not None}
-        if given:
-            self.batched.seed(list(given.values()), np.array(list(given)))
+        seed_of = {i: seed for i, seed in enumerate(seeds) if which[i] and seed is not None}
+        if seed_of:
+            self.batched.seed(list(seed_of.values()), np.array(list(seed_of)))
         self.batched.begin(which)
 
     def advance(
@@ -144,9 +146,9 @@ class LoneAnts(Ants):
 
 def _text_of(now: Snapshot) -> str:
     """Return a text map, see `worlds.text_map`; the heading of the ant marks its cell."""
-    where = [(now.grid.exists & (now.ground == kind), mark) for kind, mark in _GROUNDS.items()]
-    where.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
-    marks = [(now.grid.cells(np.flatnonzero(cells)), mark) for cells, mark in where]
+    marked = [(now.grid.exists & (now.ground == kind), mark) for kind, mark in _GROUNDS.items()]
+    marked.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
+    marks = [(now.grid.cells(np.flatnonzero(cells)), mark) for cells, mark in marked]
     on_trail = now.trail[now.ant_cells[0]] > 0
     letters = text_map.ANTS_ON_TRAIL if on_trail else text_map.ANTS
     marks.append((now.grid.cells(now.ant_cells), letters[now.ant_headings[0]]))
@@ -208,8 +210,8 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
     ) -> None:
-        given = Arguments(world, max_steps, observation_format, evaporation, render_mode)
-        self._ants = LoneAnts(1, task, delivery, given)
+        arguments = Arguments(world, max_steps, observation_format, evaporation, render_mode)
+        self._ants = LoneAnts(1, task, delivery, arguments)
         self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
         self._begun = False
@@ -309,8 +311,8 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         max_episode_steps: int | None = None,
     ) -> None:
         n = checked_whole("num_envs", num_envs)
-        given = Arguments(
+        arguments = Arguments(
             world, max_steps, observation_format, evaporation, render_mode, max_episode_steps
         )
-        ants = LoneAnts(n, task, delivery, given)
+        ants = LoneAnts(n, task, delivery, arguments)
         super().__init__(ants, n, n, autoreset_mode, render_mode)

@@ -49,10 +49,10 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> No
     """
     with writing(path):
         target = _target_of(path)
-        with unfinished(target) as place:
-            with open(place, "wb") as file:
+        with unfinished(target) as temporary:
+            with open(temporary, "wb") as file:
                 writer(file)
-            os.replace(place, target)
+            os.replace(temporary, target)
 
 
 @contextmanager
@@ -64,28 +64,28 @@ def unfinished(target: Path) -> Iterator[Path]:
     """
     # A hash, because the name itself can already have the greatest length allowed.
     name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
-    for left in _left_in(target.parent):
+    for leftover in _left_in(target.parent):
         with suppress(OSError):
             if (
-                left.name.startswith(f".{name}.")
-                and time.time() - left.stat().st_mtime > _ABANDONED
+                leftover.name.startswith(f".{name}.")
+                and time.time() - leftover.stat().st_mtime > _ABANDONED
             ):
-                _remove(left)
-    place = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
+                _remove(leftover)
+    temporary = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
     try:
-        yield place
+        yield temporary
     finally:
         with suppress(OSError):
-            _remove(place)
+            _remove(temporary)
 
 
 def _left_in(folder: Path) -> list[Path]:
     """Return the unfinished files that a folder had at most a minute ago."""
-    when, found = _listed.get(folder, (0.0, []))
+    when, names = _listed.get(folder, (0.0, []))
     if not when or time.monotonic() - when > _LISTED_FOR:
-        found = list(folder.glob(".*.tmp"))
-        _listed[folder] = time.monotonic(), found
-    return found
+        names = list(folder.glob(".*.tmp"))
+        _listed[folder] = time.monotonic(), names
+    return names
 
 
 def _remove(path: Path) -> None:
@@ -105,7 +105,7 @@ def check_writable_file(path: PathLike) -> Path:
         target = _target_of(path)
         folder = target.parent
         if not os.path.islink(path):
-            folder = next(one for one in target.parents if one.exists())
+            folder = next(parent for parent in target.parents if parent.exists())
         _try_to_write(folder)
     return Path(path)
 
@@ -203,8 +203,8 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
             raise OSError("it contains a null character")
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         no_wait = getattr(os, "O_NONBLOCK", 0)
-        place = inputs.place_of(path)
-        with open(place, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
+        copy = inputs.place_of(path)
+        with open(copy, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise OSError("it is a device or a pipe")

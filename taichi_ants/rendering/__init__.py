@@ -6,6 +6,7 @@
 - `save_picture` and `save_animation` write arrays to files, which appear only once complete.
 """
 
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering.scene import Scene, Status
 from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames, picture
 from taichi_ants.rendering.writers import (
@@ -15,7 +16,6 @@ from taichi_ants.rendering.writers import (
     save_animation,
     save_picture,
 )
-from taichi_ants.worlds.snapshot import Snapshot
 
 __all__ = [
     "PAUSE",

@@ -12,10 +12,10 @@ import numpy.typing as npt
 from taichi_ants import runtime
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
-from taichi_ants.worlds.snapshot import Snapshot
 
 # Sizes of hexagons are in pixels, from the centre to a corner.
 # At this size and above, food and queen are drawings on a light background. In smaller cells, food

@@ -9,6 +9,7 @@ import numpy as np
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks, numbered
@@ -16,7 +17,6 @@ from taichi_ants.task import Observation, Pheromone, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.field import COMPASS, TRAIL
 from taichi_ants.task.states import TASK_NAMES
-from taichi_ants.worlds.snapshot import Snapshot
 
 PAPER = observations.get("paper")
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096

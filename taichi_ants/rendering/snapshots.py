@@ -18,10 +18,10 @@ from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, Status, name_parts
 from taichi_ants.task import Observation, Task
 from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS, N_ACTIONS
-from taichi_ants.worlds.snapshot import Snapshot
 from taichi_ants.worlds.world import World
 
 CaptionedSnapshot = tuple[Snapshot, Status]

@@ -336,7 +336,7 @@ def test_a_change_is_undone_and_the_session_before_comes_back(page, room):
     page.press("Shift+ArrowRight")
     wait(page, "viewer.history.frames.at(-1).tick === 10")
     assert page.tab.is_disabled("#undo")
-    assert page.tab.is_hidden("#go-back") == (room._former is None)
+    assert page.tab.is_hidden("#go-back") == (room._previous is None)
     ground = room.session.colony.snapshot().ground
     page.press("2", "]")
     page.tab.mouse.move(*place(page, cell_of(room, 5, 5, 0)))
@@ -378,12 +378,12 @@ def test_undo_undoes_what_was_done_a_moment_ago(page, room):
     epsilon = room.session.colony.epsilon
     page.read(f"(slider => ({slid}, slider.{undo}))(byId('set-epsilon'))")
     wait(page, BEGUN)
-    assert room._former.edits == [(0, {"epsilon": {"value": 0.5}})]
+    assert room._previous.edits == [(0, {"epsilon": {"value": 0.5}})]
     assert room.session.colony.epsilon == epsilon
     page.press("2")
     page.read(f"live.tools.down({cell_of(room, 5, 5, 0)}), document.body.{undo}")
     wait(page, BEGUN)
-    assert [name for _, edit in room._former.edits for name in edit] == ["place"]
+    assert [name for _, edit in room._previous.edits for name in edit] == ["place"]
     assert_same(page, room)
     page.tab.click("#play")
     wait(page, "live.running")

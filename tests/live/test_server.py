@@ -202,7 +202,7 @@ def test_all_pages_see_the_world_of_the_engine(room):
 
 def test_a_page_that_is_slow_is_told_less_and_then_all(room):
     with Guest(room) as slow, Guest(room) as quick:
-        for _ in range(3 * server._MOST_UNSEEN):
+        for _ in range(3 * server._MOST_IN_FLIGHT):
             quick.seen(1)
             quick.ask("step", ticks=1)
             quick.until("frame")
@@ -212,8 +212,8 @@ def test_a_page_that_is_slow_is_told_less_and_then_all(room):
         slow.until("state")
         while slow.state["ticks"] < room.session.ticks:
             slow.until("state")
-        assert len(slow.frames) == server._MOST_UNSEEN
-        slow.seen(server._MOST_UNSEEN)
+        assert len(slow.frames) == server._MOST_IN_FLIGHT
+        slow.seen(server._MOST_IN_FLIGHT)
         slow.until("whole")
         assert_same(slow, room.session)
         slow.ask("step", ticks=1)
@@ -620,7 +620,7 @@ def test_pages_are_answered_quickly_while_any_file_loads(room, tmp_path):
             guest.until("state")
             slowest = max(slowest, time.monotonic() - asked)
         assert slowest < 0.3 * crowding()
-        process = room._works["load"]._process
+        process = room._jobs["load"]._process
         guest.ask("cancel", kind="load")
         guest.until("cancelled")
         process.join(2)
@@ -715,7 +715,7 @@ def test_a_file_that_is_made_can_be_cancelled(room, endless):
         while not other.state["works"]:
             other.until("state")
         assert other.state["works"][0]["kind"] == "gif"
-        making = room._works["gif"]
+        making = room._jobs["gif"]
         other.ask("cancel", kind="gif")
         both(guest, other, "cancelled")
         for page in (guest, other):
@@ -729,7 +729,7 @@ def test_a_file_that_is_made_can_be_cancelled(room, endless):
         guest.close()  # nobody waits for it any more
         while other.state["works"] or other.state["pages"] > 1:
             other.until("state")
-        assert not room._works
+        assert not room._jobs
 
 
 @pytest.mark.slow
@@ -807,9 +807,9 @@ def test_the_fastest_pages_see_moments_from_inside_episodes(room):
 )
 def test_frames_show_the_phases_of_episodes_in_turn(piece, length, steps):
     room = SimpleNamespace(
-        _piece=piece, session=SimpleNamespace(setup=SimpleNamespace(ticks_per_episode=length))
+        _frame_steps=piece, session=SimpleNamespace(setup=SimpleNamespace(ticks_per_episode=length))
     )
-    assert server.SessionServer._leap(room) == steps
+    assert server.SessionServer._steps_per_frame(room) == steps
 
 
 def test_pages_are_told_that_kernels_are_prepared(room):

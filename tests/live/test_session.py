@@ -149,7 +149,7 @@ def test_changes_are_undone_one_by_one(name):
 @pytest.mark.parametrize("name", MARKED)
 def test_a_snapshot_gives_the_same_bits_as_a_replay_from_the_start(name, monkeypatch):
     """Undoing takes no tick, however long the session was, and leaves the session as it is."""
-    monkeypatch.setattr(session_module, "_BETWEEN", 0.0)
+    monkeypatch.setattr(session_module, "_SNAPSHOT_INTERVAL", 0.0)
     session = with_edits(SETUPS[name], 25, seed=3)
     stands = session.interventions.state()
     with monkeypatch.context() as still:
@@ -176,8 +176,8 @@ def test_snapshots_are_bounded_by_time_and_memory(monkeypatch):
     for _ in range(20):
         session.apply({"episode": {}})
     few = len(session._snapshots)
-    assert few < 1 + session._spent / session_module._BETWEEN
-    monkeypatch.setattr(session_module, "_BETWEEN", 0.0)
+    assert few < 1 + session._spent / session_module._SNAPSHOT_INTERVAL
+    monkeypatch.setattr(session_module, "_SNAPSHOT_INTERVAL", 0.0)
     monkeypatch.setattr(session_module, "_MOST_KEPT", 200_000)
     for _ in range(60):
         session.advance(5)
@@ -248,7 +248,7 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
     for step in range(90):
         if step == 45:
             late = [session.snapshot()]
-            header["names"] |= session.news()
+            header["names"] |= session.new_state_names()
         frame = session.advance()
         if step % 3 == 0:
             first.append(frame)
@@ -281,12 +281,12 @@ def test_states_have_names_before_they_are_seen_on_pages():
     session = Session(setup)
     names = dict(session.header()["names"])
     assert 0 < len(names) < session.colony.task.n_states
-    session.news()
+    session.new_state_names()
     for _ in range(20):
         session.advance()
-        names |= session.news()
+        names |= session.new_state_names()
         assert set(session.colony.states[session.colony.living].tolist()) <= names.keys()
-    assert session.news() == {}
+    assert session.new_state_names() == {}
     assert session.header()["names"] == names
 
 

@@ -69,11 +69,6 @@ def test_an_observation_of_ones_own_is_known_by_its_name():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"name": "two words"}, "the name of the observation is 'two words'; it must"),
-        (
-            {"name": "paper"},
-            "'paper' is the name of a built-in observation, which",
-        ),
         ({"n_states": 0}, "n_states of 'mine' is 0; it must lie between 1"),
         ({"encode": 3}, "encode of 'mine' is 3; it must be a function of one argument"),
         ({"encode": lambda view, more: 0}, "it must be a function of one argument"),

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import HEADING_STEPS
 from taichi_ants.task.constants import EMPTY
@@ -45,16 +44,6 @@ def test_the_cells_of_a_small_map() -> None:
     )
 
 
-def test_the_papers_world_round_trip() -> None:
-    drawn = to_text(worlds.paper())
-    assert from_text(drawn) == worlds.paper()
-    lines = drawn.splitlines()
-    assert lines[0] == "trail = 25"
-    assert lines[1].strip() == "F"
-    assert lines[-1].strip() == "Q"
-    assert lines[-3].split() == [".", "a", "."]
-
-
 @pytest.mark.parametrize(
     "changed",
     [
@@ -90,22 +79,16 @@ def test_settings() -> None:
             r"line 2, column 3 of the map has 'x'; use only \. # t, F G H I, Q R S U, 0 to 5",
         ),
         ("; c\nQ\n\t.", r"line 3, column 1 of the map has '\\t'; use only"),
-        ("Q\n  6", "line 2, column 3 of the map has '6'"),
-        ("Q\n  ö", "line 2, column 3 of the map has 'ö'"),
         ("Q\n  \ud800", r"line 2, column 3 of the map has '\\ud800'"),
         ("Q   .\n  .\n.  .", "line 3, column 4 of the map has '.', which is between two cells"),
         (
             "..\n    Q   .\n  .   .\n",
             "line 1, column [12] of the map has '.', which is between two cells",
         ),
-        ("Q . .   .   .", "line 1, column 3 of the map has '.', which is between"),
         ("Q\n .", "of the map has '[Q.]', which is between"),
         ("trail = -1\nQ", "line 1 of the map sets trail to '-1'; .* from 1 to 1000000000"),
-        ("trail = 0\nQ", "line 1 of the map sets trail to '0'"),
         ("trail = 1000000001\nQ", "sets trail to '1000000001'"),
         ("trail = ٣\nQ", "sets trail to '٣'"),
-        ("trail =\nQ", "sets trail to ''"),
-        ("trail = 1 2\nQ", "sets trail to '1 2'"),
         (
             "; c\ntrails = 3\nQ",
             "line 2 of the map sets 'trails'; the only settings are trail and region",
@@ -119,12 +102,6 @@ def test_damaged_maps(text: str, message: str) -> None:
     with pytest.raises(AntsError, match=message) as caught:
         from_text(text)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("text", [None, b"Q", 5, ["Q"]])
-def test_a_map_is_text(text: object) -> None:
-    with pytest.raises(AntsError, match=f"{type(text).__name__}; it must be text"):
-        from_text(text)
 
 
 def test_several_trail_levels_cannot_be_drawn() -> None:
@@ -175,11 +152,8 @@ def test_the_examples_of_the_guide_work() -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "map.txt has no cells"),
         (b"\x89PNG\r\n\x1a\n", "map.txt' is not UTF-8 text"),
         (b"Q\n\x00\n", r"line 2, column 1 of .*map.txt has '\\x00'"),
-        ("Q\n  .".encode("utf-16"), "map.txt' is not UTF-8 text"),
-        (b"Q\n  x", "line 2, column 3 of .*map.txt has 'x'"),
     ],
 )
 def test_damaged_files(tmp_path: Path, content: bytes, message: str) -> None:
@@ -209,21 +183,14 @@ def test_errors_name_the_line_of_the_file_whatever_stands_above(above: str) -> N
         assert lines[1] == lines[0] + above.count("\n")
 
 
-@pytest.mark.parametrize("world", [None, 3, "paper", RING])
-def test_only_worlds_are_drawn(world: object) -> None:
-    with pytest.raises(AntsError, match=r"world is .*; it must be a World"):
-        to_text(world)
-
-
 def test_files_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(AntsError, match=r"cannot read .*nothing\.txt': no such file"):
         load_map(tmp_path / "nothing.txt")
     with pytest.raises(AntsError, match=r"cannot read .*: is a directory"):
         load_map(tmp_path)
-    with pytest.raises(AntsError, match="path is 5; it must be text or a path"):
-        load_map(5)
-    with pytest.raises(AntsError, match=r"cannot read .*: file name too long"):
-        load_map("x" * 10_000)
+    for call in (load_map, from_text, to_text):
+        with pytest.raises(AntsError, match="must be"):
+            call(5)
 
     def refuse(*arguments: object) -> None:
         raise PermissionError(13, "Permission denied")

@@ -38,20 +38,6 @@ def test_names_and_seeds() -> None:
     assert worlds.build("paper", 3) == worlds.paper()
 
 
-def test_worlds_of_ones_own_are_replaced_and_built_in_ones_are_not() -> None:
-    worlds.register("tiny", lambda seed: worlds.paper())
-    worlds.register("tiny", tiny)
-    assert worlds.build("tiny") == tiny(0)
-    with pytest.raises(AntsError, match="'paper' is the name of a built-in world, which cannot be"):
-        worlds.register("paper", tiny)
-
-
-@pytest.mark.parametrize("name", ["", "  ", None, 3])
-def test_a_name_is_text(name: object) -> None:
-    with pytest.raises(AntsError, match="must be text"):
-        worlds.register(name, tiny)
-
-
 def test_a_builder_builds_worlds() -> None:
     with pytest.raises(AntsError, match="must be a function of a seed"):
         worlds.register("tiny", worlds.paper())
@@ -78,7 +64,7 @@ def test_names_go_before_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert worlds.build("other").grid.count == 1
 
 
-@pytest.mark.parametrize("name", ["papr", "", "Paper", None, 4, "x" * 5000, "a\0b"])
+@pytest.mark.parametrize("name", ["papr", None, "x" * 5000, "a\0b"])
 def test_unknown_names_list_the_known_ones(name: object) -> None:
     known = r"choose one of double_bridge, far_piles, open, paper|must be text or a path"
     with pytest.raises(AntsError, match=known):
@@ -89,9 +75,3 @@ def test_unknown_names_list_the_known_ones(name: object) -> None:
 def test_missing_files_are_named(path: object) -> None:
     with pytest.raises(AntsError, match=f"no world '{path}'.*; .* path of a map file that exists"):
         worlds.build(path)
-
-
-@pytest.mark.parametrize("seed", [1.0, "1", None])
-def test_a_seed_is_whole(seed: object) -> None:
-    with pytest.raises(AntsError, match="seed is"):
-        worlds.build("paper", seed)

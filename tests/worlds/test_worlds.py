@@ -223,15 +223,6 @@ def test_ants_that_are_spread_start_on_any_free_cells_by_the_seed(seed: int) -> 
         world.start(seed, 2, "moon")
 
 
-@pytest.mark.parametrize(
-    ("seed", "n", "named"),
-    [(0, 0, "n is 0"), (0, -1, "n is -1"), (0, 1.0, "n is 1.0"), (0.5, 1, "seed is 0.5")],
-)
-def test_start_refuses_what_is_no_count_or_seed(seed: object, n: object, named: str) -> None:
-    with pytest.raises(AntsError, match=named):
-        small().start(seed, n)
-
-
 def test_reachable_foods() -> None:
     # A corridor: queen, empty, food, food, empty, food.
     corridor = World((8, 1, 1), (0, 0, 0), foods=[(2, 0, 0), (3, 0, 0), (5, 0, 0)])

@@ -128,7 +128,7 @@ class Variant:
         self.n_groups = self.n_nests * max(1, self.n_castes)  # in a world: nests by castes
         self.has_foods, self.has_loads = features.has_foods, features.has_loads
         # Whether deliveries are counted by nest and kind.
-        self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
+        self.counts_by_nest_and_kind = self.n_nests > 1 or self.n_kinds > 1
         # Only then can slots before the last ant be vacant; see `ColonyState.slots_matter`.
         self.slots_matter = features.ants_change or features.own_tables or features.is_given_actions
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
@@ -143,14 +143,14 @@ class Variant:
         self.field_numbers = {name: number for number, name in enumerate(features.fields)}
         # Whether pheromones are laid one after the other, because rules of deposits read others.
         lay = [rule for rule in features.rules if rule.kind == "deposit"]
-        self.lays_apart = any(rule.fields for rule in lay)
+        self.lays_in_turn = any(rule.fields for rule in lay)
         self.reads_stimulus = any("stimulus" in rule.inputs for rule in features.rules)
         self.learner = None if learner is None else checked_plugin(learner)
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
-        self.alone = learner is not None and self.own_tables
+        self.independent = learner is not None and self.own_tables
         self.together = learner is not None and not self.own_tables
-        self.begins = self.alone and learner.begin is not None
+        self.begins = self.independent and learner.begin is not None
         self.plans_together = self.together and learner.plans
         if learner is not None:
             self.read_rates = read_rates(learner.hyperparameters)
@@ -195,7 +195,7 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
     if v.traffic.shared:
         yield Phase(ANTS, steps.resolve)
     yield Phase(ANTS, steps.act)
-    if v.lays_apart:
+    if v.lays_in_turn:
         for number in range(len(v.pheromones)):
             yield Phase(ANTS, steps.lays_field(number))
     if v.dense:
@@ -341,9 +341,9 @@ def read_ahead(c: ti.template()):
 
 
 @ti.func
-def world_of(i, parts, lanes):
+def world_of(i, parts, threads):
     """Return the world of part i: threads that take successive parts get distant worlds."""
-    return (i % lanes) * (parts // lanes) + i // lanes
+    return (i % threads) * (parts // threads) + i // threads
 
 
 @cache
@@ -392,8 +392,8 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
             if ti.static(waits):
                 part = ti.cast(ti.atomic_add(c.barrier[Barrier.STARTED], 1), ti.i32)
             else:
-                part = world_of(i, parts, c.orders[Order.LANES])
-                n = ti.select(part < c.n_worlds, n, 0)  # the last lane can have fewer worlds
+                part = world_of(i, parts, c.orders[Order.THREADS])
+                n = ti.select(part < c.n_worlds, n, 0)  # the last thread can have fewer worlds
             for _ in range(n):
                 for group in ti.static(groups):
                     at = share(group, c, part, parts, at)

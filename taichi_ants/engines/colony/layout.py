@@ -99,7 +99,7 @@ class Order(IntEnum):
 
     TICKS = 0  # the number of ticks
     PARTS = auto()  # the number of parts of the work
-    LANES = auto()  # the number of threads among which independent worlds are dealt, see `ticks`
+    THREADS = auto()  # the number of threads among which independent worlds are dealt, see `ticks`
     FIRST = auto()  # the first group of phases that is not done yet
     SPINS = auto()  # the number of checks for the other parts before the first part gives up
     PASSED = auto()  # not a parameter: the ticks since `ColonyState.ticks` was 0, which it counts
@@ -130,7 +130,7 @@ class CasteRow(IntEnum):
     LAYS = auto()  # a bit for each pheromone
     CUES = auto()  # the number of its cues in `Task.all_cues`
     LIFESPAN = auto()  # -1 if it does not die
-    QUIT = auto()  # 0 without a threshold
+    STOP_PROBABILITY = auto()  # 0 without a threshold
     DISTRIBUTION = auto()  # of thresholds, a number in `DISTRIBUTIONS`
     VALUE = auto()
     SPREAD = auto()

@@ -2,7 +2,7 @@
 
 A rule of choice reads what the ant sees before its action. A rule of deposits that reads other
 pheromones reads those that ants lay before it with the deposits of this tick, see
-`Variant.lays_apart`. A rule of rewards runs when the ant observes at the end of a tick, before it
+`Variant.lays_in_turn`. A rule of rewards runs when the ant observes at the end of a tick, before it
 learns, so it reads levels after the tick.
 """
 

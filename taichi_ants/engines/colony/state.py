@@ -47,13 +47,12 @@ from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
-from taichi_ants.records import same
+from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.caste import chances_in, numbers_in
 from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
-from taichi_ants.worlds.snapshot import Snapshot
 from taichi_ants.worlds.world import Start, World
 
 State = TypeVar("State", bound="ColonyState")

@@ -34,7 +34,9 @@ class Timetable:
                 self._at.setdefault(tick, []).append((number, event))
         self._stops = sorted(self._at)
         self._measures = {
-            one.measure: measures.get(one.measure) for one in self._events if isinstance(one, When)
+            event.measure: measures.get(event.measure)
+            for event in self._events
+            if isinstance(event, When)
         }
         if self._events:
             self._check_colony()
@@ -45,14 +47,15 @@ class Timetable:
         for event in self._events:
             length = None if colony.ends_at_delivery else self._length
             check_room(event, self._events, colony.task, colony.ants, colony.capacity, length)
-            for one in event.interventions:
-                if isinstance(event, When) and one.in_all_worlds and len(colony.worlds) > 1:
+            for intervention in event.interventions:
+                everywhere = isinstance(event, When) and intervention.in_all_worlds
+                if everywhere and len(colony.worlds) > 1:
                     raise AntsError(
-                        f"`when.{one.path}` would change all {len(colony.worlds)} worlds of the "
-                        "colony, which share it; make a colony with a single seed."
+                        f"`when.{intervention.path}` would change all {len(colony.worlds)} worlds "
+                        "of the colony, which share it; make a colony with a single seed."
                     )
                 learns = colony.learns or colony.is_given_actions
-                one.check_in(colony.worlds[0], colony.task, learns)
+                intervention.check_in(colony.worlds[0], colony.task, learns)
 
     def __enter__(self) -> None:
         if not self._events:
@@ -61,7 +64,9 @@ class Timetable:
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
         self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
-        replaces = any(isinstance(x, SetPolicy) for one in self._events for x in one.interventions)
+        replaces = any(
+            isinstance(x, SetPolicy) for event in self._events for x in event.interventions
+        )
         self._q = colony.arrays["q"].copy() if replaces else None
 
     def __exit__(self, *_: object) -> None:
@@ -100,7 +105,7 @@ class Timetable:
             return
         self._interventions.worlds = tuple(np.flatnonzero(worlds).tolist())
         try:
-            for one in event.interventions:
-                one.apply(self._interventions)
+            for intervention in event.interventions:
+                intervention.apply(self._interventions)
         except AntsError as error:
             raise AntsError(f"after {colony.ticks} ticks, {error}") from error

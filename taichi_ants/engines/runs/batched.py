@@ -13,8 +13,8 @@ from taichi_ants.engines.layout import Command, unpack_cells
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
+from taichi_ants.records import Snapshot
 from taichi_ants.task import Task
-from taichi_ants.worlds.snapshot import Snapshot
 from taichi_ants.worlds.world import World
 
 _STEPS_OF_LAUNCH = 1 << 23  # of all ants in a rollout; a launch cannot be interrupted

@@ -256,7 +256,7 @@ def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers)
                     assert_equal(colony, plain)
             colony.end_episode()
             plain.end_episode()
-            record, nests_of = plain.records[-1], [nest for nest, _ in plain.records[-1].apart]
+            record, nests_of = plain.records[-1], [nest for nest, _ in plain.records[-1].delivered]
             happened += [
                 record.births > 0,
                 record.deaths > 0,

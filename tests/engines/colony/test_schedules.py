@@ -71,14 +71,14 @@ def test_threads_take_distant_worlds(n_worlds, threads, monkeypatch):
     state.arrays = {"orders": np.zeros(len(Order), int), "barrier": np.zeros(24, int)}
     state.orders = lambda: state.arrays["orders"].tolist()
     stepping.Stepper().advance(state, 5)
-    ((_, parts, lanes, *_),) = orders
-    found = [kernels.world_of.__wrapped__(part, parts, lanes) for part in range(parts)]
+    ((_, parts, n_threads, *_),) = orders
+    found = [kernels.world_of.__wrapped__(part, parts, n_threads) for part in range(parts)]
     assert sorted(one for one in found if one < n_worlds) == list(range(n_worlds))
-    assert lanes == min(threads, n_worlds)
-    for first in range(0, parts, lanes):
-        together = sorted(found[first : first + lanes])  # worlds that threads take at a time
-        assert all(np.diff(together) == parts // lanes)
-    assert parts - n_worlds < lanes
+    assert n_threads == min(threads, n_worlds)
+    for first in range(0, parts, n_threads):
+        together = sorted(found[first : first + n_threads])  # worlds that threads take at a time
+        assert all(np.diff(together) == parts // n_threads)
+    assert parts - n_worlds < n_threads
 
 
 def test_threads_that_do_not_come_are_not_waited_for_without_end(monkeypatch):
