@@ -211,8 +211,12 @@ def _zones(bridge: dict[str, Any]) -> np.ndarray:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the script."""
-    again = command_line.AGAIN
-    command_line.run_command(lambda: run_study(parse_arguments(arguments), __file__), again)
+    command_line.run_command(lambda: start(arguments), command_line.AGAIN)
+
+
+def start(arguments: list[str] | None = None) -> None:
+    """Run the study, or show its results if it is finished."""
+    run_study(parse_arguments(arguments), __file__)
 
 
 if __name__ == "__main__":

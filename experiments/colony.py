@@ -483,8 +483,12 @@ def main(arguments: list[str] | None = None) -> None:
     words = sys.argv[1:] if arguments is None else arguments
     if words[:1] == ["live"]:
         commands.run("colony", words)
-    again = command_line.AGAIN
-    command_line.run_command(lambda: run_study(parse_arguments(words), __file__), again)
+    command_line.run_command(lambda: start(words), command_line.AGAIN)
+
+
+def start(arguments: Sequence[str]) -> None:
+    """Run the study, or show its results if it is finished."""
+    run_study(parse_arguments(arguments), __file__)
 
 
 if __name__ == "__main__":
