@@ -26,12 +26,16 @@ with stoppable():  # Ctrl-C also works during these slow imports
         WINDOWS,
         Design,
         bridges,
+        draw,
+        draw_late,
         length,
-        write_results,
+        report,
+        rows,
     )
     from colony import learning, scheduled
 
-    from taichi_ants import AntsError, Colony, Life, Task
+    from taichi_ants import AntsError, Colony, Life, Task, files
+    from taichi_ants.analysis import style
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command import run_study
@@ -158,8 +162,14 @@ def tables(plan: Plan, results: Results) -> str:
         }
         for row, design in enumerate(plan.points)
     }
-    seeds = plan.study.seeds
-    return write_results(results.folder, found, seeds, plan.ticks, draws=results.figures)
+    table = rows(found, plan.study.seeds, plan.ticks)
+    files.write_csv(results.folder / "shares.csv", table, list(table[0]))
+    if results.figures:
+        folder = files.check_writable_folder(results.folder / "figures")
+        with style.all_or_none(folder):
+            draw(folder / "bridge.png", found, plan.ticks)
+            draw_late(folder / "late.png", found, plan.ticks)
+    return report(found, plan.ticks)
 
 
 def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:

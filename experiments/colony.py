@@ -4,8 +4,8 @@
 seeds, and writes tables, figures and findings to a folder. `live` runs a colony of any size, or
 many in parallel, and can save, resume and draw it. See docs/colony_study.md.
 
-To add rules, add entries to `RULES` (`colony_findings`) and `TASKS`. To add a kind of world, add an
-entry to `WORLDS` there, and extend `place`.
+To add rules, name them in `colony_series.toml`, and add an entry to `TASKS`. To add a kind of
+world, name it there, and extend `world_of`.
 """
 
 from __future__ import annotations
@@ -25,38 +25,10 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from pathlib import Path
     from typing import Any
 
+    import colony_findings as study
     import numpy as np
     from colony_figures import draw_all
-    from colony_findings import (
-        ABC,
-        ABC_SILENT,
-        ABROAD,
-        ALONE,
-        BC,
-        EVALUATION_EPSILON,
-        FEW,
-        JOINT,
-        PAPER,
-        QUEUES,
-        RULES,
-        SILENT,
-        SOME,
-        WORLD_KINDS,
-        WORLDS,
-        A,
-        Condition,
-        Judged,
-        Measured,
-        Results,
-        difference_rows,
-        found,
-        glance,
-        headlines,
-        means,
-        of_largest,
-        on_one_screen,
-        rows_of_seeds,
-    )
+    from colony_findings import JOINT, WORLD_KINDS, WORLDS, Condition, Results
 
     from taichi_ants import (
         AntsError,
@@ -114,18 +86,18 @@ _SILENT, _LIVELY = Pheromone(deposit="none"), Life(regrowth=0)
 TASKS: dict[str, Task] = {
     rules: replace(task, evaporation_in_training=True, life=_LIVELY)
     for rules, task in {
-        PAPER: paper(),
-        SILENT: replace(paper(), pheromone=_SILENT),
-        A: replace(paper(), pheromone=foraging().pheromone),
-        BC: replace(foraging(), pheromone=paper().pheromone),
-        ABC: foraging(),
-        ABC_SILENT: replace(foraging(), pheromone=_SILENT),
-        QUEUES: queueing(),
+        study.PAPER: paper(),
+        study.SILENT: replace(paper(), pheromone=_SILENT),
+        study.A: replace(paper(), pheromone=foraging().pheromone),
+        study.BC: replace(foraging(), pheromone=paper().pheromone),
+        study.ABC: foraging(),
+        study.ABC_SILENT: replace(foraging(), pheromone=_SILENT),
+        study.QUEUES: queueing(),
     }.items()
 }
 # Rules whose policies are also evaluated with more ants, and in other worlds, than in training.
-COMPARED = (PAPER, ABC, QUEUES)
-TRAINED_WITH = {ALONE: 1, FEW: 4, SOME: 16}
+COMPARED = (study.PAPER, study.ABC, study.QUEUES)
+TRAINED_WITH = {study.ALONE: 1, study.FEW: 4, study.SOME: 16}
 OPEN, LARGE_SIZE = "open", 1000
 POOL, FIRST_OF_POOL = 64, 1 << 20  # number of worlds for training, and the first one's seed
 EXPLORING = 0.7  # the share of training episodes in which epsilon and the learning rate decrease
@@ -257,7 +229,8 @@ def plan(options: Mapping[str, Any]) -> Plan:
             f"learner {training.learner!r} has no TD error that can be summed over ants, which "
             f"a shared table requires; choose one of {', '.join(able)}."
         )
-    training = scheduled(replace(training, min_epsilon=EVALUATION_EPSILON), options["episodes"])
+    training = replace(training, min_epsilon=study.EVALUATION_EPSILON)
+    training = scheduled(training, options["episodes"])
     names = "episodes", "ticks", "rollouts"
     several = tuple(options["world_kinds"]), tuple(options["sizes"])
     conditions = conditions_of(*several, training, **{name: options[name] for name in names})
@@ -296,7 +269,7 @@ def conditions_of(
             where: Any = {"world": places[world_kind], "task": task_in(world_kind, after.task)}
             n = LARGE_SIZE if world_kind == "large" else sizes[-1]
             abroad = replace(after, **where, pool=None, ants=n, episodes=0, after=after)
-            conditions[Condition(world_kind, rules, ABROAD, abroad.ants)] = abroad
+            conditions[Condition(world_kind, rules, study.ABROAD, abroad.ants)] = abroad
     return conditions
 
 
@@ -320,7 +293,7 @@ def measured(
 
 def with_bounds(
     conditions: Conditions, values: Mapping[Any, Mapping[str, np.ndarray]], seeds: Sequence[int]
-) -> Measured:
+) -> study.Measured:
     """Return all measures, float64 (seeds,), of all conditions from those of the points.
 
     Bounds are nan if food moves or takes time to grow back, because no bound is known.
@@ -350,8 +323,8 @@ def tables(plan: Plan, runs: Runs) -> str:
 
     The policies are those of median seeds.
     """
-    study, folder, present = runs.study, runs.folder, np.all(runs.present, axis=1)
-    place_of = {point: place for place, point in enumerate(study.points)}
+    folder, seeds, present = runs.folder, runs.study.seeds, np.all(runs.present, axis=1)
+    place_of = {point: place for place, point in enumerate(runs.study.points)}
     conditions = {
         condition: point
         for condition, point in plan.conditions.items()
@@ -361,35 +334,35 @@ def tables(plan: Plan, runs: Runs) -> str:
         raise AntsError("no condition has all of its runs yet; wait for the first ones.")
     arrays = runs.read(*COLONY)
     of_points = {p: {n: a[row] for n, a in arrays.items()} for p, row in place_of.items()}
-    values = with_bounds(conditions, of_points, study.seeds)
+    values = with_bounds(conditions, of_points, seeds)
     results = Results.of(values)
     for name, table in (
-        ("seeds.csv", rows_of_seeds(values, study.seeds)),
+        ("seeds.csv", study.rows_of_seeds(values, seeds)),
         ("conditions.csv", [one.columns() for one in results.rows]),
-        ("differences.csv", difference_rows(results.judged)),
+        ("differences.csv", study.difference_rows(results.judged)),
     ):
         files.write_csv(folder / name, table, list(table[0]))
-    files.write_text(folder / "findings.md", markdown(found(*results)))
+    files.write_text(folder / "findings.md", markdown(study.found(*results)))
     policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:
             q_values = runs.read("q_values", points=[place_of[point]])["q_values"][0]
             order = np.argsort(values[condition]["deliveries"], kind="stable")
-            run = int(order[(len(study.seeds) - 1) // 2])
+            run = int(order[(len(seeds) - 1) // 2])
             policies[condition] = q_values[run]
             delivered = values[condition]["deliveries"][run]
-            save(folder, condition, point, study.seeds[run], q_values[run], delivered)
+            save(folder, condition, point, seeds[run], q_values[run], delivered)
     parts: dict[str, Any] = {"drawings": [], "players": []}
     if runs.figures:
         with style.all_or_none(folder / "figures"):
             style.save_all(draw_all(results.rows), folder / "figures")
             parts["drawings"] = drawings(draw_all(results.rows))
-            parts["players"] = at_work(conditions, policies, study.seeds[0])
-    facts = setting_facts(settings_of(study.points, study.seeds))
+            parts["players"] = at_work(conditions, policies, seeds[0])
+    facts = setting_facts(settings_of(runs.study.points, seeds))
     parts["facts"] = {**facts, **made_facts(runs.made)}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
     files.write_text(folder / PAGE, colony_page(results, **parts, files=links))
-    return plain_text(on_one_screen(*results), width=79)
+    return plain_text(study.on_one_screen(*results), width=79)
 
 
 def save(
@@ -423,17 +396,17 @@ def colony_page(results: Results, **parts: Any) -> str:
         byline=f"{seeds}, {count(len(rows), 'condition')}, "
         f"{count(len(world_kinds), 'kind')} of world",
         seeds=seeds,
-        epsilon=f"{EVALUATION_EPSILON:g}",
+        epsilon=f"{study.EVALUATION_EPSILON:g}",
         worlds=[words for name, words in WORLD_KINDS.items() if name in world_kinds],
-        headlines=headlines(*results),
+        headlines=study.headlines(*results),
         findings=_statements(judged),
-        glance=glance(rows),
-        tables=means(rows),
+        glance=study.glance(rows),
+        tables=study.means(rows),
         **parts,
     )
 
 
-def _statements(judged: Judged) -> Statements:
+def _statements(judged: study.Judged) -> Statements:
     lines = []
     for (world_kind, series), by_sizes in judged.items():
         unit = COLONY[series.measure].label
@@ -442,7 +415,7 @@ def _statements(judged: Judged) -> Statements:
             for (n, less), one in by_sizes.items()
         ]
         facts = {"Question": series.question, "Difference in": unit}
-        verdicts = [of_largest(by_sizes).verdict]
+        verdicts = [study.of_largest(by_sizes).verdict]
         statement = f"{sentence(series.statement)}."
         lines.append(Statement(statement, sentence(WORLDS[world_kind]), verdicts, facts, told))
     return Statements(("Statement", "World", "Largest colony"), lines, "statements")
@@ -470,7 +443,7 @@ def at_work(
             q_values=policies[condition],
         )
         colony.begin_episode()
-        rules = RULES[condition.rules]
+        rules = study.RULES[condition.rules]
         recording = record_colony(colony, SHOWN_TICKS, title=rules)
         done = count(int(colony.outcome().deliveries.sum()), "delivery")
         words = f"{count(ants, 'ant')} in {WORLD_KINDS[world_kind]}: {done} in {SHOWN_TICKS} ticks."

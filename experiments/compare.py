@@ -279,7 +279,7 @@ def write_tables(
     lines, audit = table2(comparison, summaries), assess(comparison)
     for name, rows in {
         "summary": [one.columns() for one in summaries],
-        "behaviours": [one.columns() for one in summarise_behaviours(comparison)],
+        "behaviours": summarise_behaviours(comparison),
         "table2": [one.columns() for one in lines],
         "claims": claims_rows(audit),
         "baselines": [one._asdict() for one in baselines],
