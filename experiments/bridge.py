@@ -17,21 +17,13 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from functools import partial
     from typing import Any
 
+    import bridge_report as shown
     import numpy as np
-    from bridge_report import (
-        BRIDGES,
-        DESIGNS,
-        LATE,
-        LOADS,
-        WINDOWS,
-        Design,
-        bridges,
-        length,
-        write_results,
-    )
-    from colony import learning, scheduled
+    from bridge_report import BRIDGES, DESIGNS, LATE, LOADS, WINDOWS, Design, bridges
+    from colony import LEARNING, scheduled
 
-    from taichi_ants import AntsError, Colony, Life, Task
+    from taichi_ants import AntsError, Colony, Life, Task, files
+    from taichi_ants.analysis import style
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command import run_study
@@ -93,7 +85,7 @@ def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
     """
     right, left, *_ = bridges(design).values()
     pool = double_bridge(**right), double_bridge(**left)
-    several = pool[0], task(design), scheduled(learning(), episodes), pool, design.ants
+    several = pool[0], task(design), scheduled(LEARNING, episodes), pool, design.ants
     return ColonyPoint(*several, episodes=episodes, ticks=ticks, rollouts=1)
 
 
@@ -104,10 +96,6 @@ class Plan:
     study: Study
     points: Mapping[Design, ColonyPoint]
     ticks: int
-
-    def facts(self) -> dict[str, Any]:
-        """Return facts for the manifest of the results."""
-        return {"evaluation_ticks": self.ticks}
 
 
 def plan(options: Mapping[str, Any]) -> Plan:
@@ -140,7 +128,7 @@ def crossed(
         each = [slice(s, s + 1) for s in range(len(seeds))] if late else [slice(None)]
         for some in each:
             colony = learned.colony(world, seeds[some], q_values[some], False, schedule="by_world")
-            parts.append(crossings(colony, bridge, length(name, ticks), ticks if late else 0))
+            parts.append(crossings(colony, bridge, shown.length(name, ticks), ticks if late else 0))
         array = np.moveaxis(np.concatenate(parts, axis=-1), -1, 0)[None]
         found[f"crossings_{ticks}.{BRIDGES.index(name)}"] = array
     return found
@@ -158,8 +146,14 @@ def tables(plan: Plan, results: Results) -> str:
         }
         for row, design in enumerate(plan.points)
     }
-    seeds = plan.study.seeds
-    return write_results(results.folder, found, seeds, plan.ticks, draws=results.figures)
+    table = shown.rows(found, plan.study.seeds, plan.ticks)
+    files.write_csv(results.folder / "shares.csv", table, list(table[0]))
+    if results.figures:
+        folder = files.check_writable_folder(results.folder / "figures")
+        with style.all_or_none(folder):
+            shown.draw(folder / "bridge.png", found, plan.ticks)
+            shown.draw_late(folder / "late.png", found, plan.ticks)
+    return shown.report(found, plan.ticks)
 
 
 def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:
@@ -174,7 +168,13 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.
     """
-    zone, n_worlds = _zones(bridge), len(colony.seeds)
+    # The room or branch of each cell; a junction belongs to its room.
+    grid, junctions = double_bridge(**bridge).grid, junction_cells(**bridge)
+    pile = grid.distances(tuple((junctions[1] + junctions[0]).tolist()))
+    zone = np.where(pile <= ROOM_RADIUS + 1, _FOOD_ROOM, _QUEEN_ROOM)
+    for number, cells in zip((_SHORT, _LONG), branch_cells(**bridge), strict=True):
+        zone[grid.index(cells)] = number
+    n_worlds = len(colony.seeds)
     world = np.repeat(np.arange(n_worlds), colony.capacity)
     counts = np.zeros((WINDOWS, len(LOADS), 2, n_worlds), np.int64)
     room, branch = np.full(len(world), _QUEEN_ROOM), np.full(len(world), _SHORT)
@@ -198,21 +198,14 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     return counts
 
 
-def _zones(bridge: dict[str, Any]) -> np.ndarray:
-    """Return the room or branch of each cell; a junction belongs to its room."""
-    grid, junctions = double_bridge(**bridge).grid, junction_cells(**bridge)
-    zone = np.full(grid.size, _QUEEN_ROOM)
-    pile = junctions[1] + junctions[0]
-    zone[grid.distances(tuple(pile.tolist())) <= ROOM_RADIUS + 1] = _FOOD_ROOM
-    for number, cells in zip((_SHORT, _LONG), branch_cells(**bridge), strict=True):
-        zone[grid.index(cells)] = number
-    return zone
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run the script."""
-    again = command_line.AGAIN
-    command_line.run_command(lambda: run_study(parse_arguments(arguments), __file__), again)
+    command_line.run_command(lambda: start(arguments), command_line.AGAIN)
+
+
+def start(arguments: list[str] | None = None) -> None:
+    """Run the study, or show its results if it is finished."""
+    run_study(parse_arguments(arguments), __file__)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@
 seeds, and writes tables, figures and findings to a folder. `live` runs a colony of any size, or
 many in parallel, and can save, resume and draw it. See docs/colony_study.md.
 
-To add rules, add entries to `RULES` (`colony_findings`) and `TASKS`. To add a kind of world, add an
-entry to `WORLDS` there, and extend `place`.
+To add rules, name them in `colony_series.toml`, and add an entry to `TASKS`. To add a kind of
+world, name it there, and extend `world_of`.
 """
 
 from __future__ import annotations
@@ -25,45 +25,14 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from pathlib import Path
     from typing import Any
 
+    import colony_findings as study
     import numpy as np
     from colony_figures import draw_all
-    from colony_findings import (
-        ABC,
-        ABC_SILENT,
-        ABROAD,
-        ALONE,
-        BC,
-        EVALUATION_EPSILON,
-        FEW,
-        JOINT,
-        PAPER,
-        QUEUES,
-        RULES,
-        SILENT,
-        SOME,
-        WORLD_KINDS,
-        WORLDS,
-        A,
-        Condition,
-        Judged,
-        Measured,
-        Results,
-        difference_rows,
-        found,
-        glance,
-        headlines,
-        means,
-        of_largest,
-        on_one_screen,
-        rows_of_seeds,
-    )
+    from colony_findings import JOINT, WORLD_KINDS, WORLDS, Condition, Results
 
     from taichi_ants import (
         AntsError,
         Colony,
-        Life,
-        Pheromone,
-        Task,
         TrainingConfig,
         World,
         commands,
@@ -79,15 +48,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.errors import count
     from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import COLONY, Run, values_of
-    from taichi_ants.report.page import (
-        Player,
-        Shown,
-        Statement,
-        Statements,
-        fill,
-        made_facts,
-        setting_facts,
-    )
+    from taichi_ants.report import page
     from taichi_ants.settings import nested
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command import run_study
@@ -96,10 +57,11 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.folder import Results as Runs
     from taichi_ants.studies.points import ColonyPoint, Drawn, settings_of
     from taichi_ants.studies.study import Study
-    from taichi_ants.task import foraging, paper, queueing
+    from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
     from taichi_ants.viewer import record_colony
 
 VERSION = 1  # of the arrays that are kept of each run
+LEARNING = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)  # without the decays that `scheduled` adds
 QUICK = {
     **{"world_kinds": ("paper", "open", "piles"), "sizes": (1, 16, 64), "seeds": 8},
     **{"episodes": 20, "ticks": 500, "rollouts": 2},
@@ -114,20 +76,20 @@ _SILENT, _LIVELY = Pheromone(deposit="none"), Life(regrowth=0)
 TASKS: dict[str, Task] = {
     rules: replace(task, evaporation_in_training=True, life=_LIVELY)
     for rules, task in {
-        PAPER: paper(),
-        SILENT: replace(paper(), pheromone=_SILENT),
-        A: replace(paper(), pheromone=foraging().pheromone),
-        BC: replace(foraging(), pheromone=paper().pheromone),
-        ABC: foraging(),
-        ABC_SILENT: replace(foraging(), pheromone=_SILENT),
-        QUEUES: queueing(),
+        study.PAPER: paper(),
+        study.SILENT: replace(paper(), pheromone=_SILENT),
+        study.A: replace(paper(), pheromone=foraging().pheromone),
+        study.BC: replace(foraging(), pheromone=paper().pheromone),
+        study.ABC: foraging(),
+        study.ABC_SILENT: replace(foraging(), pheromone=_SILENT),
+        study.QUEUES: queueing(),
     }.items()
 }
 # Rules whose policies are also evaluated with more ants, and in other worlds, than in training.
-COMPARED = (PAPER, ABC, QUEUES)
-TRAINED_WITH = {ALONE: 1, FEW: 4, SOME: 16}
+COMPARED = (study.PAPER, study.ABC, study.QUEUES)
+TRAINED_WITH = {study.ALONE: 1, study.FEW: 4, study.SOME: 16}
 OPEN, LARGE_SIZE = "open", 1000
-POOL, FIRST_OF_POOL = 64, 1 << 20  # number of worlds for training, and the first one's seed
+_POOL = range(1 << 20, (1 << 20) + 64)  # seeds of the worlds for training
 EXPLORING = 0.7  # the share of training episodes in which epsilon and the learning rate decrease
 OPTIMISM = 10.0  # the initial action value, above most true values
 # Kinds of world in which food moves or takes time to grow back.
@@ -169,7 +131,7 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     )
     add("--quick", action="store_true", help=quick)
     parser.open_settings, parser.own_settings = ("training",), _PLANNED
-    command_line.add_settings(parser, learning())
+    command_line.add_settings(parser, LEARNING)
     command_line.add_common(parser)
     command_line.add_machines(parser)
     command_line.add_results(parser, "colony")
@@ -182,11 +144,6 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
 
 
 # Training, worlds and rules of each condition.
-
-
-def learning() -> TrainingConfig:
-    """Return the default training, without the decays, which `scheduled` adds."""
-    return TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)
 
 
 def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
@@ -221,14 +178,6 @@ def world_of(world_kind: str) -> World | Drawn:
     return Drawn.by("open", ranges=ranges, rock_share=0.3 if world_kind == "rocks" else 0.15)
 
 
-def pool_of(world_kind: str) -> tuple[World, ...] | None:
-    """Return the worlds for training in a kind; None in the paper's world."""
-    drawn = world_of(world_kind)
-    if not isinstance(drawn, Drawn):
-        return None
-    return tuple(drawn.of(seed) for seed in range(FIRST_OF_POOL, FIRST_OF_POOL + POOL))
-
-
 @dataclass(frozen=True)
 class Plan:
     """The study of some conditions, of kinds of world and numbers of ants."""
@@ -250,14 +199,15 @@ def plan(options: Mapping[str, Any]) -> Plan:
         AntsError: Ants cannot share a table with the learner.
     """
     given = nested({path: value for path, value in options.items() if "." in path})
-    training = learning().replace(**given.get("training", {}))
+    training = LEARNING.replace(**given.get("training", {}))
     if learners.get(training.learner).td_error is None:
         able = [name for name in learners.names() if learners.get(name).td_error]
         raise AntsError(
             f"learner {training.learner!r} has no TD error that can be summed over ants, which "
             f"a shared table requires; choose one of {', '.join(able)}."
         )
-    training = scheduled(replace(training, min_epsilon=EVALUATION_EPSILON), options["episodes"])
+    training = replace(training, min_epsilon=study.EVALUATION_EPSILON)
+    training = scheduled(training, options["episodes"])
     names = "episodes", "ticks", "rollouts"
     several = tuple(options["world_kinds"]), tuple(options["sizes"])
     conditions = conditions_of(*several, training, **{name: options[name] for name in names})
@@ -276,7 +226,10 @@ def conditions_of(
     """
     kinds = dict.fromkeys([*world_kinds, OPEN])
     places = {world_kind: world_of(world_kind) for world_kind in kinds}
-    pools = {one: pool_of(one) for one in kinds if one in WORLD_KINDS}
+    pools: dict[str, tuple[World, ...] | None] = {}  # for training; None in the paper's world
+    for one in WORLD_KINDS.keys() & places.keys():
+        place = places[one]
+        pools[one] = tuple(map(place.of, _POOL)) if isinstance(place, Drawn) else None
 
     def trained(world_kind: str, rules: str, ants: int) -> ColonyPoint:
         places_of = places[world_kind], TASKS[rules], training, pools[world_kind]
@@ -296,7 +249,7 @@ def conditions_of(
             where: Any = {"world": places[world_kind], "task": task_in(world_kind, after.task)}
             n = LARGE_SIZE if world_kind == "large" else sizes[-1]
             abroad = replace(after, **where, pool=None, ants=n, episodes=0, after=after)
-            conditions[Condition(world_kind, rules, ABROAD, abroad.ants)] = abroad
+            conditions[Condition(world_kind, rules, study.ABROAD, abroad.ants)] = abroad
     return conditions
 
 
@@ -320,7 +273,7 @@ def measured(
 
 def with_bounds(
     conditions: Conditions, values: Mapping[Any, Mapping[str, np.ndarray]], seeds: Sequence[int]
-) -> Measured:
+) -> study.Measured:
     """Return all measures, float64 (seeds,), of all conditions from those of the points.
 
     Bounds are nan if food moves or takes time to grow back, because no bound is known.
@@ -350,8 +303,8 @@ def tables(plan: Plan, runs: Runs) -> str:
 
     The policies are those of median seeds.
     """
-    study, folder, present = runs.study, runs.folder, np.all(runs.present, axis=1)
-    place_of = {point: place for place, point in enumerate(study.points)}
+    folder, seeds, present = runs.folder, runs.study.seeds, np.all(runs.present, axis=1)
+    place_of = {point: place for place, point in enumerate(runs.study.points)}
     conditions = {
         condition: point
         for condition, point in plan.conditions.items()
@@ -361,55 +314,42 @@ def tables(plan: Plan, runs: Runs) -> str:
         raise AntsError("no condition has all of its runs yet; wait for the first ones.")
     arrays = runs.read(*COLONY)
     of_points = {p: {n: a[row] for n, a in arrays.items()} for p, row in place_of.items()}
-    values = with_bounds(conditions, of_points, study.seeds)
+    values = with_bounds(conditions, of_points, seeds)
     results = Results.of(values)
     for name, table in (
-        ("seeds.csv", rows_of_seeds(values, study.seeds)),
+        ("seeds.csv", study.rows_of_seeds(values, seeds)),
         ("conditions.csv", [one.columns() for one in results.rows]),
-        ("differences.csv", difference_rows(results.judged)),
+        ("differences.csv", study.difference_rows(results.judged)),
     ):
         files.write_csv(folder / name, table, list(table[0]))
-    files.write_text(folder / "findings.md", markdown(found(*results)))
+    files.write_text(folder / "findings.md", markdown(study.found(*results)))
     policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:
             q_values = runs.read("q_values", points=[place_of[point]])["q_values"][0]
             order = np.argsort(values[condition]["deliveries"], kind="stable")
-            run = int(order[(len(study.seeds) - 1) // 2])
+            run = int(order[(len(seeds) - 1) // 2])
             policies[condition] = q_values[run]
-            delivered = values[condition]["deliveries"][run]
-            save(folder, condition, point, study.seeds[run], q_values[run], delivered)
+            metadata = {
+                **condition._asdict(),
+                **{"task": point.task.as_dict(), "training": point.training.as_dict()},
+                **{"seed": seeds[run], "episodes": point.episodes, "ticks": point.ticks},
+                "deliveries_per_1000_ticks": values[condition]["deliveries"][run],
+            }
+            path = files.check_writable_folder(folder / "policies")
+            path /= f"{condition.world_kind}_{condition.rules}_{condition.ants}.npz"
+            save_policy(path, q_values[run], metadata, point.task.observation)
     parts: dict[str, Any] = {"drawings": [], "players": []}
     if runs.figures:
         with style.all_or_none(folder / "figures"):
             style.save_all(draw_all(results.rows), folder / "figures")
             parts["drawings"] = drawings(draw_all(results.rows))
-            parts["players"] = at_work(conditions, policies, study.seeds[0])
-    facts = setting_facts(settings_of(study.points, study.seeds))
-    parts["facts"] = {**facts, **made_facts(runs.made)}
+            parts["players"] = at_work(conditions, policies, seeds[0])
+    facts = page.setting_facts(settings_of(runs.study.points, seeds))
+    parts["facts"] = {**facts, **page.made_facts(runs.made)}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
     files.write_text(folder / PAGE, colony_page(results, **parts, files=links))
-    return plain_text(on_one_screen(*results), width=79)
-
-
-def save(
-    folder: Path,
-    condition: Condition,
-    point: ColonyPoint,
-    seed: int,
-    q_values: np.ndarray,
-    delivered: float,
-) -> None:
-    """Write the policy of a seed of a condition."""
-    metadata = {
-        **condition._asdict(),
-        **{"task": point.task.as_dict(), "training": point.training.as_dict()},
-        **{"seed": seed, "episodes": point.episodes, "ticks": point.ticks},
-        "deliveries_per_1000_ticks": delivered,
-    }
-    name = f"{condition.world_kind}_{condition.rules}_{condition.ants}.npz"
-    path = files.check_writable_folder(folder / "policies") / name
-    save_policy(path, q_values, metadata, point.task.observation)
+    return plain_text(study.on_one_screen(*results), width=79)
 
 
 def colony_page(results: Results, **parts: Any) -> str:
@@ -417,40 +357,42 @@ def colony_page(results: Results, **parts: Any) -> str:
     rows, judged = results
     world_kinds = {row.condition.world_kind for row in rows}
     seeds = seeds_in_words(rows[0].seeds)
-    return fill(
+    return page.fill(
         Path(__file__).with_name("colony.html"),
         title="Which rules and which training make a colony deliver more?",
         byline=f"{seeds}, {count(len(rows), 'condition')}, "
         f"{count(len(world_kinds), 'kind')} of world",
         seeds=seeds,
-        epsilon=f"{EVALUATION_EPSILON:g}",
+        epsilon=f"{study.EVALUATION_EPSILON:g}",
         worlds=[words for name, words in WORLD_KINDS.items() if name in world_kinds],
-        headlines=headlines(*results),
+        headlines=study.headlines(*results),
         findings=_statements(judged),
-        glance=glance(rows),
-        tables=means(rows),
+        glance=study.glance(rows),
+        tables=study.means(rows),
         **parts,
     )
 
 
-def _statements(judged: Judged) -> Statements:
+def _statements(judged: study.Judged) -> page.Statements:
     lines = []
     for (world_kind, series), by_sizes in judged.items():
         unit = COLONY[series.measure].label
         told = [
-            Shown(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
+            page.Shown(
+                count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit
+            )
             for (n, less), one in by_sizes.items()
         ]
         facts = {"Question": series.question, "Difference in": unit}
-        verdicts = [of_largest(by_sizes).verdict]
+        verdicts = [study.of_largest(by_sizes).verdict]
         statement = f"{sentence(series.statement)}."
-        lines.append(Statement(statement, sentence(WORLDS[world_kind]), verdicts, facts, told))
-    return Statements(("Statement", "World", "Largest colony"), lines, "statements")
+        lines.append(page.Statement(statement, sentence(WORLDS[world_kind]), verdicts, facts, told))
+    return page.Statements(("Statement", "World", "Largest colony"), lines, "statements")
 
 
 def at_work(
     conditions: Conditions, policies: Mapping[Condition, np.ndarray], seed: int
-) -> list[Player]:
+) -> list[page.Player]:
     """Return recordings of the largest colony under each of the compared rules, in one world."""
     shown = [one for one in policies if one.ants <= MOST_SHOWN]
     if not shown:
@@ -470,11 +412,11 @@ def at_work(
             q_values=policies[condition],
         )
         colony.begin_episode()
-        rules = RULES[condition.rules]
+        rules = study.RULES[condition.rules]
         recording = record_colony(colony, SHOWN_TICKS, title=rules)
         done = count(int(colony.outcome().deliveries.sum()), "delivery")
         words = f"{count(ants, 'ant')} in {WORLD_KINDS[world_kind]}: {done} in {SHOWN_TICKS} ticks."
-        players.append(Player(sentence(rules), words, recording))
+        players.append(page.Player(sentence(rules), words, recording))
     return players
 
 
@@ -483,8 +425,12 @@ def main(arguments: list[str] | None = None) -> None:
     words = sys.argv[1:] if arguments is None else arguments
     if words[:1] == ["live"]:
         commands.run("colony", words)
-    again = command_line.AGAIN
-    command_line.run_command(lambda: run_study(parse_arguments(words), __file__), again)
+    command_line.run_command(lambda: start(words), command_line.AGAIN)
+
+
+def start(arguments: Sequence[str]) -> None:
+    """Run the study, or show its results if it is finished."""
+    run_study(parse_arguments(arguments), __file__)
 
 
 if __name__ == "__main__":

@@ -279,7 +279,7 @@ def write_tables(
     lines, audit = table2(comparison, summaries), assess(comparison)
     for name, rows in {
         "summary": [one.columns() for one in summaries],
-        "behaviours": [one.columns() for one in summarise_behaviours(comparison)],
+        "behaviours": summarise_behaviours(comparison),
         "table2": [one.columns() for one in lines],
         "claims": claims_rows(audit),
         "baselines": [one._asdict() for one in baselines],
@@ -321,11 +321,12 @@ def save_policies(folder: Path, comparison: Comparison, chosen: Sequence[Example
 def main(arguments: list[str] | None = None) -> None:
     """Run the script."""
     again = "Stopped; finished runs are saved. Run the same command again to resume."
-    command_line.run_command(lambda: start(parse_arguments(arguments)), again)
+    command_line.run_command(lambda: start(arguments), again)
 
 
-def start(settings: argparse.Namespace) -> None:
+def start(arguments: list[str] | None = None) -> None:
     """Run the comparison, or show its results if it is finished."""
+    settings = parse_arguments(arguments)
     is_new = settings.force or not (settings.out / MANIFEST).exists()
     # With --threads 1, there is no second process either.
     draws = is_new and not settings.no_figures and settings.threads != 1

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from paper.claims import Audit, headlines, tallies
 from paper.comparison import GREEDY_RETURN, GREEDY_STEPS, Comparison
 from paper.table2 import (
     FIGURES,
-    BehaviourMeans,
     Line,
 )
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
@@ -203,19 +203,22 @@ def greedy_table(lines: Sequence[Line]) -> Table:
     return Table(title, ("Learner", "Delivery", *means), rows, [note], 2)
 
 
-def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans]) -> Table:
+def behaviour_table(lines: Sequence[Line], behaviours: Sequence[Mapping[str, Any]]) -> Table:
     """Return a table of the behaviours of the final policies of `lines`."""
     returns = ("Return\nin training", "Return\nfollowed", "Return\ngreedy")
     headers = ("Learner", "Delivery", "Behaviour", "Runs", *returns)
-    shown = ("return_last50", "policy_return", "greedy_return")
+    shown = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
     rows = [
         [
-            *(line.label, line.delivery, BEHAVIOURS[one.behaviour], str(one.runs)),
-            *(number(one.means[name]) for name in shown),
+            line.label,
+            line.delivery,
+            one["behaviour"],
+            str(one["runs"]),
+            *(number(one[n]) for n in shown),
         ]
         for line in lines
         for one in behaviours
-        if one.row == line.summary.row
+        if one.items() >= line.summary.row.columns().items()
     ]
     notes = (
         "Each policy is followed greedily once, with evaporation as in training.",

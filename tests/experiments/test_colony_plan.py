@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from colony import (
     COMPARED,
-    POOL,
+    LEARNING,
     TASKS,
     conditions_of,
     greedy,
-    learning,
     plan,
     scheduled,
     with_bounds,
@@ -26,7 +25,7 @@ LENGTHS = {"episodes": 60, "ticks": 1000, "rollouts": 4}
 
 @pytest.fixture(scope="module")
 def planned():
-    training = scheduled(learning(), 60)
+    training = scheduled(LEARNING, 60)
     return conditions_of([*WORLD_KINDS, *ELSEWHERES], (1, 4, 16, 64), training, **LENGTHS)
 
 
@@ -53,7 +52,7 @@ def test_nobody_is_evaluated_where_it_was_trained(planned) -> None:
             assert point.pool is None
             assert point.world == worlds.paper()
         elif teacher.pool is not None:
-            assert len(set(teacher.pool)) == POOL
+            assert len(set(teacher.pool)) == 64
             seen = point.worlds(SEEDS)
             assert not set(seen if isinstance(seen, list) else [seen]) & set(teacher.pool)
 
