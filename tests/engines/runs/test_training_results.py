@@ -118,7 +118,7 @@ def test_results_compare_by_content(result):
 
 def test_configurations_that_follow_one_another_are_not_copied_to_be_trained():
     configs = [TrainingConfig("q_learning", rate, 0.9, 0.1, 1.0) for rate in (0.1, 0.2, 0.3)]
-    state = RunState.fresh(configs, (1, 2), 128)
+    state = RunState.initial(configs, (1, 2), 128)
     part = state.part(slice(1, 3))
     assert part.q.shape == (4, *state.q.shape[2:])
     part.q[:], part.epsilon[:] = 7, 0.5
