@@ -36,8 +36,8 @@ def check_rules(settings: argparse.Namespace) -> None:
 
     built_in = observations.names()
     load_plugin(settings.file)
-    own = [name for name in observations.names() if name not in built_in]
-    if not rules.names() and not own:
+    registered = [name for name in observations.names() if name not in built_in]
+    if not rules.names() and not registered:
         raise AntsError(
             f"the file {settings.file!r} registers no rules or observations; register one with "
             "taichi_ants.rules.register or taichi_ants.task.observations.register."
@@ -45,7 +45,7 @@ def check_rules(settings: argparse.Namespace) -> None:
     differs = False
     checks = chain(
         (check_rule(name, settings.inputs) for name in rules.names()),
-        (check_observation(name) for name in own),
+        (check_observation(name) for name in registered),
     )
     for check in checks:
         print(check, flush=True)

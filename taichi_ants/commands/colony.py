@@ -33,8 +33,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = command_line.Parser(__doc__)
     kinds = parser.add_subparsers(metavar="live", required=True)
     about = "run one colony, or many in parallel"
-    one = kinds.add_parser("live", help=about, description=f"{about.capitalize()}.")
-    _add_live(one)
+    live = kinds.add_parser("live", help=about, description=f"{about.capitalize()}.")
+    _add_live(live)
     settings, given = parser.parse_given(arguments)
     _check_live(settings, given, parser.error)
     return settings

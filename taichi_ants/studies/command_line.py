@@ -16,7 +16,7 @@ from taichi_ants.settings import DeclaredSetting, Named, Settings, declared, nes
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 if TYPE_CHECKING:
-    from taichi_ants import World
+    from taichi_ants.worlds.world import World
 
 EXIT_BAD_INPUT = 2
 MOST_SHARDS = 100_000

@@ -134,7 +134,7 @@ def _policy(path: Path) -> dict[str, Any]:
 
 def _training() -> TrainingResult:
     arrays = {name: np.ones((1, 1, 2), np.int32) for name in ("returns", "steps", "deliveries")}
-    state = RunState.fresh([SARSA], [0], TASK.n_states)
+    state = RunState.initial([SARSA], [0], TASK.n_states)
     return TrainingResult(WORLD, (SARSA,), (0,), 9, TASK, **arrays, seconds=1.0, state=state)
 
 
