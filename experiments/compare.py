@@ -106,19 +106,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 @dataclass(frozen=True)
 class Plan:
-    """The study of a comparison.
-
-    Attributes:
-        study: The points of the grid.
-        world_name: The name of the world for readers.
-        exact: A function that waits for the exact bounds.
-        renders: Whether figures come with animations.
-    """
+    """The study of a comparison: the points of the grid."""
 
     study: Study
-    world_name: str
-    exact: process.Begun
-    renders: bool
+    world_name: str  # for readers
+    exact: process.Begun  # waits for the exact bounds
+    renders: bool  # whether figures come with animations
 
 
 def plan(options: Mapping[str, Any]) -> Plan:
