@@ -117,7 +117,7 @@ class Variant:
         self.pheromones = tuple(zip(features.dense, features.views, strict=True))
         pairs = features.cues or ((features.outbound, features.homing),)
         self.cues = tuple(cues_of(features, *pair) for pair in pairs)
-        cues = {number for one in self.cues for number in (one.outbound, one.followed)}
+        cues = {number for cue in self.cues for number in (cue.outbound, cue.followed)}
         self.reads = features.reads
         self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
@@ -133,13 +133,13 @@ class Variant:
         self.slots_matter = features.ants_change or features.own_tables or features.is_given_actions
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
-        own, none = partial(own_rule, features.rules), ("",) * len(features.dense)
-        self.own_choice = own_inputs.choice(own(features.choice))
-        self.own_reward = own_inputs.reward(own(features.reward))
+        named, none = partial(own_rule, features.rules), ("",) * len(features.dense)
+        self.own_choice = own_inputs.choice(named(features.choice))
+        self.own_reward = own_inputs.reward(named(features.reward))
         self.has_own_choice = self.own_choice is not None
         self.has_own_reward = self.own_reward is not None
-        self.own_deposits = tuple(own_inputs.deposit(own(one)) for one in features.deposits or none)
-        self.own_evaporations = tuple(map(own, features.evaporations or none))
+        self.own_deposits = tuple(map(own_inputs.deposit, map(named, features.deposits or none)))
+        self.own_evaporations = tuple(map(named, features.evaporations or none))
         self.field_numbers = {name: number for number, name in enumerate(features.fields)}
         # Whether pheromones are laid one after the other, because rules of deposits read others.
         lay = [rule for rule in features.rules if rule.kind == "deposit"]
@@ -225,7 +225,7 @@ def planning_phases(v: Variant) -> Iterator[Phase]:
 def last_phases(v: Variant) -> Iterator[Phase]:
     """Yield the phases at the end of a tick."""
     if v.ants_change:
-        yield Phase(ANTS, life.retire)
+        yield Phase(ANTS, life.update_slots)
     yield Phase(WORLD, life.end_tick)
 
 
@@ -244,8 +244,8 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
                 phase.do(c, v, w, chunk, ant, tick)
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
-        for place in range(w * c.size + first, w * c.size + last * running):
-            phase.do(c, v, place, tick)
+        for index in range(w * c.size + first, w * c.size + last * running):
+            phase.do(c, v, index, tick)
     elif running == 1:
         phase.do(c, v, w, tick)
 
