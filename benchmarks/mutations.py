@@ -142,12 +142,7 @@ MUTATIONS = [
     ("task/rules/delivery.py", "(action == GIVE) & (", "(action == GIVE) | (", RUNS),
     ("task/rules/delivery.py", "turns_at_queen == 1", "turns_at_queen == 0", RUNS),
     ("task/rules/delivery.py", "(is_last | delivered &", "(is_last & delivered &", RUNS),
-    (
-        "task/rules/pheromone.py",
-        "ti.min(level + p.deposit_level, p.cap)",
-        "level + p.deposit_level",
-        COLONY,
-    ),
+    ("task/rules/pheromone.py", "ti.min(level + p.deposit_level, p.cap)", "p.cap", COLONY),
     ("task/rules/pheromone.py", "ti.min(carried, p.fades_after)", "carried", CONFLICTS),
     ("task/rules/pheromone.py", "if after < 1.0:", "if after < 0.5:", COLONY),
     ("task/rules/pheromone.py", "levels[neighbour] * share", "level * share", COLONY),
