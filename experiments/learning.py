@@ -29,10 +29,10 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.command_line import (
         Parser,
         given_world,
-        load_plugin,
         run_command,
         whole_number,
     )
+    from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import Rewards, Task
     from taichi_ants.task.constants import N_ACTIONS
     from taichi_ants.task.events import Event

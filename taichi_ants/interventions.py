@@ -43,7 +43,6 @@ from taichi_ants.task.field import TRAIL
 from taichi_ants.task.pheromone import MAX_DEPOSIT
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.grid.hexgrid import AxialGrid
     from taichi_ants.worlds.world import World
 
@@ -128,8 +127,8 @@ class Intervention(ShorthandSettings):
                 "numbered from 0; choose one of them."
             )
 
-    def apply(self, to: Interventions) -> None:
-        """Apply the change; AntsError if a world does not allow it."""
+    def apply(self, to: Any) -> None:
+        """Apply the change to an `Interventions`; AntsError if a world does not allow it."""
         raise NotImplementedError
 
 
@@ -188,7 +187,7 @@ class RemoveAnts(OfAnts, path="remove_ants"):
     cells: Annotated[Sequence | None, _CELLS] = None
     nest: Annotated[int | None, Setting("nest of the ants; any if left out", least=0)] = None
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         if self.cells is None:
             to.remove_some(self.number, self.share, self.nest)
         else:
@@ -213,7 +212,7 @@ class AddAnts(OfAnts, path="add_ants"):
     ] = None
     nest: Annotated[int | None, Setting("nest of the new ants", least=0)] = None
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         if self.cells is None:
             to.add_some(self.number, self.share, self.heading, self.nest)
         else:
@@ -255,7 +254,7 @@ class Place(OfCells, path="place"):
         if self.kind is not None:
             check_one_of("`place.kind`", self.kind, tuple(task.foods))
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         cells = to.index(self.cells)
         if self.what == "queen":
             to.move_queen(int(cells[0]), self.nest or 0)
@@ -284,7 +283,7 @@ class Move(OfCells, path="move"):
                 f"`move.cells` {has}; give the cell to move from, then the cell to move to."
             )
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         cell, target = (int(to.index([cell])[0]) for cell in self.cells)
         to.move(cell, target)
 
@@ -295,7 +294,7 @@ class Clear(OfCells, path="clear"):
 
     cells: Annotated[Sequence, _CELLS]
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.put(to.index(self.cells), EMPTY)
 
 
@@ -319,7 +318,7 @@ class SetTrail(OfCells, path="trail"):
         super().check_in(world, task, learns)
         check_one_of("`trail.field`", self.field, (TRAIL, *task.fields))
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         self.check_in(to.colony.worlds[0], to.colony.task, to.colony.learns)
         cells = to.everywhere() if self.cells is None else to.index(self.cells)
         to.lay_trail(cells, self.level, self.field)
@@ -337,7 +336,7 @@ class SetAnts(Intervention, path="ants"):
     def short(cls, value: Any) -> dict[str, Any] | None:
         return {"number": value} if isinstance(value, (int, np.integer)) else None
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_ants(self.number)
 
 
@@ -392,7 +391,7 @@ class SetTask(Intervention, path="task"):
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         check_same_kernels(task, self.changed(task), learns)
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_task(self.changed(to.colony.task))
 
 
@@ -412,7 +411,7 @@ class SetEpsilon(_Rate, path="epsilon"):
 
     value: Annotated[Share, Setting("exploration rate")]
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_epsilon(self.value)
 
 
@@ -425,7 +424,7 @@ class SetLearningRate(_Rate, path="learning_rate"):
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         check_learns(learns)
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_learning_rate(self.value)
 
 
@@ -477,7 +476,7 @@ class SetPolicy(Intervention, path="policy"):
         check_follows(learns, task)
         self.table_for(task)
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_policy(self.table_for(to.colony.task))
 
 
@@ -487,7 +486,7 @@ class Episode(Intervention, path="episode"):
 
     in_all_worlds = True
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.begin_episode()
 
 

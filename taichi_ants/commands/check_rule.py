@@ -13,6 +13,7 @@ from itertools import chain
 
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import whole_number
+from taichi_ants.studies.plugins import load_plugin
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -34,7 +35,7 @@ def check_rules(settings: argparse.Namespace) -> None:
     from taichi_ants.testing import check_observation, check_rule
 
     built_in = observations.names()
-    command_line.load_plugin(settings.file)
+    load_plugin(settings.file)
     registered = [name for name in observations.names() if name not in built_in]
     if not rules.names() and not registered:
         raise AntsError(

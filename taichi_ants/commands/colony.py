@@ -15,6 +15,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import whole_number
 from taichi_ants.studies.interruption import held
+from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Task, queueing
 
 if TYPE_CHECKING:
@@ -113,7 +114,7 @@ def live(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.one_colony import check_places, summary
     from taichi_ants.studies.one_colony import live as run
 
-    command_line.load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     files = settings.save, settings.render, settings.figure
     check_places(*files)
     if settings.resume:

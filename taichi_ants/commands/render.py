@@ -22,11 +22,11 @@ from taichi_ants.studies.command_line import (
     add_settings,
     given_settings,
     given_world,
-    load_plugin,
     progress_bar,
     run_command,
     whole_number,
 )
+from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Task
 
 if TYPE_CHECKING:

@@ -20,6 +20,7 @@ from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
 
 if TYPE_CHECKING:
+    from taichi_ants.records import Snapshot
     from taichi_ants.task import Task
     from taichi_ants.worlds.world import World
 

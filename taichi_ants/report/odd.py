@@ -16,6 +16,7 @@ from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
 from taichi_ants.measures import finished
 from taichi_ants.settings import DeclaredSetting, declared, flat
+from taichi_ants.studies.folder import INPUTS, asked_in, checksum_of
 from taichi_ants.studies.sweep_file import declaration_of
 from taichi_ants.task import observations
 
@@ -206,11 +207,17 @@ class Model:
 
 def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the ODD description of finished results, as Markdown."""
-    inputs, sums = manifest["inputs"], manifest["files"]
-    name = inputs.get(str(manifest["asked"]["options"].get("file")))
+    asked = asked_in(folder)
+    assert asked is not None  # because the results are finished
+    inputs = asked["inputs"]
+    name = inputs.get(str(asked["options"].get("file")))
     sweep = files.tomllib.loads(files.read_text(folder / name)) if name else {}
-    sources = [(f"`{path}`", f"`{sums[path][:16]}`") for path in inputs.values()]
-    return described(Model(manifest["settings"], sweep), manifest["command"], sources)
+    every = sorted(path for path in (folder / INPUTS).rglob("*") if path.is_file())
+    sources = [
+        (f"`{path.relative_to(folder).as_posix()}`", f"`{checksum_of(path)[:16]}`")
+        for path in every
+    ]
+    return described(Model(asked["settings"], sweep), manifest["command"], sources)
 
 
 def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from enum import IntEnum, auto
 
+import numpy as np
+
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
 
 # Columns are arrays with one entry for each slot. Small values that each tick uses take one byte,
 # which is a quarter of the memory traffic.
-INTEGER_COLUMNS = (
+_INTEGERS = (
     "cell",
     "carried",  # ticks since the pick-up of its food, or, if a field needs it, without food
     "number",  # -1 in a slot that was never used in this episode
@@ -17,7 +19,7 @@ INTEGER_COLUMNS = (
     "age",  # in ticks, if ants are born or die
     "reward",  # of the last action, if rewards are by your own rule
 )
-BYTE_COLUMNS = (
+_BYTES = (
     "heading",
     "carries",
     "stage",  # a `Stage`
@@ -31,7 +33,9 @@ BYTE_COLUMNS = (
     "caste",  # the number of its caste, with castes
     "idle",  # 1 if it does not forage, with `Labour`
 )
-FLOAT_COLUMNS = ("threshold",)  # the response threshold of its ant, with `Labour`
+_FLOATS = ("threshold",)  # the response threshold of its ant, with `Labour`
+COLUMNS: dict[type, tuple[str, ...]] = {np.int32: _INTEGERS, np.int8: _BYTES, np.float32: _FLOATS}
+ALL_COLUMNS = (*_INTEGERS, *_BYTES, *_FLOATS)
 
 
 class Stage(IntEnum):
