@@ -76,10 +76,12 @@ def shown(value: object, most: int = 80) -> str:
 
 
 def count(number_of: int, noun: str) -> str:
-    """Return a number with its noun: "1 seed", "2 seeds", "3 deliveries"."""
+    """Return a number with its noun: "1 seed", "2 days", "3 deliveries"."""
     if number_of == 1:
         return f"1 {noun}"
-    return f"{number_of} {noun[:-1]}ies" if noun.endswith("y") else f"{number_of} {noun}s"
+    if noun.endswith("y") and not noun.endswith(("ay", "ey", "oy", "uy")):
+        return f"{number_of} {noun[:-1]}ies"
+    return f"{number_of} {noun}s"
 
 
 def listing(names: Iterable[str], noun: str) -> str:

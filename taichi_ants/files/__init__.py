@@ -1,7 +1,7 @@
 """Atomic writing of files, and reading with limits on their size.
 
 All functions raise an AntsError that names the file if it cannot be written or read. `archives`
-stores arrays with metadata (.npz), and `results` manages folders of results.
+stores arrays with metadata (.npz), and `tables` writes typed columns.
 """
 
 from __future__ import annotations
@@ -141,54 +141,15 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     Raises ValueError if a row has a key that is not a column.
     """
 
-    write_atomically(path, lambda file: _write_rows(file, rows, columns, header=True))
-
-
-class GrowingTable:
-    """A file as `write_csv` writes it, to which rows are appended while others read it.
-
-    The file contains whole rows after each `append`. Raises AntsError if it cannot be written.
-    """
-
-    def __init__(self, path: PathLike, columns: Sequence[str]) -> None:
-        self._path, self._columns = path, columns
-        with writing(path):
-            Path(path).unlink(missing_ok=True)  # another process may write to it
-            self._file = open(path, "wb", buffering=0)  # noqa: SIM115
-        self.append((), header=True)
-
-    def __enter__(self) -> GrowingTable:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        self._file.close()
-
-    def append(self, rows: Iterable[Mapping[str, Any]], header: bool = False) -> None:
-        """Append rows, all at once."""
-        text = csv_text(rows, self._columns, header)
-        with writing(self._path):
-            self._file.write(text)
-
-
-def csv_text(
-    rows: Iterable[Mapping[str, Any]], columns: Sequence[str], header: bool = True
-) -> bytes:
-    """Return the text that `write_csv` writes, with or without the header."""
-    text = io.BytesIO()
-    _write_rows(text, rows, columns, header)
-    return text.getvalue()
-
-
-def _write_rows(
-    file: BinaryIO, rows: Iterable[Mapping[str, Any]], columns: Sequence[str], header: bool
-) -> None:
-    text = codecs.getwriter("utf-8")(file)
-    table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
-    if header:
+    def save(file: BinaryIO) -> None:
+        text = codecs.getwriter("utf-8")(file)
+        table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
         table.writeheader()
-    for row in rows:
-        values = {n: v.item() if isinstance(v, np.generic) else v for n, v in row.items()}
-        table.writerow({n: None if v != v else v for n, v in values.items()})
+        for row in rows:
+            values = {n: v.item() if isinstance(v, np.generic) else v for n, v in row.items()}
+            table.writerow({n: None if v != v else v for n, v in values.items()})
+
+    write_atomically(path, save)
 
 
 @contextmanager
@@ -244,12 +205,6 @@ def read_csv(path: PathLike) -> list[dict[str, Any]]:
         raise AntsError(f"{named(path)} is not a table (CSV); name another file.") from error
 
 
-def csv_columns(path: PathLike) -> list[str]:
-    """Return the names of the columns of a file that `write_csv` wrote."""
-    with opened(path) as file:
-        return next(csv.reader([file.readline().decode("utf-8", "replace")]), [])
-
-
 def smallest(array: np.ndarray) -> np.ndarray:
     """Return integers as an array of the smallest integer type that can hold them."""
     low, high = int(array.min(initial=0)), int(array.max(initial=0))
@@ -268,19 +223,6 @@ def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Pat
         folder.mkdir(parents=True, exist_ok=True)
         _try_to_write(folder)
     return folder
-
-
-def check_room(folder: PathLike, needed: int) -> None:
-    """Check that the disk of a folder has `needed` bytes free, before long work."""
-    with writing(folder):
-        free = shutil.disk_usage(folder).free
-    if needed > free:
-        from rich.filesize import decimal
-
-        raise AntsError(
-            f"this needs {decimal(needed)} on the disk of {named(folder)}, and {decimal(free)} "
-            "are free; free some space, write less, or choose another place."
-        )
 
 
 @contextmanager

@@ -65,7 +65,7 @@ def record(
     if isinstance(behaviour, TrainingConfig):
         configs = checks.checked_configs(behaviour)
         checks.check_choices(configs, task)
-        state = RunState.fresh(configs, numbers, task.n_states).part([0])
+        state = RunState.initial(configs, numbers, task.n_states).part([0])
         runs = Runs.learning(configs, numbers, state)
         facts = {"policy": "learner", **configs[0].as_dict()}
     else:

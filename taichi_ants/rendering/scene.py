@@ -116,7 +116,7 @@ class Scene:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
         strongest = checked_whole("strongest", strongest)
-        of_fields = {name: _scale(one) for name, one in task.fields.items()} if task else {}
+        of_fields = {name: _scale(field) for name, field in task.fields.items()} if task else {}
         self._foods = list(task.foods) if task else []
         width, height = check_size(size)
         expect("title", title, str)

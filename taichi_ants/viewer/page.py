@@ -121,7 +121,7 @@ def notebook(media: Any) -> str | None:
     if isinstance(media, World):
         return _image(media, picture(media)) if media.grid.size <= _MOST_CELLS else None
     if isinstance(media, Trace):
-        small = media.made is not None and len(media) <= _MOST_STEPS
+        small = media.arguments is not None and len(media) <= _MOST_STEPS
         return frame(record_trace(media)) if small else None
     expect("the object", media, Colony)
     if media.grid.size > _MOST_CELLS or media.ants > _MOST_ANTS or media.episode < 0:

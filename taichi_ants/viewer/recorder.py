@@ -398,7 +398,7 @@ def record_episode(episode: Episode, title: str = "") -> Recording:
 def record_trace(trace: Trace, title: str = "") -> Recording:
     """Return a recording of a `rollout` or `trace_training`; AntsError for any other trace."""
     expect("trace", trace, Trace)
-    arguments = trace.made
+    arguments = trace.arguments
     if arguments is None:
         raise AntsError(
             "the trace does not contain its world and settings, so it cannot be replayed; use a "

@@ -9,13 +9,12 @@ from functools import partial
 
 import numpy as np
 import pytest
-from colonies import GAMMA, act, begun, load, n_draws, training
+from colonies import GAMMA, act, begun, load, training
 from transitions import transition
 
-from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.learners.config import update_weights
 from taichi_ants.reference import LEARNERS
-from taichi_ants.reference.random_stream import RandomStream, stream_state
+from taichi_ants.reference.random_stream import RandomStream
 from taichi_ants.reference.sharing import SharedTable, mean_error
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
@@ -100,20 +99,6 @@ def test_the_weights():
     assert update_weights(1.0, 2).tolist() == [0, 1, 1]
     assert update_weights(1e-12, 2)[1] == np.float32(1e-12)
     assert update_weights(0.3, 0).tolist() == [0]
-
-
-# In the world: two ants want one cell, both by (0, forward).
-MEETING = World((5, 5, 5), (0, 0, 4), ants=[((0, 0, 0), 0), ((2, 0, 0), 3)])
-
-
-@pytest.mark.parametrize(("learner", "n"), [("sarsa", 3), ("dyna_q", 3), ("q_learning", 3)])
-def test_with_a_fixed_table_ants_draw_for_their_actions_alone(learner, n):
-    colony = begun(MEETING, training(learner), sharing="frozen", seed=4)
-    for _ in range(n):
-        colony.tick()
-    for number, ant in colony.ants.items():
-        assert n_draws(ant.stream.state, stream_state(4, STREAM_ANT, number)) == n
-        assert ant.chosen is None
 
 
 @pytest.mark.parametrize(("learner", "then"), [("sarsa", FORWARD), ("q_learning", LEFT)])

@@ -102,7 +102,7 @@ class Colony(TickingColony):
                 outcomes.append(self.outcome())
             self.end_episode()
         counts: dict[str, Any] = {
-            name: np.concatenate([getattr(one, name) for one in outcomes])
+            name: np.concatenate([getattr(outcome, name) for outcome in outcomes])
             for name, array in vars(outcomes[0]).items()
             if isinstance(array, np.ndarray)
         }

@@ -108,8 +108,7 @@ def cues_of(features: Features, outbound: int, homing: int) -> Cues:
 
 
 class Variant:
-    """The compile-time properties of a kernel, `v` in the functions of the colony: its features,
-    and what follows from them."""
+    """The compile-time properties of a kernel, `v` in functions: features and what follows."""
 
     def __init__(self, features: Features) -> None:
         vars(self).update(features._asdict())
@@ -118,7 +117,7 @@ class Variant:
         self.pheromones = tuple(zip(features.dense, features.views, strict=True))
         pairs = features.cues or ((features.outbound, features.homing),)
         self.cues = tuple(cues_of(features, *pair) for pair in pairs)
-        cues = {number for one in self.cues for number in (one.outbound, one.followed)}
+        cues = {number for cue in self.cues for number in (cue.outbound, cue.followed)}
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
         self.n_groups = self.n_nests * max(1, self.n_castes)  # in a world: nests by castes
@@ -126,13 +125,13 @@ class Variant:
         self.counts_by_nest_and_kind = self.n_nests > 1 or self.n_kinds > 1
         # Only then can slots before the last ant be vacant; see `ColonyState.slots_matter`.
         self.slots_matter = features.ants_change or features.own_tables or features.is_given_actions
-        own, none = partial(own_rule, features.rules), ("",) * len(features.dense)
-        self.own_choice = own_inputs.choice(own(features.choice))
-        self.own_reward = own_inputs.reward(own(features.reward))
+        named, none = partial(own_rule, features.rules), ("",) * len(features.dense)
+        self.own_choice = own_inputs.choice(named(features.choice))
+        self.own_reward = own_inputs.reward(named(features.reward))
         self.has_own_choice = self.own_choice is not None
         self.has_own_reward = self.own_reward is not None
-        self.own_deposits = tuple(own_inputs.deposit(own(one)) for one in features.deposits or none)
-        self.own_evaporations = tuple(map(own, features.evaporations or none))
+        self.own_deposits = tuple(map(own_inputs.deposit, map(named, features.deposits or none)))
+        self.own_evaporations = tuple(map(named, features.evaporations or none))
         self.field_numbers = {name: number for number, name in enumerate(features.fields)}
         # Whether pheromones are laid one after the other, because rules of deposits read others.
         lay = [rule for rule in features.rules if rule.kind == "deposit"]
@@ -217,7 +216,7 @@ def planning_phases(v: Variant) -> Iterator[Phase]:
 def last_phases(v: Variant) -> Iterator[Phase]:
     """Yield the phases at the end of a tick."""
     if v.ants_change:
-        yield Phase(ANTS, life.retire)
+        yield Phase(ANTS, life.update_slots)
     yield Phase(WORLD, life.end_tick)
 
 
@@ -236,8 +235,8 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
                 phase.do(c, v, w, chunk, ant, tick)
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
-        for place in range(w * c.size + first, w * c.size + last * running):
-            phase.do(c, v, place, tick)
+        for index in range(w * c.size + first, w * c.size + last * running):
+            phase.do(c, v, index, tick)
     elif running == 1:
         phase.do(c, v, w, tick)
 

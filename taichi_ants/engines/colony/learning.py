@@ -57,7 +57,7 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if columns.trait(c.stage, ant) == Stage.NEWBORN:
         columns.put(c.stage, ant, Stage.LIVING)
         if ti.static(v.independent):
-            forget(c, v, ant)
+            reset_slot(c, v, ant)
         if ti.static(v.has_labour):
             labour.begin(c, v, w, ant)
     see_anew(c, v, w, ant, tick)
@@ -97,7 +97,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     note_seen(c, v, ant, paper_state, state)
     if ti.static(v.has_labour):
         next_action = ti.select(stops, -1, next_action)
-        rest(c, v, ant, acts, stops)
+        make_idle(c, v, ant, acts, stops)
     if ti.static(v.draws_next_action):
         columns.put(c.next_action, ant, next_action)
 
@@ -112,7 +112,7 @@ def learns(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def rest(c: ti.template(), v: ti.template(), ant, acts, stops):
+def make_idle(c: ti.template(), v: ti.template(), ant, acts, stops):
     """Make a forager idle if it `stops`; an ant without an action has the last action -1."""
     if not acts:
         columns.put(c.action, ant, -1)
@@ -165,7 +165,7 @@ def begin_to_learn(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def forget(c: ti.template(), v: ti.template(), ant):
+def reset_slot(c: ti.template(), v: ti.template(), ant):
     """Reset the tables and the memory of a slot for a newborn ant."""
     at = memory_of(c, v, ant)
     for i in range(at.table, steps.table_of(c, v, ant + 1)):

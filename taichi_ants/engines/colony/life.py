@@ -1,7 +1,7 @@
 """Births, deaths, regrowth of food, and wandering food in a colony.
 
-`grow_old` and `retire` are phases of single ants, in parallel. The others process one whole world
-serially, because they have little to do in a tick.
+`grow_old` and `update_slots` are phases of single ants, in parallel. The others process a whole
+world serially, because they have little to do in a tick.
 """
 
 import taichi as ti
@@ -23,7 +23,7 @@ from taichi_ants.engines.colony.layout import (
     Tally,
     WorldRow,
 )
-from taichi_ants.engines.colony.learning import forget
+from taichi_ants.engines.colony.learning import reset_slot
 from taichi_ants.engines.colony.steps import tally
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
 from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN
@@ -126,7 +126,7 @@ def give_birth_in(c: ti.template(), v: ti.template(), w, nest):
             put(c.caste, w * c.n_slots + slot, draw_caste(c, v, w, nest))
         place_newborn(c, v, w, nest, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
         if ti.static(v.independent):
-            forget(c, v, w * c.n_slots + slot)
+            reset_slot(c, v, w * c.n_slots + slot)
         c.nests[NestRow.STORE, column] -= 1
         free = free_around(c, base, queen)
 
@@ -294,7 +294,7 @@ def can_move(c: ti.template(), w, source, step):
 
 
 @ti.func
-def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+def update_slots(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Free the slot of a dying ant, and let a newborn ant live, at the end of the tick."""
     if trait(c.stage, ant) == Stage.NEWBORN:
         put(c.stage, ant, Stage.LIVING)

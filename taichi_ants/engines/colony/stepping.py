@@ -33,21 +33,21 @@ class ThreadChoice:
 
     def __init__(self) -> None:
         self._launches = 0
-        self._paces: dict[int, float] = {}  # seconds per tick, by number of threads
+        self._seconds_per_tick: dict[int, float] = {}  # by number of threads
 
     def plan(self, ticks: int, most: int) -> tuple[int, int]:
         """Return the number of ticks for the next launch, and of threads, up to `most`."""
         if most == 1:
             return ticks, 1
         self._launches += 1
-        best, other = sorted((most, 1), key=lambda n: self._paces.get(n, math.inf))
+        best, other = sorted((most, 1), key=lambda n: self._seconds_per_tick.get(n, math.inf))
         if self._launches % _LAUNCHES_BETWEEN_PROBES == 2:
             return max(1, ticks // _LAUNCHES_BETWEEN_PROBES), other
         return ticks, best
 
-    def took(self, threads: int, seconds: float) -> None:
+    def record(self, threads: int, seconds: float) -> None:
         """Record the seconds per tick on a number of threads."""
-        self._paces[threads] = seconds
+        self._seconds_per_tick[threads] = seconds
 
 
 class Stepper:
@@ -100,7 +100,7 @@ class Stepper:
         compiled, began = "ticks" in self._launches, time.perf_counter()
         self._launch_ticks(state, n, threads)
         if compiled:
-            self.threads.took(threads, (time.perf_counter() - began) / n)
+            self.threads.record(threads, (time.perf_counter() - began) / n)
 
     def _launch_ticks(self, state: ColonyState, n: int, parts: int, threads: int = 1) -> None:
         """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""

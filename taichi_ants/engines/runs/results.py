@@ -67,7 +67,7 @@ class RunState(Record):
         )
 
     @classmethod
-    def fresh(
+    def initial(
         cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int
     ) -> RunState:
         """Return the state of new runs, with leading axes (configurations, seeds)."""

@@ -14,7 +14,7 @@ from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import GIVE, PICK_UP
 from taichi_ants.task.events import Event, Reason
-from taichi_ants.worlds import World, from_text, paper
+from taichi_ants.worlds import World, from_text
 
 # Each is a kernel of its own: observation, deposit, view.
 KERNELS = [
@@ -196,11 +196,3 @@ def test_ants_of_different_worlds_and_threads_do_not_meet():
             alone.step(row[mine], same_step=True)
         for name in ("states", "rewards_of", "steps", "ant_cells", "random_states"):
             np.testing.assert_array_equal(alone.arrays[name], seen[1][name][mine], err_msg=name)
-
-
-def test_first_starts_are_those_of_the_world():
-    seeds = np.arange(40, dtype=np.uint64) * np.uint64(2**58 + 7)
-    for world in (paper(), *(random_world(seed) for seed in range(30))):
-        cells, headings = world.first_starts(seeds)
-        for seed, cell, heading in zip(seeds.tolist(), cells, headings, strict=True):
-            assert (cell, heading) == tuple(one[0] for one in world.start(seed))
