@@ -90,7 +90,7 @@ MUTATIONS = [
     ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
     ("engines/colony/kernels.py", "features.carriers_follow if", "outbound if", CHOICE),
     ("measures/tidy.py", "else parts", "else []", RESULTS_OF_RUNS),
-    ("rendering/rasteriser.py", "snapshot.ant_nests % len", "0 * snapshot.ant_nests % len", RASTER),
+    ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
     (
         "viewer/recorder.py",
         "self.colony.tables_of_ants[self.world, slots] *",
@@ -99,8 +99,8 @@ MUTATIONS = [
     ),
     (
         "rendering/rasteriser.py",
-        "[np.maximum(snapshot.ant_foods, 0) %",
-        "[0 * snapshot.ant_foods %",
+        "FOODS[np.maximum(snapshot.ant_foods, 0)]",
+        "FOODS[0 * snapshot.ant_foods]",
         RASTER,
     ),
     ("engines/colony/state.py", '{"nest": self.n_nests, "caste"', '{"caste"', NESTS),

@@ -31,8 +31,7 @@ _KEPT = np.unique(
         *(colours.PAGE, colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.CELL_NEARER),
         *(colours.INK, colours.FAINT_INK, colours.RULE, colours.CHOSEN, colours.FOOD_DOT),
         *(*colours.QUEENS, *colours.ANTS, *colours.FOODS),
-        *colours.floors(colours.QUEENS, colours.FLOOR_QUEEN),
-        *colours.floors(colours.FOODS, colours.FLOOR_FOOD),
+        *(*colours.QUEEN_FLOORS, *colours.FOOD_FLOORS),
         *colours.TRAIL_RAMP[::6],
         *(word for n in range(colours.N_FIELDS) for word in colours.field_ramp(n)[255::-36]),
     ]
