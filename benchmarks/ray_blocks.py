@@ -23,8 +23,9 @@ from operator import getitem
 from pathlib import Path
 from typing import Any
 
-from taichi_ants.studies.points import ColonyPoint
 from taichi_ants.studies.ray_workers import RayWorkers
+
+from taichi_ants.studies.points import ColonyPoint
 from taichi_ants.studies.sweep import read_sweep
 
 TRAINING = """

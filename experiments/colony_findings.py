@@ -41,49 +41,18 @@ from taichi_ants.analysis.tables import (
 )
 from taichi_ants.errors import count
 from taichi_ants.files import tomllib
-from taichi_ants.measures.colonies import MEASURES, OF_STUDY
+from taichi_ants.measures.finished import COLONY
 
-# Kinds of world for training and evaluation, with their names in tables and figures.
-WORLD_KINDS: dict[str, str] = {
-    "paper": "the paper's world",
-    "open": "open worlds (30, 30, 30)",
-    "piles": "three far piles (30, 30, 30)",
-}
-# Kinds of world for the evaluation of ants that were trained in open worlds.
-ELSEWHERES: dict[str, str] = {
-    "rocks": "twice the rocks",
-    "one_pile": "one far pile",
-    "moving": "piles that move every 100 ticks",
-    "slow": "food that grows back after 100 ticks",
-    "small": "small worlds (15, 15, 15)",
-    "wide": "wide worlds (60, 60, 60)",
-    "large": "large worlds (100, 100, 100), 1000 ants",
-}
+_FILE = tomllib.loads(Path(__file__).with_name("colony_series.toml").read_text(encoding="utf-8"))
+# Kinds of world for training and evaluation, and others for the evaluation of ants that were
+# trained in open worlds; rules, and training regimes: their names in tables and figures.
+WORLD_KINDS: dict[str, str] = _FILE["world_kinds"]
+ELSEWHERES: dict[str, str] = _FILE["elsewheres"]
 WORLDS = {**WORLD_KINDS, **ELSEWHERES}
-
-# Rules: A, trails that rise towards food; B, right of way; C, ants in view.
-PAPER, SILENT, A, BC, ABC, ABC_SILENT, QUEUES = (
-    *("paper", "paper_no_trails", "direction", "right_of_way"),
-    *("foraging", "foraging_no_trails", "queueing"),
-)
-RULES: dict[str, str] = {
-    PAPER: "paper's rules",
-    SILENT: "paper's rules, no trails laid",
-    A: "A",
-    BC: "B + C",
-    ABC: "A + B + C",
-    ABC_SILENT: "B + C, no trails laid",
-    QUEUES: "queues",
-}
-# Training regimes.
-JOINT, ALONE, FEW, SOME, ABROAD = "joint", "alone", "with_4", "with_16", "open"
-REGIMES: dict[str, str] = {
-    JOINT: "trained jointly",
-    ALONE: "trained alone, copied",
-    FEW: "trained with 4",
-    SOME: "trained with 16",
-    ABROAD: "trained in open worlds",
-}
+RULES: dict[str, str] = _FILE["rules"]
+PAPER, SILENT, A, BC, ABC, ABC_SILENT, QUEUES = RULES
+REGIMES: dict[str, str] = _FILE["regimes"]
+JOINT, ALONE, FEW, SOME, ABROAD = REGIMES
 
 
 class Design(NamedTuple):
@@ -109,10 +78,15 @@ class Condition(NamedTuple):
 
 
 EVALUATION_EPSILON = 0.01  # the exploration rate of the evaluation
+# Measures of the study, which also evaluates without exploration and computes bounds.
+OF_STUDY: dict[str, str] = {
+    **{name: measure.label for name, measure in COLONY.items()},
+    "greedy": "deliveries per 1000 ticks without exploration",
+    "bound": "most deliveries per 1000 ticks that are possible in the world of the seed",
+    "bound_share": "deliveries as a share of that bound",
+}
 # Measures of each seed, float64 (seeds,), by their names in `OF_STUDY`.
 Measured = Mapping[Condition, Mapping[str, np.ndarray]]
-
-
 # The numbers of ants of the first and the second condition of a difference.
 Sizes = tuple[int, int]
 
@@ -124,7 +98,7 @@ class Series:
     Attributes:
         question: The question that the series helps to answer.
         statement: A statement that is true if the differences are above 0.
-        measure: A name in `MEASURES`.
+        measure: A name in `COLONY`.
         against: "same" compares equal numbers of ants, "smaller" each number with all smaller ones.
         least: The fewest ants for "same". With one ant, all regimes and some rules are the same.
         main: Whether it is one of the main findings.
@@ -158,10 +132,9 @@ class Series:
         return [(n, n) for n in sizes if n >= self.least and n in others]
 
 
-_TEXT = Path(__file__).with_name("colony_series.toml").read_text(encoding="utf-8")
 SERIES = tuple(
     Series(**{**one, "first": Design(*one["first"]), "second": Design(*one["second"])})
-    for one in tomllib.loads(_TEXT)["series"]
+    for one in _FILE["series"]
 )
 QUESTIONS: tuple[str, ...] = tuple(dict.fromkeys(series.question for series in SERIES))
 # By the name of the kind of world and the series.
@@ -264,7 +237,7 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
 
     The last table has policies from open worlds in other worlds, with intervals and worst seeds.
     """
-    seeds = f"{_basis(rows)}: {MEASURES['deliveries']}"
+    seeds = f"{_basis(rows)}: {COLONY['deliveries'].label}"
     trained = [one for one in rows if one.condition.regime != ABROAD]
     abroad = [one for one in rows if one.condition.regime == ABROAD]
     tables = []
@@ -341,7 +314,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             range_ = "" if low == high else f" {interval(low, high, 0)}"
             line.append(figure(best.estimates["bound"].mean) + range_)
         cells.append(["Mean bound, right of way [range]", *line])
-    title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
+    title = f"{sentence(COLONY['deliveries'].label)} of {count(largest, 'ant')}"
     note = f"{_basis(rows)}; in brackets: without exploration; %: share of the world's bound."
     return Table(title, ("", *_headers(shown)), cells, [note] if cells else [])
 
@@ -369,7 +342,7 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
     headers = ("Statement", *_headers(world_kinds))
     note = (
         "Below the verdict: the number of ants, and the means compared, in "
-        f"{MEASURES['deliveries']}. {_basis(rows)}."
+        f"{COLONY['deliveries'].label}. {_basis(rows)}."
     )
     return Table("", headers, cells, [note] if cells else [], text_columns=len(headers))
 
@@ -429,7 +402,7 @@ def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
                 world = "" if world_kind == shown else sentence(WORLDS[world_kind])
                 verdicts = _verdicts(by_condition, world_kind, series, findings)
                 lines.append([world, sentence(series.statement), *verdicts])
-                units.append(MEASURES[series.measure])
+                units.append(COLONY[series.measure].label)
                 shown = world_kind
         what = f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says"
         notes = [f"{what}; {_basis(rows)}."]
@@ -479,17 +452,3 @@ class Results(NamedTuple):
     def of(cls, measured: Measured) -> Results:
         """Return the results of all measures."""
         return cls(condition_rows(measured), judge_all(measured))
-
-    @classmethod
-    def read(cls, seeds: Sequence[Mapping]) -> Results:
-        """Return the results from the rows of seeds.csv."""
-        by_condition: dict[Condition, list[Mapping]] = {}
-        for row in seeds:
-            condition = Condition(row["world_kind"], row["rules"], row["regime"], int(row["ants"]))
-            by_condition.setdefault(condition, []).append(row)
-        return cls.of(
-            {  # an empty field is None, which is nan as a float
-                one: {name: np.array([row[name] for row in rows], float) for name in OF_STUDY}
-                for one, rows in by_condition.items()
-            }
-        )

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
         testing,
         worlds,
     )
-    from taichi_ants.analysis.results import compare, plot
+    from taichi_ants.analysis.results import compare, plot, summary
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
@@ -43,7 +43,7 @@ __version__ = "0.1.0"
 PHYSICS = 1  # rises when equal settings and seeds give other numbers; see tests/golden/record.py
 
 _NAMES_IN = {
-    "analysis.results": ("compare", "plot"),
+    "analysis.results": ("compare", "plot", "summary"),
     "engines.colony.colony": ("Colony", "ColonyEpisodes"),
     "engines.colony.interventions": ("Interventions",),
     "engines.runs.results": ("Rollouts", "TrainingResult"),
@@ -98,6 +98,7 @@ __all__ = [
     "rules",
     "save_policy",
     "states",
+    "summary",
     "tabulate",
     "task",
     "testing",

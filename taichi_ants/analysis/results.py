@@ -115,11 +115,7 @@ def compare(
         AntsError: The seeds differ, a result does not have the measure or the configuration, or no
             seed has a value in both results.
     """
-    for name, result in (("a", a), ("b", b)):
-        if not isinstance(result, Tidy):
-            raise AntsError(
-                f"{name} is {shown(result)}; give a result of Colony.run, train or evaluate."
-            )
+    _check_results({"a": a, "b": b})
     if not isinstance(level, (int, float)) or not 0 < level < 1:
         raise AntsError(f"level is {shown(level)}; it must be a number between 0 and 1.")
     tables = a.measured(), b.measured()
@@ -136,7 +132,7 @@ def compare(
     both = ~np.isnan(values[0] - values[1])
     if not both.any():
         raise AntsError(f"no seed has a value of {measure!r} in both results; run more ticks.")
-    first, second = (one[both] for one in values)
+    first, second = (sample[both] for sample in values)
     differences = first - second
     low, high = (float(end[0]) for end in bootstrap_interval(differences[None], level))
     return Comparison(
@@ -152,14 +148,30 @@ def compare(
     )
 
 
+def _check_results(results: Mapping[str, object]) -> None:
+    for name, result in results.items():
+        if not isinstance(result, Tidy):
+            raise AntsError(
+                f"{name} is {shown(result)}; give a result of Colony.run, train or evaluate."
+            )
+
+
 def summary(result: Tidy, last: int | None = None) -> Summary:
-    """Return means over seeds with intervals; see `Tidy.summary`."""
+    """Return means over seeds with 95 % intervals, for each configuration and measure.
+
+    The value of a seed is its mean over episodes, at the last tick of each.
+
+    Args:
+        result: The result of `Colony.run`, `train` or `evaluate`.
+        last: The number of episodes to use, from the last one; None uses all.
+    """
+    _check_results({"result": result})
     table, rows = result.measured(), []
     if not table.values:
         raise AntsError(_NO_NUMBERS)
     for name in table.values:
         for group, values in zip(table.groups, of_seeds(table, name, last), strict=True):
-            mean, low, high = (float(one[0]) for one in _means(values[None]))
+            mean, low, high = (float(bound[0]) for bound in _means(values[None]))
             rows.append({
                 "configuration": group, "measure": name, "unit": table.units.get(name, ""),
                 "seeds": int(np.count_nonzero(~np.isnan(values))),
@@ -189,15 +201,10 @@ def plot(
     if path is not None:
         expect("path", path, str, Path)
         check_one_of("the suffix of path", Path(path).suffix, (".png",))
-    named = results if isinstance(results, Mapping) else {"": results}
-    for name, result in named.items():
-        if not isinstance(result, Tidy):
-            raise AntsError(
-                f"a result{f' ({name})' if name else ''} is {shown(result)}; give results of "
-                "Colony.run, train or evaluate."
-            )
+    named = results if isinstance(results, Mapping) else {"result": results}
+    _check_results(named)
     table = _together({name: result.measured() for name, result in named.items()})
-    names = [part for name in measures for part in parts_of(table, name)] or list(table.usual)
+    names = [part for name in measures for part in parts_of(table, name)] or list(table.plotted)
     if not names:
         raise AntsError(_NO_NUMBERS)
     if len(table.groups) > _MOST_LINES:
@@ -248,7 +255,7 @@ def _together(tables: Mapping[str, Measured]) -> Measured:
             )
     every = tables.values()
     common = [name for name in first.values if all(name in table.values for table in every)]
-    groups = [f"{name} {group}".strip() for name, one in tables.items() for group in one.groups]
+    groups = [f"{name} {group}".strip() for name, table in tables.items() for group in table.groups]
     ends = list(itertools.accumulate(len(table.groups) for table in every))
     of_group = [t.of_group + end - len(t.groups) for t, end in zip(every, ends, strict=True)]
     return Measured(
@@ -261,7 +268,7 @@ def _together(tables: Mapping[str, Measured]) -> Measured:
         of_group=np.concatenate(of_group),
         seeds=first.seeds,
         groups=tuple(groups),
-        usual=tuple(name for name in first.usual if name in common),
+        plotted=tuple(name for name in first.plotted if name in common),
         units=first.units,
     )
 
@@ -320,16 +327,16 @@ def curves(table: Measured, measure: str, across: str) -> Iterator[tuple[np.ndar
 def _means(values: np.ndarray, resamples: int = RESAMPLES) -> tuple[np.ndarray, ...]:
     """Return the mean and the ends of its interval by row (rows, seeds), without nan."""
     known = ~np.isnan(values)
-    found = np.full((3, len(values)), math.nan)
+    intervals = np.full((3, len(values)), math.nan)
     whole = known.all(axis=1)
     if whole.any():
-        found[:, whole] = (
+        intervals[:, whole] = (
             values[whole].mean(axis=1),
             *bootstrap_interval(values[whole], resamples=resamples),
         )
     for row in np.flatnonzero(known.any(axis=1) & ~whole):
         some = values[row, known[row]][None]
-        found[:, row] = np.ravel(
+        intervals[:, row] = np.ravel(
             [some.mean(axis=1), *bootstrap_interval(some, resamples=resamples)]
         )
-    return tuple(found)
+    return tuple(intervals)

@@ -13,6 +13,7 @@ from itertools import chain
 
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import whole_number
+from taichi_ants.studies.plugins import load_plugin
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -34,9 +35,9 @@ def check_rules(settings: argparse.Namespace) -> None:
     from taichi_ants.testing import check_observation, check_rule
 
     built_in = observations.names()
-    command_line.load_plugin(settings.file)
-    own = [name for name in observations.names() if name not in built_in]
-    if not rules.names() and not own:
+    load_plugin(settings.file)
+    registered = [name for name in observations.names() if name not in built_in]
+    if not rules.names() and not registered:
         raise AntsError(
             f"the file {settings.file!r} registers no rules or observations; register one with "
             "taichi_ants.rules.register or taichi_ants.task.observations.register."
@@ -44,7 +45,7 @@ def check_rules(settings: argparse.Namespace) -> None:
     differs = False
     checks = chain(
         (check_rule(name, settings.inputs) for name in rules.names()),
-        (check_observation(name) for name in own),
+        (check_observation(name) for name in registered),
     )
     for check in checks:
         print(check, flush=True)

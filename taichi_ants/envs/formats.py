@@ -107,20 +107,20 @@ def tabulate(
     seen = Shown(observations.get(observation), observation_format).table
     n_states, returned = len(seen), function(seen)
     try:
-        given = np.asarray(returned)
+        values = np.asarray(returned)
     except (TypeError, ValueError, RuntimeError) as error:  # NumPy and torch raise these
         raise AntsError(
             f"function returned {shown(returned)}, which is not an array ({shown(str(error))}); "
             "return only one array, detached from gradients."
         ) from error
-    if given.shape == (n_states,) and given.dtype.kind in "iu":
-        if given.min() < 0 or given.max() >= N_ACTIONS:
-            wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
+    if values.shape == (n_states,) and values.dtype.kind in "iu":
+        if values.min() < 0 or values.max() >= N_ACTIONS:
+            wrong = values[(values < 0) | (values >= N_ACTIONS)][0]
             raise AntsError(f"function returned the action {wrong}; it must be 0, 1, 2, 3 or 4.")
-        return np.eye(N_ACTIONS, dtype=np.float32)[given]
-    if given.shape != (n_states, N_ACTIONS) or given.dtype.kind not in "fiu":
+        return np.eye(N_ACTIONS, dtype=np.float32)[values]
+    if values.shape != (n_states, N_ACTIONS) or values.dtype.kind not in "fiu":
         raise AntsError(
-            f"function returned an array of shape {given.shape} and type {given.dtype}; it must be "
-            f"real numbers ({n_states}, {N_ACTIONS}), or integer actions ({n_states},)."
+            f"function returned an array of shape {values.shape} and type {values.dtype}; it must "
+            f"be real numbers ({n_states}, {N_ACTIONS}), or integer actions ({n_states},)."
         )
-    return finite("function returned", given)
+    return finite("function returned", values)

@@ -32,21 +32,23 @@ def _cells(values: object) -> np.ndarray:
             f"cells have shape {array.shape} and type {array.dtype}; they must be whole numbers of "
             "shape (..., 3)."
         )
-    if (far := (array > FAR) | (array < -FAR)).any():
-        raise AntsError(f"a coordinate is {array[far][0]}; it must be between -2**40 and 2**40.")
+    if (too_far := (array > FAR) | (array < -FAR)).any():
+        raise AntsError(
+            f"a coordinate is {array[too_far][0]}; it must be between -2**40 and 2**40."
+        )
     return array.astype(np.int64)
 
 
 def normal_form(cells: object) -> np.ndarray:
     """Return cube coordinates shifted so that their minimum is 0, int64 (..., 3)."""
-    given = _cells(cells)
-    return given - given.min(axis=-1, keepdims=True)
+    coordinates = _cells(cells)
+    return coordinates - coordinates.min(axis=-1, keepdims=True)
 
 
 def axial(cells: object) -> np.ndarray:
     """Return the axial coordinates (q, r), int64 (..., 2), of cube coordinates (..., 3)."""
-    given = _cells(cells)
-    return given[..., :2] - given[..., 2:]
+    coordinates = _cells(cells)
+    return coordinates[..., :2] - coordinates[..., 2:]
 
 
 def cube(axials: np.ndarray) -> np.ndarray:

@@ -38,20 +38,20 @@ def path_ratio(colony: ReferenceColony) -> float:
     """Return the path length divided by the fewest ticks for the nearest food of the start."""
     world = colony.start_world
     walls, foods = set(listed_cells(world.obstacles)), set(listed_cells(world.foods))
-    inside, found = set(colony.world.ground), NONE
+    inside, fewest = set(colony.world.ground), NONE
     steps: dict[Cell, int] = {world.queen: 0}
     waiting = deque([world.queen])
     while waiting:
         cell = waiting.popleft()
         if cell in foods:
-            found = max(1, steps[cell] - 1)
+            fewest = max(1, steps[cell] - 1)
             break
         for heading in range(N_HEADINGS):
             there = neighbour(cell, heading)
             if there in inside and there not in walls and there not in steps:
                 steps[there] = steps[cell] + 1
                 waiting.append(there)
-    return path_length(colony) / found
+    return path_length(colony) / fewest
 
 
 def entropy(colony: ReferenceColony) -> float:
@@ -96,7 +96,7 @@ def foraging(colony: ReferenceColony) -> float:
 def mean_distance(colony: ReferenceColony) -> float:
     """Return the mean distance of the ants to the nearest queen."""
     queens = colony.world.queens
-    far = [min(distance(ant.cell, one) for one in queens) for ant in colony.ants.values()]
+    far = [min(distance(ant.cell, queen) for queen in queens) for ant in colony.ants.values()]
     return sum(far) / len(far) if far else NONE
 
 
@@ -107,9 +107,20 @@ def share_in_region(colony: ReferenceColony, name: str) -> float:
     return sum(inside) / len(inside) if inside else NONE
 
 
+def deliveries_by(colony: ReferenceColony, part: str) -> int:
+    """Return the deliveries of a nest, a kind of food or a caste, such as "nest_0"."""
+    owner, _, number = part.partition("_")
+    if owner == "caste":
+        return colony.record.by_caste[int(number)]
+    column = ("nest", "food").index(owner)
+    return sum(n for key, n in colony.record.delivered.items() if key[column] == int(number))
+
+
 def measured(colony: ReferenceColony, name: str) -> float:
-    """Return the value of a measure of `MEASURES`, or of "regions.NAME"."""
+    """Return the value of a measure of `MEASURES`, or of a part of "regions" or "deliveries_by"."""
     before, _, part = name.partition(".")
+    if before == "deliveries_by":
+        return deliveries_by(colony, part)
     return share_in_region(colony, part) if before == "regions" else MEASURES[name](colony)
 
 

@@ -46,7 +46,7 @@ _samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()])
 _places = np.linspace(0, _samples.shape[1] - 1, 256)
 # uint32 (256,): colours of trails from just above level 0 to `strongest`.
 TRAIL_RAMP = _packed(
-    np.stack([np.interp(_places, range(len(one)), one) for one in _samples], axis=-1)
+    np.stack([np.interp(_places, range(len(channel)), channel) for channel in _samples], axis=-1)
 )
 TRAIL_RAMP.setflags(write=False)
 

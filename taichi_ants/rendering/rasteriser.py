@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from taichi_ants import runtime
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
@@ -69,7 +69,7 @@ def marks(
     return table
 
 
-def thing(places: npt.ArrayLike, hexagon: float, mark: Mark, colour: np.ndarray) -> np.ndarray:
+def marker(places: npt.ArrayLike, hexagon: float, mark: Mark, colour: np.ndarray) -> np.ndarray:
     """Return marks of food or queens; cells have the radius `hexagon`, in pixels."""
     return marks(places, 0.72 * hexagon, mark, colour)
 
@@ -85,7 +85,7 @@ def cell(letter: str, centre: npt.ArrayLike, hexagon: float, number: int = 0) ->
         return marks(centre, hexagon, Mark.HEXAGON, cell_colour(letter))
     mark, of_things, floors = _THINGS[letter]
     floor = marks(centre, hexagon, Mark.HEXAGON, floors[number])
-    return np.concatenate([floor, thing(centre, hexagon, mark, of_things[number])])
+    return np.concatenate([floor, marker(centre, hexagon, mark, of_things[number])])
 
 
 def ants(
@@ -199,8 +199,8 @@ class Rasteriser:
             tables.append(marks(foods, radius, Mark.DOT, of_foods))
             tables.append(marks(queens, max(hexagon, _QUEEN), Mark.DOT, of_queens))
         else:
-            tables.append(thing(foods, hexagon, Mark.FOOD, of_foods))
-            tables.append(thing(queens, hexagon, Mark.QUEEN, of_queens))
+            tables.append(marker(foods, hexagon, Mark.FOOD, of_foods))
+            tables.append(marker(queens, hexagon, Mark.QUEEN, of_queens))
         if in_view is not None:
             places, radius = self._places(in_view), 0.98 * hexagon
             if hexagon < _SMALLEST_OUTLINE:
@@ -272,7 +272,7 @@ class Rasteriser:
         seen = levels[levels >= 1]
         most = float(np.quantile(seen, 0.95)) if len(seen) else 1.0
         power = 10 ** math.floor(math.log10(most))
-        return next(one * power for one in (1, 2, 5, 10) if one * power >= most)
+        return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= most)
 
     def _places(self, cells: np.ndarray) -> np.ndarray:
         """Pixel coordinates (n, 2) of flat indices (n,)."""

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.errors import AntsError, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
@@ -129,7 +129,7 @@ class Scene:
     ) -> None:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
-        of_fields = {name: _scale(one) for name, one in task.fields.items()} if task else {}
+        of_fields = {name: _scale(field) for name, field in task.fields.items()} if task else {}
         self._foods = list(task.foods) if task else []
         width, height = check_size(size)
         self._overlay, letters = overlay, round(min(width, height) / 38)
@@ -182,7 +182,9 @@ class Scene:
         (left, width, size), frame = self._panel, self._background
         cue = "trail (S)" if homing_cue == TRAIL else f"field {homing_cue} (S)"
         told = homing_cue == COMPASS  # by the label
-        entries = [one if told or not one.letter else one._replace(label=cue) for one in _LEGEND]
+        entries = [
+            entry._replace(label=cue) if entry.letter and not told else entry for entry in _LEGEND
+        ]
         self._draw_entries(frame, entries, 0)
         y = self._legend_top + len(entries) * round(_PITCH * size) + round(1.45 * size)
         text.write(frame, "trail (T), by strength", left, y, size)
@@ -195,24 +197,24 @@ class Scene:
         return y
 
     def _draw_entries(self, frame: np.ndarray, entries: Sequence[_Entry], first: int) -> None:
-        """Draw entries of the legend; row 0 is its first one, and further ones are above it."""
+        """Draw entries of the legend; row 0 is its first entry, and further ones are above it."""
         (left, _, size), hexagon = self._panel, self._rasteriser.hexagon
         x, radius = left + 0.85 * size, 0.82 * size
-        for row, one in enumerate(entries, start=first):
+        for row, entry in enumerate(entries, start=first):
             y = self._legend_top + row * round(_PITCH * size) + 0.75 * size
             ant_x, label_x = x, left + round(2.1 * size)
-            strongest = int(colours.field_ramp(one.number)[-1])
+            strongest = int(colours.field_ramp(entry.number)[-1])
             field = marks((x, y), radius, Mark.HEXAGON, strongest)
-            tables = [cell(one.cell, (x, y), radius, one.number) if one.cell else field]
-            if one.ant is not None:
-                if one.cell == "Q":  # to the right of the queen
+            tables = [cell(entry.cell, (x, y), radius, entry.number) if entry.cell else field]
+            if entry.ant is not None:
+                if entry.cell == "Q":  # to the right of the queen
                     ant_x, label_x = x + 1.7 * size, label_x + round(1.7 * size)
-                look, colour = (one.ant, hexagon, 0.83 * radius), int(colours.ANTS[one.number])
+                look, colour = (entry.ant, hexagon, 0.83 * radius), int(colours.ANTS[entry.number])
                 tables.append(ants((ant_x, y), 1, *look, colour=colour))
             draw_marks(frame, *tables)
             baseline = round(y + 0.36 * size)
-            text.write(frame, one.letter, x, baseline, size, align="middle")
-            text.write(frame, one.label, label_x, baseline, size)
+            text.write(frame, entry.letter, x, baseline, size, align="middle")
+            text.write(frame, entry.label, label_x, baseline, size)
 
     def _further_entries(self, snapshot: Snapshot) -> list[_Entry]:
         """Return entries of further fields, several nests and several kinds of food."""

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 from taichi_ants import checks, files, interventions, learners, measures, protocol, rules, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.measures import colonies as of_colonies
-from taichi_ants.measures import runs as of_runs
+from taichi_ants.measures import finished
+from taichi_ants.measures.measure import RUN
 from taichi_ants.settings import (
     DeclaredSetting,
     all_of,
@@ -27,7 +27,7 @@ from taichi_ants.settings import (
 )
 from taichi_ants.studies import design
 from taichi_ants.studies.design import Axis, Choices, Range
-from taichi_ants.studies.points import ColonyPoint, FixedPolicy, Point, RunPoint
+from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
@@ -46,62 +46,14 @@ _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
 
 
-class Measure(NamedTuple):
-    """A number for each point and seed: its name for readers, and the fewest episodes it needs."""
-
-    words: str
-    episodes: int = 0
-    uses_iqm: bool = False
-
-
-MEASURES = {
-    "runs": {
-        # With fewer than 50 episodes, the comparison uses all of them; a sweep refuses.
-        name: Measure(
-            one.words, of_runs.WINDOW if name.endswith("_last50") else one.episodes, one.uses_iqm
-        )
-        for name, one in of_runs.MEASURES.items()
-    },
-    "colony": {name: Measure(words) for name, words in of_colonies.MEASURES.items()},
-}
-
-
-def measure_of(kind: str, name: str) -> Measure:
-    """Return a measure of this kind; for colonies also a registered one.
-
-    Raises:
-        AntsError: There is no such measure; the message lists all names.
-    """
-    known = MEASURES[kind]
-    if isinstance(name, str) and name in known:
-        return known[name]
-    if not isinstance(name, str) or name.partition(".")[0] not in _registered(kind):
-        raise AntsError(f"measures is {shown(name)}; it must be one of {_names_of(kind)}.")
-    one = measures.get(name)
-    words = one.summary or name.replace("_", " ")
-    return Measure(f"{words} ({one.unit})" if one.unit else words)
-
-
-def _registered(kind: str) -> set[str]:
-    """Return the names of registered measures that sweeps of this kind can have."""
-    return set(measures.names()) - set(measures.ARRAYS) if kind == "colony" else set()
-
-
-def _names_of(kind: str) -> str:
-    """Return the names of all measures of this kind, for a message."""
-    registered = _registered(kind)
-    names = ", ".join([*MEASURES[kind], *sorted(registered - MEASURES[kind].keys())])
-    return names + (", or the name of a measure of a plugin (--plugin FILE)" if registered else "")
-
-
 @contextmanager
-def contents(path: Path, text: str | None = None) -> Iterator[Settings]:
-    """Yield the contents of a file (.toml), or of its text; errors in the context name the file.
+def contents(path: Path) -> Iterator[Settings]:
+    """Yield the contents of a file (.toml); errors in the context name the file.
 
     Raises:
         AntsError: The file cannot be read.
     """
-    text = files.read_text(path) if text is None else text
+    text = files.read_text(path)
     try:
         file = files.tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -136,9 +88,9 @@ class Base(NamedTuple):
         wanted = as_list(file.get("measures", []))
         if not wanted:
             what = "empty" if "measures" in file else "missing"
-            raise AntsError(f"measures is {what}; name one or more of {_names_of(kind)}.")
+            raise AntsError(f"measures is {what}; name one or more of {finished.names_of(kind)}.")
         for name in wanted:
-            measure_of(kind, name)
+            finished.of_runs(kind, name)
         _check_once("measures", wanted)
         beside = [_BESIDE[name] for name in wanted if name in _BESIDE]
         wanted = list(dict.fromkeys([*wanted, *beside]))
@@ -166,9 +118,11 @@ class Base(NamedTuple):
         Reuses worlds and policies in `built`, and adds new ones. Raises AntsError if a setting is
         not allowed, or there are too few episodes for a measure.
         """
-        point = _point(self.kind, {**self.fixed, **row}, self.seeds, built, self.reading)
+        point = _point(self.kind, {**self.fixed, **row}, built, self.reading)
         for name in self.measures:
-            least = measure_of(self.kind, name).episodes
+            least = finished.of_runs(self.kind, name).episodes
+            # With fewer than 50 episodes, `compare` uses all of them; a sweep refuses.
+            least = finished.WINDOW if name.endswith("_last50") else least
             if point.episodes < least:
                 raise AntsError(
                     f"{name} needs {least} episodes; use more or choose another measure."
@@ -180,7 +134,11 @@ class Base(NamedTuple):
 
 def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
     """Return the arguments of points for the registered measures."""
-    registered = tuple(n for n in wanted if n.partition(".")[0] in measures.names())
+    registered = tuple(
+        name
+        for name in wanted
+        if name.partition(".")[0] in measures.names() and measures.get(name).of != RUN
+    )
     if kind != "colony":
         if every is not None:
             raise AntsError(
@@ -188,7 +146,7 @@ def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
             )
         return {}
     if every is None:
-        return {"measures": tuple(name for name in registered if name not in MEASURES[kind])}
+        return {"measures": tuple(name for name in registered if name not in finished.COLONY)}
     if not registered:
         raise AntsError(
             f"measure_every is {shown(every)}, but no measure has a series; add one of "
@@ -334,11 +292,7 @@ def check_training(names: Iterable[str], points: Sequence[Point]) -> None:
 
 
 def _point(
-    kind: str,
-    settings: Settings,
-    seeds: tuple[int, ...],
-    built: dict[str, Any],
-    reading: Mapping[str, Any],
+    kind: str, settings: Settings, built: dict[str, Any], reading: Mapping[str, Any]
 ) -> Point:
     """Return the point of some settings; reuse worlds and policies in `built`, and add new ones.
 
@@ -368,7 +322,7 @@ def _point(
             raise AntsError(f"training.{name} is missing; add it to [training] or [vary].")
     key = repr(sorted(world.items()))
     if key not in built:
-        built[key] = _world(kind, world, seeds)
+        built[key] = _world(kind, world)
     if events:
         tree["protocol"] = protocol.read(events)
     return KINDS[kind](built[key], chosen, TrainingConfig(**training), **tree, **reading)
@@ -423,7 +377,7 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
     return f"of this sweep; choose one of {', '.join(near)}"
 
 
-def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
+def _world(kind: str, given: Settings) -> Any:
     preset, drawn = given.pop("preset", "paper"), "seed" in given
     first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
     regions = given.pop("regions", {})
@@ -436,5 +390,4 @@ def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
     if not per_seed:
         return worlds.build(preset, first, **given).with_regions(regions)
     checked_whole("world.seed", first, -(2**62), 2**62)
-    drawn_worlds = (worlds.build(preset, first + seed, **given) for seed in seeds)
-    return tuple(world.with_regions(regions) for world in drawn_worlds)
+    return Drawn.by(preset, first, regions, **given)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,10 +14,12 @@ from taichi_ants import (
     AntsError,
     Colony,
     TrainingConfig,
+    evaluate,
     files,
     measures,
     rules,
     save_policy,
+    train,
     worlds,
 )
 from taichi_ants.learners.policies import random_policy, trail_follower
@@ -47,7 +50,7 @@ FROZEN = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 def sweep(tmp_path, capsys, monkeypatch):
     """Calls the command on a file of this text, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry, "_YOURS", {})
+    monkeypatch.setattr(registry.MEASURES, "yours", {})
 
     def called(text, *more):
         Path("my.toml").write_text(text, "utf-8")
@@ -144,16 +147,13 @@ def test_without_every_there_is_no_series(sweep):
     assert float(read_csv("runs.csv")[0]["entropy.trail"]) > 0
 
 
-def test_a_resumed_sweep_writes_the_same_series(sweep, tmp_path):
-    Path("my.toml").write_text(FILE, "utf-8")
-    asked, blocks = read_sweep(Path("my.toml")), tmp_path / "blocks"
-    blocks.mkdir()
+def test_a_resumed_sweep_writes_the_same_series(sweep):
     texts = []
     for _ in range(2):
-        asked.measured(blocks, lambda share: None, threads=1)
-        asked.write_series(blocks, tmp_path)
-        texts.append((tmp_path / "series.csv").read_bytes())
-        sorted(blocks.iterdir())[0].unlink()
+        assert sweep(FILE, "--no-figures")[0] == 0
+        texts.append(Path("results/sweep-my/series.csv").read_bytes())
+        sorted(Path("results/sweep-my/blocks").iterdir())[0].unlink()
+        Path("results/sweep-my/report.txt").unlink()
     assert texts[0] == texts[1]
 
 
@@ -170,13 +170,13 @@ def test_policies_can_vary(sweep):
     expected = run(table=random_policy()).deliveries.mean(axis=0) * 1000 / 60
     assert found["random"] == pytest.approx(expected.tolist())
     save_policy("mine.npz", random_policy(), {})  # another table in the same file
-    status, _, err = sweep(text, "--no-figures")
-    assert status == 2
-    assert "policy.sha256" in err
+    assert sweep(text, "--no-figures")[0] == 0
+    rows = [float(row["deliveries"]) for row in read_csv("runs.csv") if row["policy"] == "mine.npz"]
+    assert rows == found["random"]
 
 
 def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
-    monkeypatch.setattr(rules.registry, "_RULES", dict(rules.registry._RULES))
+    monkeypatch.setattr(rules.registry.RULES, "yours", dict(rules.registry.RULES.yours))
     rules.register("evaporation")(weaker)
     text = FILE.replace("[vary]", '[task]\npheromone.evaporation = "weaker"\n\n[vary]')
     text += "task.rules.weaker.rate = [0.1, 0.5]\n"
@@ -202,6 +202,49 @@ def test_a_plugin_can_register_a_measure(sweep):
     assert (status, err) == (0, "")
     assert "north" in out
     assert measures.get("north").summary == "north"
+
+
+def test_measures_of_a_plugin_work_for_lone_ants_and_for_colonies(sweep):
+    """A measure of counts for the windows of lone ants, and one of finished runs of both kinds."""
+    Path("yours.py").write_text(
+        "from taichi_ants import measures\n"
+        "measures.register('pace', lambda c: c['deliveries'] / c['ticks'], of='counts')\n"
+        "measures.register('worst', lambda r: r.evaluation['returns'].min(-1), of='run')\n"
+    )
+    text = FILE.replace('"entropy", "deliveries", "path_length"', '"pace", "worst"')
+    assert sweep(text, "--plugin", "yours.py", "--no-figures")[0] == 0
+    rows = [row for row in read_csv("runs.csv") if row["task.pheromone.level"] == "250"]
+    result = run()
+    pace = (result.deliveries / 60).mean(axis=0)
+    assert [float(row["pace"]) for row in rows] == pytest.approx(pace)
+    assert [float(row["worst"]) for row in rows] == result.returns.min(axis=0).tolist()
+    assert {row["measure"] for row in read_csv("series.csv")} == {"pace"}
+    asked = '"pace_all", "greedy_pace", "pace_fluctuation_all", "worst"'
+    lone = f"""
+kind = "runs"
+measures = [{asked}]
+seeds = 2
+episodes = 5
+rollouts = 3
+max_steps = 80
+training = {{learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 1.0}}
+
+[vary]
+training.learning_rate = [0.1, 0.2]
+"""
+    assert sweep(lone, "--plugin", "yours.py", "--no-figures", "--force")[0] == 0
+    config = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 1.0)
+    trained = train(worlds.paper(), config, (0, 1), 5, 80)
+    greedy = evaluate(worlds.paper(), trained.q_values, 3, (0, 1), 80)
+    rows = read_csv("runs.csv")[2:]
+    for row, steps, delivered in zip(rows, trained.steps[0], trained.deliveries[0], strict=True):
+        assert float(row["pace_all"]) == pytest.approx((delivered / steps).mean())
+    assert [float(row["worst"]) for row in rows] == greedy.returns[0].min(axis=1).tolist()
+    paces = (greedy.deliveries / greedy.steps)[0].mean(axis=1)
+    assert [float(row["greedy_pace"]) for row in rows] == pytest.approx(paces)
+    status, _, err = sweep(lone.replace("pace_all", "blocked_share_all"), "--plugin", "yours.py")
+    assert status == 2
+    assert "of lone ants must compute with arrays of the counts returns, ticks, deliveries" in err
 
 
 @pytest.mark.parametrize(
@@ -274,7 +317,13 @@ def test_runs_without_a_value_are_left_out_and_counted(tmp_path):
     sweep = sweep_of(file)
     values = np.random.default_rng(0).uniform(size=(3, 12))
     values[0, 3] = values[1, [4, 5]] = values[2] = np.nan
-    sweep.write({"entropy.trail": values}, tmp_path, draws=True)
+
+    def write(values, figures):
+        found, present = {"entropy.trail": values}, np.ones((3, 12), bool)
+        how = {"figures": figures, "parquet": False, "part": False, "folder": tmp_path}
+        return sweep.tables(SimpleNamespace(**how, present=present, read=lambda *names: found))
+
+    report = write(values, figures=True)
     rows = files.read_csv(tmp_path / "summary.csv")
     assert [row["entropy.trail_left_out"] for row in rows] == [1, 2, 12]
     assert [row["seeds"] for row in rows] == [12] * 3
@@ -286,10 +335,8 @@ def test_runs_without_a_value_are_left_out_and_counted(tmp_path):
     wanted = (values[1] - values[0])[both].mean()
     assert float(found[0]["difference"]) == pytest.approx(wanted)
     assert found[1]["finding"] == "undecided"
-    report = (tmp_path / "report.txt").read_text()
     assert "runs without a value are left out" in " ".join(report.split())
     assert "] (2 left out)" in report
     assert "- (12 left out)" in report
-    sweep.write({"entropy.trail": np.nan_to_num(values)}, tmp_path, draws=False)
+    assert "left out" not in write(np.nan_to_num(values), figures=False)
     assert "left_out" not in (tmp_path / "summary.csv").read_text()
-    assert "left out" not in (tmp_path / "report.txt").read_text()

@@ -21,10 +21,10 @@ from paper.comparison import (
     Row,
     Variant,
 )
-from paper.figures import curves_of
+from paper.figures import curves_of, spans, sums
 
 from taichi_ants.analysis.behaviour import DELIVERS, WALKS
-from taichi_ants.measures.runs import measures_of_runs
+from taichi_ants.measures.finished import Run, values_of
 
 EARLY = 50  # number of early episodes
 EPISODES = ("returns", "steps", "deliveries")
@@ -170,9 +170,10 @@ def comparison_of(arrays: dict[str, np.ndarray], rows: tuple[Row, ...], **fields
 
 def remeasured(made: Made) -> Made:
     """Return a comparison with measures and learning curves recomputed from its episodes."""
-    made = replace(made, measures=measures_of_runs(made.arrays))
-    each = ({n: made.arrays[n][row] for n in EPISODES} for row in range(len(made.rows)))
-    return replace(made, curves=curves_of(made, enumerate(each)))
+    made = replace(made, measures=values_of(Run.of_lone_ant(made.arrays)))
+    edges = spans(made.episodes)[:-1]
+    each = {sums(n): np.add.reduceat(made.arrays[n], edges, axis=2, dtype=int) for n in EPISODES}
+    return replace(made, curves=curves_of(made, each))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from taichi_ants.engines.records import Record
 from taichi_ants.measures.series import Series
 from taichi_ants.measures.tidy import Measured, Tidy, seed_array
+from taichi_ants.records import Record
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,20 +54,20 @@ class ColonyEpisodes(Record, Tidy):
 
     def counts(self) -> dict[str, np.ndarray]:
         """Return the arrays of all counts of worlds by name."""
-        arrays = (one for one in vars(self).items() if isinstance(one[1], np.ndarray))
+        arrays = (item for item in vars(self).items() if isinstance(item[1], np.ndarray))
         return {name: array for name, array in arrays if array.ndim == 2}
 
     def measured(self) -> Measured:
         """Return the values of the measures, or all counts if `Colony.run` was asked for none."""
         shape, series = self.returns.shape, self.series
         if series is None:
-            episodes, worlds = (one.ravel().astype(np.int32) for one in np.indices(shape))
+            episodes, worlds = (numbers.ravel().astype(np.int32) for numbers in np.indices(shape))
             ticks = self.ticks.ravel()
             values = {name: array.ravel() for name, array in self.counts().items()}
-            usual: tuple[str, ...] = ("deliveries",)
+            plotted: tuple[str, ...] = ("deliveries",)
         else:
             worlds, episodes, ticks = series.worlds, series.episodes, series.ticks
-            values, usual = dict(series.values), tuple(series.values)
+            values, plotted = dict(series.values), tuple(series.values)
         seeds = seed_array(self.seeds)[worlds]
         index = {"world": worlds, "seed": seeds, "episode": episodes, "tick": ticks}
         return Measured(
@@ -76,6 +76,6 @@ class ColonyEpisodes(Record, Tidy):
             of_seed=worlds,
             of_group=np.zeros(len(worlds), np.int32),
             seeds=self.seeds,
-            usual=usual,
+            plotted=plotted,
             units={} if series is None else dict(series.units),
         )

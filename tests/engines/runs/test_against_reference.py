@@ -13,7 +13,6 @@ from random_rewards import random_rewards
 from random_worlds import random_world
 
 from taichi_ants import (
-    AntsError,
     TrainingConfig,
     evaluate,
     learners,
@@ -23,10 +22,10 @@ from taichi_ants import (
 )
 from taichi_ants.reference.ants import starts
 from taichi_ants.settings import declared
-from taichi_ants.task import Life, Pheromone, Task, observations
+from taichi_ants.task import Pheromone, Task, observations
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 from taichi_ants.task.events import Event
-from taichi_ants.worlds import World, paper
+from taichi_ants.worlds import paper
 
 DELIVERIES = ("terminates", "truncates")
 # Each entry is a kernel of its own, so that there are few: learner, observation, deposit.
@@ -231,22 +230,6 @@ def test_paper_states_are_the_papers_states_whatever_the_observation():
         assert not np.array_equal(other.states, papers.states)
 
 
-@pytest.mark.parametrize(
-    ("task", "says"),
-    [
-        (Task(pheromone=Pheromone(evaporation="exponential")), "evaporation='exponential'"),
-        (Task(pheromone=Pheromone(diffusion=0.1)), "diffusion=0.1"),
-        (Task(life=Life(births=True)), "births=True"),
-        (Task(choice="deneubourg"), "is 'deneubourg'"),
-    ],
-)
-def test_what_runs_cannot_do_is_refused_by_name(task, says):
-    for function in (train, trace_training):
-        with pytest.raises(AntsError, match="use a Colony") as caught:
-            function(paper(), random_config(0, "sarsa"), 0, 1, 1, task=task)
-        assert says in str(caught.value)
-
-
 def test_starts_of_ants():
     """Where ants start, listed or placed by the seed."""
     for seed in range(200):
@@ -255,11 +238,3 @@ def test_starts_of_ants():
         [(cell, heading)] = starts(world, seed)
         assert tuple(world.grid.cells(cells[0])) == cell
         assert headings[0] == heading
-
-
-def test_worlds_of_one_row():
-    """The narrowest worlds: every side cell lies outside."""
-    world = World((6, 1, 1), queen=(0, 0, 0), foods=[(5, 0, 0)], ants=[((1, 0, 0), 0)])
-    config = TrainingConfig("q_learning", 0.1, 0.9, 0.5, 1.0)
-    plain = assert_equal_steps(world, config, 0, 10, 60, Task(evaporation_in_training=True))
-    assert sum(plain.deliveries) > 0

@@ -1,0 +1,238 @@
+"""Blocks by Ray: the bytes of a plain run, whatever happens to workers and machines."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from command_lines import (
+    assert_one_sentence,
+    assert_same_results,
+    call,
+    environment,
+    promptly,
+    run,
+    start,
+)
+
+from taichi_ants.studies.ray import _has_token
+
+SWEEP = """
+kind = "runs"
+measures = ["return_all", "greedy_deliveries"]
+seeds = 1000
+episodes = 300
+max_steps = 600
+rollouts = 3
+[training]
+learner = "sarsa"
+discount = 0.9
+epsilon = 0.3
+epsilon_decay = 0.99
+[vary]
+training.learning_rate = [0.01, 0.1, 0.2]
+task.rewards.shaping = [1, 0]
+"""
+
+
+@pytest.fixture
+def sweep(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("my.toml").write_text(SWEEP)
+    return lambda *more: call("sweep", ["my.toml", "--out", "a", *more], capsys)
+
+
+@pytest.mark.parametrize("other", [("--workers", 2), ("--shard", "1/2")])
+def test_ray_excludes_other_ways_to_spread_work(other, sweep):
+    status, _, err = sweep("--ray", *other)
+    assert status == 2
+    assert err == (
+        f"error: --ray and {other[0]} cannot be combined, because Ray already spreads all of the "
+        "work; leave one of them out.\n"
+    )
+    assert not Path("a").exists()
+
+
+@pytest.mark.parametrize("address", ["my.toml", "host", "host:", ":6379", "host:0", "ray://h:1"])
+def test_what_is_not_an_address_is_refused(address, sweep):
+    status, _, err = sweep("--ray", address)
+    assert status == 2
+    assert_one_sentence(err)
+    assert f"{address!r} is not the address of a Ray cluster; write HOST:PORT" in err
+
+
+def test_an_address_where_nobody_listens_is_refused_in_seconds(sweep):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+    began = time.monotonic()
+    status, _, err = sweep("--ray", address)
+    assert time.monotonic() - began < promptly()
+    assert status == 2
+    assert_one_sentence(err)
+    assert f"no Ray cluster listens at {address!r} (Connection refused); give the address" in err
+
+
+def test_ray_is_an_extra(monkeypatch, sweep):
+    monkeypatch.setitem(sys.modules, "ray", None)
+    status, _, err = sweep("--ray")
+    assert status == 2
+    assert_one_sentence(err)
+    assert 'needs ray, which cannot be imported; run pip install -e ".[ray]"' in err
+
+
+def test_a_token_of_this_machine_is_found(monkeypatch, tmp_path):
+    for name in ("RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert not _has_token()
+    (tmp_path / ".ray").mkdir()
+    (tmp_path / ".ray" / "auth_token").write_text("a")
+    assert _has_token()
+
+
+# The slow tests, which start Ray, and the long ones, which start a cluster.
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory, kernels):
+    """The results of the sweep without Ray."""
+    folder = tmp_path_factory.mktemp("plain")
+    (folder / "my.toml").write_text(SWEEP)
+    assert run("sweep", ["my.toml", "--out", "a", "--no-figures"], kernels, folder).returncode == 0
+    return folder / "a"
+
+
+def tree(pid: int) -> dict[int, str]:
+    """Return the command lines of all descendants of a process, by process."""
+    rows = []
+    for path in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
+            rows.append((int(path.name), parent, (path / "cmdline").read_text()))
+    found = {pid: ""}
+    for _ in range(5):
+        found |= {one: line for one, parent, line in rows if parent in found}
+    return {one: line for one, line in found.items() if one != pid}
+
+
+def blocks_in(folder: Path) -> set[Path]:
+    return set(folder.rglob("*.npz"))
+
+
+def wait_for_blocks(process: subprocess.Popen, folder: Path) -> None:
+    until = time.monotonic() + 240
+    while len(blocks_in(folder)) < 2 and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.05)
+    assert process.poll() is None
+    assert blocks_in(folder)
+
+
+@pytest.mark.slow
+def test_a_killed_worker_costs_its_blocks_only(plain, kernels, tmp_path):
+    pytest.importorskip("ray")
+    (tmp_path / "my.toml").write_text(SWEEP)
+    arguments = ["my.toml", "--out", "a", "--no-figures", "--ray"]
+    process = start("sweep", arguments, kernels, tmp_path)
+    wait_for_blocks(process, tmp_path)
+    os.kill(next(one for one, line in tree(process.pid).items() if "ray::do" in line), 9)
+    out, err = process.communicate(timeout=500)
+    assert (process.returncode, err) == (0, "")
+    assert "all results are in a/" in out
+    assert_same_results(plain, tmp_path / "a", also=["packages"])
+
+
+@pytest.mark.slow
+def test_ctrl_c_ends_ray_and_the_work_resumes(plain, kernels, tmp_path):
+    pytest.importorskip("ray")
+    (tmp_path / "my.toml").write_text(SWEEP)
+    arguments = ["my.toml", "--out", "a", "--no-figures"]
+    process = start("sweep", [*arguments, "--ray"], kernels, tmp_path)
+    wait_for_blocks(process, tmp_path)
+    others, began = tree(process.pid), time.monotonic()
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert time.monotonic() - began < promptly()
+    assert process.returncode == 130
+    assert err == "Stopped; finished parts are saved. Run the same command again to resume.\n"
+    while any(Path(f"/proc/{one}").exists() for one in others):
+        assert time.monotonic() - began < 2 * promptly()
+        time.sleep(0.05)
+    assert run("sweep", arguments, kernels, tmp_path).returncode == 0
+    assert_same_results(plain, tmp_path / "a", also=["packages"])
+
+
+CLUSTER = """
+import sys
+from ray.cluster_utils import Cluster
+cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "include_dashboard": False})
+nodes = [cluster.add_node(num_cpus=1, wait=False) for _ in range(8)]
+cluster.wait_for_nodes(timeout=240)
+print(cluster.address, flush=True)
+for line in sys.stdin:
+    cluster.remove_node(nodes.pop(), allow_graceful=False)
+    print("removed", flush=True)
+cluster.shutdown()
+"""
+
+
+@pytest.fixture(scope="module")
+def cluster(kernels):
+    """A Ray cluster of nine machines, simulated on this one; writing a line kills one of them.
+
+    Its `address` is that of Ray.
+    """
+    pytest.importorskip("ray")
+    process = subprocess.Popen(
+        [sys.executable, "-c", CLUSTER],
+        env=environment(kernels, RAY_USAGE_STATS_ENABLED="0", RAY_BACKEND_LOG_LEVEL="fatal"),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    with process:
+        process.address = process.stdout.readline().strip()
+        yield process
+        process.stdin.close()
+
+
+@pytest.mark.long
+def test_two_of_eight_machines_die(plain, kernels, cluster, tmp_path):
+    (tmp_path / "my.toml").write_text(SWEEP)
+    arguments = ["my.toml", "--out", "a", "--no-figures", "--ray", cluster.address]
+    process = start("sweep", arguments, kernels, tmp_path)
+    wait_for_blocks(process, tmp_path)
+    for _ in range(2):
+        cluster.stdin.write("\n")
+        cluster.stdin.flush()
+        assert cluster.stdout.readline() == "removed\n"
+    assert len(blocks_in(tmp_path)) < 8
+    _, err = process.communicate(timeout=500)
+    assert (process.returncode, err) == (0, "")
+    assert_same_results(plain, tmp_path / "a", also=["packages"])
+
+
+@pytest.mark.long
+def test_a_dead_head_ends_the_command_with_a_sentence(plain, kernels, cluster, tmp_path):
+    """The last test of the cluster, which does not survive it."""
+    (tmp_path / "my.toml").write_text(SWEEP)
+    arguments = ["my.toml", "--out", "a", "--no-figures"]
+    process = start("sweep", [*arguments, "--ray", cluster.address], kernels, tmp_path)
+    wait_for_blocks(process, tmp_path)
+    os.kill(next(one for one, line in tree(cluster.pid).items() if "gcs_server" in line), 9)
+    began = time.monotonic()
+    out, err = process.communicate(timeout=500)
+    assert time.monotonic() - began < 30 * promptly()  # Ray itself needs a minute
+    assert (process.returncode, out) == (1, "")
+    assert_one_sentence(err.lstrip("\n"))
+    assert "the head of the Ray cluster at '" in err
+    assert "does not answer any more; finished parts are saved, so run the same command" in err
+    assert run("sweep", arguments, kernels, tmp_path).returncode == 0
+    assert_same_results(plain, tmp_path / "a", also=["packages"])
