@@ -35,11 +35,9 @@ STATISTICS = "tests/analysis/test_statistics.py"
 FINDINGS = "tests/analysis/test_findings.py"
 ARCHIVES = "tests/files/test_archives.py"
 FILES = "tests/files/test_files.py"
-RESULTS = "tests/files/test_results.py"
-STUDIES = "tests/studies/test_runner.py"
+STUDIES = "tests/studies/test_study.py"
 EXECUTORS = "tests/studies/test_executors.py"
-RAY = "tests/studies/test_ray_workers.py"
-COMPILATION = "tests/studies/test_compilation.py"
+RAY = "tests/studies/test_ray.py"
 GROWING = "tests/commands/test_growing.py"
 RECORDING = "tests/viewer/test_recording.py"
 SERVER = "tests/live/test_server.py"
@@ -289,33 +287,31 @@ MUTATIONS = [
     ("files/__init__.py", 'with open(temporary, "wb")', 'with open(target, "wb")', FILES),
     ("files/__init__.py", "st_mtime > _ABANDONED", "st_mtime >= 0", FILES),
     ("files/__init__.py", "None if v != v else v", "v", FILES),
-    ("files/results.py", "name in may_lack and not", "not", RESULTS),
-    ("files/results.py", "or checksum_of(path) != checksum", "", RESULTS),
-    ("files/results.py", "elif not manifest_in(self._unfinished) and any", "elif any", RESULTS),
-    ("files/results.py", ' and not any(self._ready.glob("*"))', "", RESULTS),
-    ("files/results.py", "for name in (MANIFEST, SPARE) if", "for name in (MANIFEST,) if", RESULTS),
-    ("files/results.py", "max([started, *times]) - started", "0", RESULTS),
-    ("studies/blocks.py", "== digest", '!= ""', "tests/studies/test_blocks.py"),
-    ("studies/blocks.py", "if path == self._path(header):", "if header:", STUDIES),
-    ("studies/runner.py", "missing[a] |= missing[place] & lacks", "pass", STUDIES),
-    ("studies/runner.py", "families[root] for root in roots", "0 for root in roots", STUDIES),
-    ("studies/runner.py", "(a < 0) | ~missing[a]", "True", EXECUTORS),
-    ("studies/executors.py", "if failures[piece] == TRIES:", "if True:", EXECUTORS),
-    ("studies/ray_workers.py", "header[3:4] != bytes([_SETTINGS])", "False", RAY),
-    ("studies/ray_workers.py", "_check_listens(self.address)", "pass", RAY),
-    ("studies/command_line.py", 'for other in ("workers", "shard"):', "for other in ():", RAY),
-    ("studies/compilation.py", "else bool(value)", "else value", COMPILATION),
-    ("studies/compilation.py", "seeds=work.seeds[:1]", "seeds=work.seeds", COMPILATION),
-    ("studies/executors.py", "if own != of_study:", "if False:", EXECUTORS),
     (
-        "studies/executors.py",
-        "while len(coming) < (in_flight or 2 * workers):",
-        "while True:",
-        EXECUTORS,
+        "studies/store.py",
+        "is_whole = set(file.files)",
+        "is_whole = True or set(file.files)",
+        STUDIES,
     ),
-    ("studies/shards.py", "if name != _OF_TIME", "if False", GROWING),
-    ("studies/sweep.py", "values[number, :, n]", "values[0, :, n]", GROWING),
-    ("files/results.py", "seeds <= wanted.get(point, nothing)", "True", GROWING),
+    ("studies/store.py", "if one.has(arrays)]", "]", STUDIES),
+    ("studies/store.py", "np.nan if array.dtype.kind", "0 if array.dtype.kind", GROWING),
+    ("studies/study.py", "np.array_split(several, -(-len(several) // most))", "[several]", STUDIES),
+    ("studies/study.py", "- work / 2", "", STUDIES),
+    ("studies/study.py", "return point if point.after is None else", "return point or", STUDIES),
+    ("studies/study.py", "needed & first.missing(store)", "needed & False", STUDIES),
+    ("studies/study.py", "len(failed) == _HOPELESS and", "False and", EXECUTORS),
+    ("studies/points.py", "!= _usual(one)}", "}", STUDIES),
+    ("studies/points.py", '"physics": PHYSICS, "kind"', '"kind"', STUDIES),
+    ("studies/points.py", "one.checked(settings[one.name])", "settings[one.name]", STUDIES),
+    ("studies/executors.py", "if deaths[piece] < TRIES:", "if False:", EXECUTORS),
+    ("studies/executors.py", "if of_study != versions():", "if False:", EXECUTORS),
+    ("studies/executors.py", "while len(coming) < 2 * workers:", "while True:", EXECUTORS),
+    ("studies/ray.py", "            _check_listens(address)", "            pass", RAY),
+    ("studies/command_line.py", 'for other in ("workers", "shard"):', "for other in ():", RAY),
+    ("studies/folder.py", "if not points and not seeds:", "if not points:", GROWING),
+    ("studies/folder.py", "if before and not force:", "if False:", GROWING),
+    ("studies/folder.py", "and checksum_of(folder / name) == checksum", "", GROWING),
+    ("studies/sweep.py", "array[at, of].astype(float)", "array[at, 0].astype(float)", GROWING),
     # Recorder and viewer.
     ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
     ("viewer/recorder.py", "headings + 8 * carrying", "headings + 8 * ~carrying", RECORDING),
@@ -379,7 +375,7 @@ MUTATIONS = [
     ("measures/tidy.py", "ticks == last[which", "ticks <= last[which", RESULTS_OF_RUNS),
     ("analysis/results.py", "goes_on, np.roll(begins, -1)", "goes_on, begins + 1", RESULTS_OF_RUNS),
     ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
-    ("studies/sweep.py", "last = array[..., -1]", "last = array[..., 0]", SWEEPS),
+    ("studies/sweep.py", "outcome[key][..., -1]", "outcome[key][..., 0]", SWEEPS),
     # Settings.
     ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
     ("settings.py", "elif value != setting.default:", "elif False:", SETTINGS),
@@ -395,13 +391,11 @@ MUTATIONS = [
     ("analysis/sensitivity.py", "(seeds - 1)) / seeds", "(seeds - 1))", SENSITIVITY),
     ("analysis/sensitivity.py", '"seed": RANDOM_SEED', '"seed": 0', SENSITIVITY),
     # Archives of studies, and descriptions of models.
-    ("files/bundles.py", 'not {"", ".", ".."}.intersection(parts)', "True", ARCHIVE),
-    ("files/bundles.py", 'if digest.hexdigest() != facts["sha256"]:', "if False:", ARCHIVE),
-    ("files/bundles.py", "            if left < 0:", "            if False:", ARCHIVE),
-    ("files/bundles.py", "stat.S_IFMT(mode) not in _TYPES", "False", ARCHIVE),
-    ("files/bundles.py", "size > MOST_BYTES or len(members)", "len(members)", ARCHIVE),
-    ("commands/reproduce.py", "    if different:", "    if False:", ARCHIVE),
-    ("commands/reproduce.py", "if not settings.trust_plugins:", "if False:", ARCHIVE),
+    ("studies/archive.py", "return is_inside and", "return", ARCHIVE),
+    ("studies/archive.py", " and kind in (0, stat.S_IFREG)", "", ARCHIVE),
+    ("studies/archive.py", "> MOST_BYTES:", "> 2 * MOST_BYTES:", ARCHIVE),
+    ("commands/reproduce.py", "sum(bool(difference) for", "0 * sum(bool(difference) for", ARCHIVE),
+    ("commands/reproduce.py", "if not settings.trust_code:", "if False:", ARCHIVE),
     ("files/inputs.py", "return copy or path", "return path", ARCHIVE),
     ("report/odd.py", 'return row.get(f"{group}.{other}") in needed', "return True", ODD),
     ("report/odd.py", "one[n] if name in varies", "one[0] if name in varies", ODD),

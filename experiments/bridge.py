@@ -135,7 +135,7 @@ def crossed(
 
 
 def tables(plan: Plan, results: Results) -> str:
-    """Write counts and figures, and return the report, which needs all runs."""
+    """Return the report, which needs all runs, and write counts and figures."""
     if not results.present.all():
         raise AntsError("not all runs are there yet, and the report compares all designs; wait.")
     arrays = results.read(f"crossings_{plan.ticks}")

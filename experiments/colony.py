@@ -299,7 +299,7 @@ def with_bounds(
 
 
 def tables(plan: Plan, runs: Runs) -> str:
-    """Write all results, and return the report; while runs are missing, those of whole conditions.
+    """Return the report, and write all results; while runs are missing, those of whole conditions.
 
     The policies are those of median seeds.
     """

@@ -225,7 +225,7 @@ def what_policies_do(
 
 
 def tables(plan: Plan, results: Results) -> str:
-    """Write all results, and return the report; while runs are missing, those of whole rows."""
+    """Return the report, and write all results; while runs are missing, those of whole rows."""
     folder, arch = results.folder, results.arch
     rows = np.flatnonzero(results.present.all(axis=1)).tolist()
     if not rows:
@@ -274,7 +274,7 @@ def comparison_of(study: Study, world: str, arrays: Mapping[str, np.ndarray]) ->
 def write_tables(
     folder: Path, comparison: Comparison, baselines: Sequence[Baseline]
 ) -> tuple[list[Line], Audit]:
-    """Write all tables; return our table 2 and the findings on the claims."""
+    """Return our table 2 and the findings on the claims, and write all tables."""
     summaries = summarise(comparison)
     lines, audit = table2(comparison, summaries), assess(comparison)
     for name, rows in {

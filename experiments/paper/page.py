@@ -72,7 +72,7 @@ def begin(
     folder: Path,
     renders: bool,
 ) -> Callable[[], Seen]:
-    """Begin all figures, recordings and, if `renders`, animations; return a function that waits.
+    """Return a function that waits for all figures, recordings and, if `renders`, animations.
 
     This process follows the policies, because it has compiled the kernel. The second process draws
     the animations or, without them, the figures.

@@ -63,9 +63,9 @@ class Launch:
         memory = pack._ArgPack__argpack
         finalize(pack, _delete, ref(taichi), memory).atexit = False
         with runtime.quiet():
-            built = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
-            compiled = program.compile_kernel(program.config(), program.get_device_caps(), built)
-        self._context = built.make_launch_context()
+            lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
+            compiled = program.compile_kernel(program.config(), program.get_device_caps(), lowered)
+        self._context = lowered.make_launch_context()
         self._context.set_arg_argpack((0,), memory)
         on_cpu = program.config().arch in (ti.x64, ti.arm64)
         self._compiled = compiled if on_cpu else None  # a GPU copies arrays at each launch

@@ -59,7 +59,7 @@ def finished(place: Path) -> dict[str, Any]:
 
 
 def write(path: Path, place: Path, manifest: Mapping[str, Any], odd: str) -> int:
-    """Write the archive of finished results; return the number of files.
+    """Return the number of files of an archive of finished results, after writing it.
 
     The same folder gives the same bytes. `odd` is the description of the model.
     """

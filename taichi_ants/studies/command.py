@@ -52,7 +52,7 @@ class Planned:
 
     Attributes:
         module: The module, or its file.
-        own: What `plan` has returned.
+        own: The object that `plan` has returned.
         code: The plugin and the file of the module, as far as there are any.
         inputs: The contents of all files that the study has read, by their places in a folder.
         facts: Facts from which `opened` plans the same study again.
@@ -174,7 +174,7 @@ def _unfinished(place: Path, shard: tuple[int, int] | None) -> str:
 
 
 def compute(settings: Namespace, found: Planned, place: Path, figures: bool, parquet: bool) -> bool:
-    """Compute missing runs, and write the tables; return whether all runs are there."""
+    """Return whether all runs are there, after computing and, if so, writing the tables."""
     shard = settings.shard or (1, 1)
     while True:
         store = Store(place)

@@ -1,10 +1,10 @@
-"""Folders of results: what a study asks for, who has computed it, its tables, and what is missing.
+"""Folders of results: study, runs, sessions, and finished tables.
 
-    study.json    what is asked for: the module of the study with its options, settings, all runs
-    inputs/       copies of the files that the study has read
-    blocks/       the runs, see `studies.store`
-    sessions/     the command, versions and machine of each process that has computed, a file each
-    manifest.json the checksums of tables and figures, once all runs are there
+- `study.json`: the module of the study, its options and settings, and all runs that it asks for.
+- `inputs/`: copies of the files that the study has read.
+- `blocks/`: the runs, see `studies.store`.
+- `sessions/`: a file for each process that has computed, with its command, versions and machine.
+- `manifest.json`: the checksums of tables and figures, once all runs are there.
 
 No process changes the files of another one, so several can work in a folder without a lock.
 """
@@ -194,7 +194,7 @@ def _differences(before: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
 
 @contextmanager
 def session(folder: Path, shard: tuple[int, int]) -> Iterator[None]:
-    """Note in a file of its own that this process computes, how long, and what has failed."""
+    """Return a context in which a file says that this process computes, and then how it ended."""
     places = files.check_writable_folder(folder / SESSIONS, folder)
     began, name = time.time(), f"{time.strftime('%Y%m%dT%H%M%S')}-{socket.gethostname()}"
     facts = {**provenance(sys.argv), "shard": shard, "began": began, "seconds": None, "failed": []}

@@ -95,8 +95,8 @@ class RayWorkers(Executor):
             mine.set_exception(BrokenExecutor(type(error).__name__))
 
     def _count(self) -> None:
-        """Count workers in a thread of its own, because Ray waits a minute for a dead head."""
-        while not self._ended.wait(0 if self.num_workers == 1 else _LOOK_EVERY):
+        """Count workers in another thread, because Ray waits a minute for a dead head."""
+        while not self._ended.is_set():
             with suppress(Exception):  # `check` reports a dead head
                 has = self._ray.cluster_resources()
                 room = (has.get(name, 0) // n for name, n in self._needs.items() if n)

@@ -1,7 +1,7 @@
 """A store: arrays of runs by point and seed, in files that are written once.
 
-A run is the key of a point with a seed. Equal runs have equal arrays, whoever computed them. So
-files never change, several processes can add the same run without a lock, and copying the files of
+A run is the key of a point with a seed. Equal runs have equal arrays in all processes. So files
+never change, several processes can add the same run without a lock, and copying the files of
 one store to another merges them.
 
 An array can have parts, which are found by its name: "entropy" are "entropy.trail" and

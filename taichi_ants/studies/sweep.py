@@ -86,7 +86,7 @@ class Sweep:
         return [place[point] for point in self.points]
 
     def tables(self, results: Results) -> str:
-        """Write all tables and figures of the runs that are there; return the report.
+        """Return the report, after writing all tables and figures of the runs that are there.
 
         The value of a registered measure is its mean over rollouts, at the last tick of each.
         """
@@ -257,7 +257,7 @@ def plan(options: Mapping[str, Any]) -> Sweep:
 
 
 def tables(sweep: Sweep, results: Results) -> str:
-    """Write all tables and figures of the runs that are there; return the report."""
+    """Return the report, after writing all tables and figures of the runs that are there."""
     return sweep.tables(results)
 
 

@@ -629,7 +629,7 @@ def test_ranges_of_events_are_checked_and_whole(tmp_path):
 
 def test_ranges_of_entries_of_groups_are_checked_and_whole(tmp_path):
     text = PROTOCOL.replace("at.1.remove_ants = [0.0, 0.5]", "task.fields.home.level = {R}")
-    text = text.replace("[training]", '[task.fields.home]\nlaid = "always"\n\n[training]')
+    text = text.replace("[training]", '[task.fields.home]\ndeposited_when = "always"\n\n[training]')
     text = 'design = "random"\nsamples = 4\n' + text
     (tmp_path / "my.toml").write_text(text.replace("R", "from = 5, to = 50"))
     points = read_sweep(tmp_path / "my.toml").study.points

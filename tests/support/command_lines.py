@@ -118,7 +118,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 # The keys of a manifest that depend on when, where and how a command ran.
-OF_THE_RUN = ("command", "finished", "seconds", "checksum")
+OF_THE_RUN = ("command", "finished", "seconds", "checksum", "commit", "clean")
 
 
 def assert_same_results(one: Path | str, other: Path | str, also: Sequence[str] = ()) -> None:
