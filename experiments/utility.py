@@ -226,9 +226,9 @@ def forage(
     highest utility of the other goal. `docs/baselines.md` lists sources and deviations.
 
     All `ants` of a colony start in the nest, which has room for all; a cell has room for
-    `capacity`. `evaporation` is the share of utilities that evaporates per tick, `exploration` the
-    probability of a random step if a neighbour has a utility above 0, and `momentum` that of a step
-    straight ahead, if possible, where none has. More colonies do not change the first ones.
+    `capacity`. `evaporation` is the share of utilities that evaporates per tick. `exploration` is
+    the probability of a random step if a neighbour has a utility above 0. Where none has,
+    `momentum` is that of a step straight ahead, if possible. More colonies do not change the first.
     """
     cells, neighbours, is_food, nest, steps = open_cells(world)
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)
