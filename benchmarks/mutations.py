@@ -88,7 +88,7 @@ MUTATIONS = [
     ("engines/colony/steps.py", "homing.half", "cues.half", COLONY),
     ("engines/colony/kernels.py", "features.carriers_follow if", "outbound if", CHOICE),
     ("measures/tidy.py", "column.startswith(f", "column == (f", RESULTS_OF_RUNS),
-    ("rendering/rasteriser.py", "snapshot.ant_nests % len", "0 * snapshot.ant_nests % len", RASTER),
+    ("rendering/rasteriser.py", "ANTS[snapshot.ant_nests]", "ANTS[0 * snapshot.ant_nests]", RASTER),
     (
         "viewer/recorder.py",
         "self.colony.tables_of_ants[self.world, slots] *",
@@ -97,8 +97,8 @@ MUTATIONS = [
     ),
     (
         "rendering/rasteriser.py",
-        "[np.maximum(snapshot.ant_foods, 0) %",
-        "[0 * snapshot.ant_foods %",
+        "FOODS[np.maximum(snapshot.ant_foods, 0)]",
+        "FOODS[0 * snapshot.ant_foods]",
         RASTER,
     ),
     ("engines/colony/state.py", '{"nest": self.n_nests, "caste"', '{"caste"', NESTS),
