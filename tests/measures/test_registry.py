@@ -53,7 +53,6 @@ def test_your_own_measure_is_read_as_the_others():
     assert values["growth"].reshape(3, 3)[-1].tolist() == np.ptp(by_world, axis=0).tolist()
     assert np.isnan(values["loads.without"]).all()
     assert result.series.units["north"] == "ants"
-    assert "growth" in measures.names()
 
 
 def test_a_measure_of_counts_works_for_colonies_and_lone_ants():
