@@ -183,3 +183,4 @@ def expect(name: str, value: object, *kinds: type) -> None:
 
 
 _PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}
+_PLAIN["Callable"] = "a function"

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from taichi_ants.checks import check_follows, check_learns, check_same_kernels
 from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
 from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
@@ -49,7 +48,7 @@ if TYPE_CHECKING:
 
 One = TypeVar("One", bound="Record")
 _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
-_MOST = 2**24  # ants, see `checks.MAX_ANTS`
+_MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Is("cells, each [x, y, z], or the name of a region", or_region=True)
 _NAMED = {one.name: one for one in named_groups(Task)}
 
@@ -493,6 +492,41 @@ INTERVENTIONS: dict[str, type[Intervention]] = {
         *(TaskNumbers, Epsilon, LearningRate, Policy, Episode),
     )
 }
+
+
+def check_learns(learns: bool) -> None:
+    """Raise AntsError unless ants learn, so that they have a learning rate."""
+    if not learns:
+        raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
+
+
+def check_follows(learns: bool, task: Task) -> None:
+    """Raise AntsError unless ants follow a policy and do not learn."""
+    if learns or not task.choice.needs_table:
+        raise AntsError(
+            f"the ants of this colony learn, are given actions, or choose without action values "
+            f"(`task.choice.rule` is {task.choice.rule!r}), so they follow no policy; make a "
+            'colony with sharing="frozen" and q_values.'
+        )
+
+
+def check_same_kernels(task: Task, changed: Task, learns: bool) -> None:
+    """Raise AntsError if a changed task needs other kernels; `learns` says whether ants learn."""
+    castes = {name: caste.fixed for name, caste in task.castes.items()}
+    if castes != {name: caste.fixed for name, caste in changed.castes.items()}:
+        raise AntsError(
+            "the task cannot change the share, ants, nest or policy of a caste in an episode, or "
+            "whether it has thresholds; change its other numbers."
+        )
+    if task.compiled(learns) != changed.compiled(learns):
+        old, new = flat(task.as_dict()), flat(changed.as_dict())
+        names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+        changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)
+        raise AntsError(
+            f"the task cannot change {' and '.join(changes)} in an episode, because that requires "
+            "other kernels; change settings that kernels read as numbers, for example "
+            "pheromone.level."
+        )
 
 
 def from_dict(facts: Any) -> Intervention:

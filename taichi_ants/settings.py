@@ -344,6 +344,27 @@ class Settings(metaclass=_Checked):
                 f"{_either(map(repr, values))}."
             )
 
+    def uses(self) -> dict[str, str]:
+        """Return the features in use, each with the words of messages about it.
+
+        A feature is a setting that differs from its default, by its name below these settings, for
+        example `noise.slip`. If its values are words, it includes the value: `choice.rule=softmax`.
+        A mapping of named settings is one feature.
+        """
+        found: dict[str, str] = {}
+        for one in declared(type(self)):
+            value = getattr(self, one.name)
+            if value == one.default:
+                continue
+            if isinstance(value, Settings):
+                found |= {f"{one.name}.{name}": words for name, words in value.uses().items()}
+            elif isinstance(value, Named):
+                found[one.name] = f"`{one.path}` has {', '.join(value)}"
+            else:
+                word = f"={value}" if one.allowed_words else ""
+                found[one.name + word] = f"`{one.path}` is {shown(value)}"
+        return found
+
     def but(self: Self, **changes: Any) -> Self:
         """Return the settings with changes; settings that lose their effect get their defaults.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taichi_ants.checks import checked_world
+from taichi_ants.arguments import checked_world
 from taichi_ants.errors import AntsError
 from taichi_ants.task.constants import EMPTY, FOOD, QUEEN
 from taichi_ants.worlds.world import World
@@ -20,7 +20,7 @@ def open_cells(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, i
     Raises:
         AntsError: `world` is not a World, or no food is reachable.
     """
-    ground = checked_world(world, learns=True).ground()
+    ground = checked_world(world, True, "a published model", ()).ground()
     cells = np.flatnonzero(np.isin(ground, (EMPTY, FOOD, QUEEN)))
     number = np.full(ground.size, -1, np.int32)
     number[cells] = np.arange(len(cells), dtype=np.int32)

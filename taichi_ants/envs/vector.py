@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +16,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from taichi_ants import checks
+from taichi_ants import arguments
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.envs.rollout import Choices, Rollout, checked_actions, checked_plan
 from taichi_ants.errors import (
@@ -76,21 +76,23 @@ class Ants(ABC):
         evaporates: Whether trails evaporate.
         max_steps: The step limit of an episode.
         shown: The format of observations.
-        colonies: Whether worlds can have several nests and kinds of food.
     """
 
-    colonies = False
-
     def __init__(
-        self, n_worlds: int, task: Task, given: Arguments, render_modes: Sequence[str]
+        self,
+        n_worlds: int,
+        task: Task,
+        given: Arguments,
+        supports: Collection[str],
+        render_modes: Sequence[str],
     ) -> None:
-        self.task, self.worlds = task, _worlds_of(given.world, n_worlds, self.colonies)
+        self.task, self.worlds = task, _worlds_of(given.world, n_worlds, supports)
         self.evaporates = task.evaporation_in_training
         if given.evaporation is not None:
             self.evaporates = checked_flag("evaporation", given.evaporation)
         if given.render_mode is not None:
             check_one_of("render_mode", given.render_mode, render_modes)
-        self.max_steps = checks.checked_max_steps(given.max_steps, task)
+        self.max_steps = arguments.checked_max_steps(given.max_steps, task)
         if given.max_episode_steps is not None:
             limit = checked_whole("max_episode_steps", given.max_episode_steps)
             self.max_steps = min(self.max_steps, limit)
@@ -149,7 +151,7 @@ class Ants(ABC):
         return {**vars(self), "_scene": None}  # `draw` creates it again
 
 
-def _worlds_of(world: Any, most: int, colonies: bool) -> tuple[World, ...]:
+def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World, ...]:
     single = isinstance(world, (str, os.PathLike, Mapping, World))
     given = [world] if single else world
     if not isinstance(given, (list, tuple)) or not given:
@@ -158,7 +160,10 @@ def _worlds_of(world: Any, most: int, colonies: bool) -> tuple[World, ...]:
         )
     if len(given) > most:
         raise AntsError(f"world lists {count(len(given), 'world')}; it must list at most {most}.")
-    several = tuple(checks.checked_world(_world_of(one), several=colonies) for one in given)
+    several = tuple(
+        arguments.checked_world(_world_of(one), what="the environment", supports=supports)
+        for one in given
+    )
     ranges = {one.ranges for one in several}
     if len(ranges) > 1:
         raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must be the same.")
@@ -184,7 +189,7 @@ def task_of(given: Rules | None) -> Task:
     if isinstance(given, str):
         check_one_of("task", given, tuple(Task.named()))
         return Task.named()[given]
-    return checks.checked_task(Task() if given is None else given)
+    return Task() if given is None else given
 
 
 def check_options(options: Any, *allowed: str) -> dict[str, Any]:
@@ -396,7 +401,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         """
         waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
         length, actions, q_values = checked_plan(policy, steps, n, ants.task)
-        epsilon, choices = checks.checked_share("epsilon", epsilon), None
+        epsilon, choices = arguments.checked_share("epsilon", epsilon), None
         if q_values is None and (epsilon or seed is not None):
             raise AntsError(
                 f"epsilon is {epsilon} and seed is {seed}, but the actions are given; leave both "

@@ -6,6 +6,7 @@ An ant takes an action with the largest value; ties are broken at random with eq
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -17,6 +18,7 @@ import numpy.typing as npt
 from taichi_ants.errors import AntsError, check_one_of, expect, shown
 from taichi_ants.files import PathLike, to_json
 from taichi_ants.files.archives import Kind
+from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Choice, Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
@@ -164,25 +166,29 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
 WITHOUT_LEARNING = {"trail_follower": trail_follower, "random": random_policy}
 
 
-def frozen_policy(name_or_path: PathLike, observation: str = "paper") -> ActionValues:
+def frozen_policy(
+    name_or_path: PathLike, observation: str = "paper", name: str = "policy"
+) -> ActionValues:
     """Return a policy without learning by its name, or the policy in a file (.npz).
+
+    Messages call it `name`.
 
     Raises:
         AntsError: There is no such policy for this observation, or the file cannot be used.
     """
-    expect("policy", name_or_path, str, os.PathLike)
+    expect(name, name_or_path, str, os.PathLike)
     name_or_path = os.fspath(name_or_path)
     if name_or_path in WITHOUT_LEARNING:
         return WITHOUT_LEARNING[name_or_path](observation)
     if not name_or_path.endswith(".npz"):
         raise AntsError(
-            f"policy is {shown(name_or_path)}; it must be one of {', '.join(WITHOUT_LEARNING)}, or "
+            f"{name} is {shown(name_or_path)}; it must be one of {', '.join(WITHOUT_LEARNING)}, or "
             "the path of a policy file (.npz)."
         )
     policy = load_policy(name_or_path)
     if policy.observation != observation:
         raise AntsError(
-            f"policy is {shown(name_or_path)}, which is for the observation "
+            f"{name} is {shown(name_or_path)}, which is for the observation "
             f"{policy.observation!r}, but task.observation is {observation!r}; set the observation "
             "of the policy."
         )
@@ -235,8 +241,11 @@ def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
 
 
 def checked_values(q_values: Any, task: Task) -> np.ndarray:
-    """Return action values as float32 (..., n_states, 5); AntsError unless they are finite."""
-    shape = (task.n_states, N_ACTIONS)
+    """Return action values as float32 (..., n_states, 5); AntsError unless they are finite.
+
+    Also accepts an object with `q_values`: a `TrainingResult`, a `Policy` or a `Colony`.
+    """
+    q_values, shape = getattr(q_values, "q_values", q_values), (task.n_states, N_ACTIONS)
     try:
         values = np.asarray(q_values)
     except ValueError:  # rows of different lengths
@@ -249,6 +258,35 @@ def checked_values(q_values: Any, task: Task) -> np.ndarray:
             f"end in {shape}."
         )
     return finite("q_values is", values)
+
+
+def checked_table(q_values: Any, task: Task) -> np.ndarray:
+    """Return the one table of `q_values`, float32 (n_states, 5); AntsError if it has several."""
+    tables = checked_values(q_values, task)
+    if math.prod(tables.shape[:-2]) > 1:
+        whose = "its " if hasattr(q_values, "q_values") else ""
+        places = ", ".join("0" * (tables.ndim - 2))
+        raise AntsError(
+            f"q_values has shape {tables.shape}, which is {math.prod(tables.shape[:-2])} tables; "
+            f"give one of them, for example {whose}q_values[{places}]."
+        )
+    return tables.reshape(tables.shape[-2:])
+
+
+def check_finite(
+    tables: np.ndarray, configs: Sequence[TrainingConfig], seeds: Sequence[int]
+) -> None:
+    """Raise AntsError if learnt tables (configurations * seeds, ...) are not finite."""
+    with np.errstate(all="ignore"):
+        if np.isfinite(tables.sum()):  # a copy of a colony's tables could take much memory
+            return
+    finite = np.isfinite(tables).reshape(len(configs), len(seeds), -1).all(axis=-1)
+    for c, s in np.argwhere(~finite)[:1]:
+        raise AntsError(
+            f"learner {configs[c].learner!r} computed action values that are not finite, with "
+            f"{configs[c]} and seed {seeds[s]}; correct its TD error, or use smaller rewards and "
+            "action values."
+        )
 
 
 def finite(what: str, values: np.ndarray) -> np.ndarray:

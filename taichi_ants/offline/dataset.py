@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.checks import checked_seeds, checked_share
+from taichi_ants.arguments import checked_seeds, checked_share
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_array, checked_whole, expect
 from taichi_ants.files import PathLike, smallest

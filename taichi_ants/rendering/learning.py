@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import checks
+from taichi_ants import arguments
 from taichi_ants.engines.runs.training import evaluate, train
 from taichi_ants.errors import AntsError, count, entries_of, expect, shown, whole
 from taichi_ants.learners.config import TrainingConfig
@@ -118,7 +118,7 @@ def typical_seed(
         The seed, and for each checkpoint the number of seeds that deliver within `max_steps`.
     """
     task, checkpoints = _checked(task, checkpoints, progress)
-    chosen = checks.checked_seeds(seeds)
+    chosen = arguments.checked_seeds(seeds)
     distances, deliver = np.zeros(len(chosen)), []
     for done, n in enumerate(checkpoints, start=1):
         tables = _tables(world, config, chosen, n, task)
@@ -135,8 +135,8 @@ def typical_seed(
 def _checked(
     task: Task | None, checkpoints: Sequence[int], progress: object
 ) -> tuple[Task, list[int]]:
-    checks.check_progress(progress)
-    task = checks.checked_task(Task() if task is None else task)
+    arguments.check_progress(progress)
+    task = arguments.checked_lone_task(task)
     listed = entries_of(checkpoints)
     if listed is None:
         raise AntsError(

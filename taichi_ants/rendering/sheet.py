@@ -11,10 +11,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from taichi_ants.checks import checked_table, checked_task
 from taichi_ants.errors import expect
 from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
 from taichi_ants.grid.hexgrid import centre_of
+from taichi_ants.learners.policies import checked_table
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import (
@@ -88,7 +88,8 @@ def policy_sheet(
             run, or a `Policy`.
         task: The task of the policy, which defines its states; None is the paper's.
     """
-    task = checked_task(Task() if task is None else task)
+    task = Task() if task is None else task
+    expect("task", task, Task)
     table = checked_table(q_values, task)
     expect("title", title, str)
     observation, spread = task.sees, usual_spread(table, task.sees)

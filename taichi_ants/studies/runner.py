@@ -18,8 +18,9 @@ from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
-from taichi_ants import __version__, checks, files
+from taichi_ants import __version__, arguments, files
 from taichi_ants.errors import AntsError, checked_whole, count, shown
+from taichi_ants.features import COLONY, LONE
 from taichi_ants.studies.blocks import Blocks, Outcome
 from taichi_ants.studies.executors import Executor, Plugin, Reduce, Work, completed
 from taichi_ants.studies.interruption import stop_if_noted
@@ -52,7 +53,7 @@ class Study(Generic[PointKind]):
     seeds: tuple[int, ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "seeds", checks.checked_seeds(self.seeds))
+        object.__setattr__(self, "seeds", arguments.checked_seeds(self.seeds))
         if not self.points:
             raise AntsError("`points` is empty; give at least one point.")
         places: Any = dict.fromkeys((one.world, one.pool, one.ants) for one in self.points)
@@ -66,7 +67,8 @@ class Study(Generic[PointKind]):
             starts = [*zip(several, self.seeds, strict=False), *((one, 0) for one in pool or ())]
             for one, seed in starts:
                 of_colony = isinstance(self.points[0], ColonyPoint)
-                checks.checked_world(one, learns=True, several=of_colony).start(seed, ants)
+                who = ("a colony", COLONY) if of_colony else ("a run of one ant", LONE)
+                arguments.checked_world(one, True, *who).start(seed, ants)
 
     @cached_property
     def in_order(self) -> tuple[PointKind, ...]:

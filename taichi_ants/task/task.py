@@ -394,6 +394,12 @@ class Task(Settings, path="task"):
         """The registered observation."""
         return observations.get(self.observation)
 
+    def uses(self) -> dict[str, str]:
+        """Return the features in use; one is `reads`, fields that the observation reads."""
+        reads = ", ".join(self.sees.reads)
+        words = f"the observation {self.observation!r} reads {reads}"
+        return super().uses() | ({"reads": words} if reads else {})
+
     @property
     def n_states(self) -> int:
         """The number of states."""

@@ -119,6 +119,11 @@ class World:
         """The number of kinds of food, at least 1."""
         return int(self.food_kinds.max(initial=0)) + 1
 
+    def uses(self) -> dict[str, str]:
+        """Return the features in use, each with the words of messages about it; see `Task.uses`."""
+        counts = {"nests": self.n_nests, "kinds of food": self.n_food_kinds}
+        return {name: f"the world has {n} {name}" for name, n in counts.items() if n > 1}
+
     def with_regions(self, regions: Mapping[str, Any]) -> World:
         """Return the world with more regions, which replace those of the same names."""
         more = validation.parse_regions(self.grid, regions)

@@ -18,7 +18,6 @@ from taichi_ants import AntsError, Task, worlds
 from taichi_ants.envs import Event
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
-from taichi_ants.task import Life
 from taichi_ants.task.constants import GIVE
 from taichi_ants.task.task import foraging
 
@@ -300,8 +299,6 @@ def test_steps_in_the_wrong_order_and_wrong_actions():
     [
         ({"num_envs": 7}, "num_envs is 7; .* a multiple of ants, 6"),
         ({"ants": 0}, "ants is 0; "),
-        ({"task": Task(life=Life(births=True))}, "life of the task is Life.*leave out births"),
-        ({"task": Task(life=Life(lifespan=9))}, "life of the task is Life.*lifespan"),
         ({"autoreset_mode": "never"}, "autoreset_mode is 'never'; it must be one of NextStep"),
         (
             {"task": Task(), "autoreset_mode": NEXT},

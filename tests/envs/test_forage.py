@@ -22,7 +22,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 from gymnasium.wrappers import TimeLimit
 
-from taichi_ants import AntsError, Life, Pheromone, Task, World, rollout, task, worlds
+from taichi_ants import AntsError, Pheromone, Task, World, rollout, task, worlds
 from taichi_ants.envs import Event, Reason
 from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
 from taichi_ants.envs.formats import FORMATS
@@ -441,8 +441,6 @@ def test_wrong_steps_raise_what_gymnasium_raises():
         ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
         ({"task": 3}, "a Task"),
         ({"world": {"ranges": (3, 3, 3)}}, "give a World or its `as_dict()`"),
-        ({"task": Task(life=Life(regrowth=0))}, "use a Colony"),
-        ({"task": Task(pheromone=Pheromone(diffusion=0.5))}, "use a Colony"),
         ({"delivery": "never"}, "delivery is 'never'"),
         ({"evaporation": 2}, "evaporation is 2"),
         ({"max_steps": 0}, "max_steps is 0"),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from taichi_ants import AntsError, TrainingConfig, learners
-from taichi_ants.checks import checked_share
+from taichi_ants.arguments import checked_share
 
 GOOD = {
     **{"learner": "dyna_q", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3},

@@ -31,11 +31,11 @@ from taichi_ants import (
 )
 from taichi_ants import task as tasks
 from taichi_ants.files import archives
-from taichi_ants.learners.policies import trail_follower
+from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live import session as session_module
+from taichi_ants.live.choices import Choices
 from taichi_ants.live.exports import gif_bytes, recording
 from taichi_ants.live.session import Log, Session, Setup
-from taichi_ants.live.setup import check_cues
 from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE
 from taichi_ants.viewer import Recording, recorder
 from taichi_ants.viewer.frames import CLOCK, POINT
@@ -624,8 +624,11 @@ def test_what_the_task_or_the_page_lacks_is_refused_with_what_to_do():
         Session(replace(SETUPS["nests"], world="Q   G   F\n"))
     with pytest.raises(AntsError, match=r"castes.guide.policy` is '/etc/passwd', but the live pag"):
         replace(OF_GROUPS, task=GROUPS.but(castes={"guide": {"policy": "/etc/passwd"}}))
-    with pytest.raises(AntsError, match=r"the task has castes nurse, scout and guide, which the"):
-        check_cues(GROUPS)
+    policy = Policy(np.zeros((GROUPS.n_states, 5), np.float32), "ants", {"task": GROUPS.as_dict()})
+    with pytest.raises(
+        AntsError, match=r"`task.foods` has seed, sap, which the form of the live"
+    ):
+        Choices({"mine": policy})
 
 
 @pytest.mark.slow

@@ -170,7 +170,6 @@ def test_a_colony_of_one_with_a_table_of_its_own_is_a_run():
         ({"behaviour": np.zeros((128, 4))}, "q_values has shape"),
         ({"episodes": 0}, "episodes is 0"),
         ({"epsilon": 2}, "epsilon is 2"),
-        ({"task": Task(life=Life(births=True))}, "use a Colony"),
     ],
 )
 def test_what_cannot_be_recorded(change, says):

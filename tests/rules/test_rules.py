@@ -435,7 +435,7 @@ REFUSED = [
     (lambda: Task("ants", choice="weber", noise={"misread": 0.1}), "`task.noise` is"),
     (
         lambda: train(worlds.paper(), own_config(), 0, 1, task=Task(reward="shaped")),
-        "your rules shaped; a run of one ant supports only built-in rules",
+        "`task.reward` is 'shaped', which a run of one ant does not support",
     ),
 ]
 

@@ -8,8 +8,6 @@ from scipy.stats import chisquare
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, record, task, train, worlds
 from taichi_ants.analysis.bounds.episodes import EpisodeBounds
-from taichi_ants.envs.colony import ColonyWorlds
-from taichi_ants.envs.forage import LoneAnts
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
@@ -261,7 +259,6 @@ REFUSED = [
         lambda: Colony(worlds.paper(), CELLS, PLAIN, sharing="frozen", q_values=GREEDY_VALUES),
         'set sharing to "frozen" and training to None, and leave out q_values',
     ),
-    (lambda: train(worlds.paper(), PLAIN, 0, 1, task=CELLS), "only colonies support it"),
     (
         lambda: train(
             worlds.paper(),
@@ -279,14 +276,6 @@ REFUSED = [
             TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0),
         ),
         "learner 'expected_sarsa'",
-    ),
-    (
-        lambda: LoneAnts(1, Task(choice="softmax"), None, GIVEN),
-        "the actions of an environment are given; leave `task.choice` out",
-    ),
-    (
-        lambda: ColonyWorlds(1, CELLS, GIVEN, ants=1, start="nest"),
-        "the actions of an environment are given",
     ),
     (lambda: EpisodeBounds(worlds.paper(), Task(noise=Noise(slip=0.1))), "a task without noise"),
     (

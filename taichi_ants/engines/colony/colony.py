@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import checks
+from taichi_ants import arguments
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ALL, ColonyState, Which, checked_worlds
@@ -118,7 +118,7 @@ class Colony(ColonyState):
             listed = entries_of(seeds)
             if listed is None:
                 raise AntsError(f"seeds is {shown(seeds)}; give a list of one seed per world.")
-            checked = [seed for one in listed for seed in checks.checked_seeds(one)]
+            checked = [seed for one in listed for seed in arguments.checked_seeds(one)]
             if len(checked) != np.count_nonzero(which):
                 n = int(np.count_nonzero(which))
                 raise AntsError(
@@ -215,7 +215,7 @@ class Colony(ColonyState):
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         places = self._checked_places(worlds, episodes)
-        checks.check_progress(progress)
+        arguments.check_progress(progress)
         recorder, timetable = Recorder(measures, every), Timetable(self, protocol, ticks)
         outcomes = []
         for episode in range(episodes):

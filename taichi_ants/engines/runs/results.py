@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.checks import checked_max_steps, checked_seeds
+from taichi_ants.arguments import checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES, padded
 from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, check_array, shown

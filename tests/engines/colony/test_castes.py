@@ -8,13 +8,9 @@ from random_castes import drawn_castes
 from random_colonies import random_colony
 from scipy.stats import kstest, lognorm, truncnorm, uniform
 
-from taichi_ants import AntsError, Colony, Task, TrainingConfig, task, train, worlds
-from taichi_ants.analysis.bounds.limits import limits_of
+from taichi_ants import AntsError, Colony, Task, TrainingConfig, task, worlds
 from taichi_ants.engines.colony.interventions import Interventions
-from taichi_ants.envs.colony import ColonyWorlds
-from taichi_ants.envs.vector import Arguments
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
-from taichi_ants.offline import record_colony
 from taichi_ants.task import Labour, Threshold
 from taichi_ants.task.caste import chances_in, numbers_in
 from taichi_ants.task.events import Event
@@ -211,23 +207,12 @@ def test_numbers_of_castes_change_in_an_episode():
             interventions.set_task(colony.task.but(castes={"a": fixed}))
 
 
-CASTES = Task(castes={"minor": {}})
-GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
-
-
 @pytest.mark.parametrize(
     ("make", "says"),
     [
         (
-            lambda: train(worlds.paper(), TRAINING, 0, 1, task=CASTES),
-            "only colonies support castes",
-        ),
-        (lambda: limits_of(worlds.paper(), CASTES), "a bound on deliveries does not support"),
-        (lambda: record_colony(follows(CASTES), 1, 1), "record_colony does not support castes"),
-        (lambda: ColonyWorlds(1, CASTES, GIVEN, 2, "nest"), "an environment does not"),
-        (
-            lambda: Colony(worlds.paper(), CASTES, sharing="frozen"),
-            "a colony with given actions does not support castes",
+            lambda: Colony(worlds.paper(), Task(castes={"minor": {}}), sharing="frozen"),
+            "`task.castes` has minor, which a colony with given actions does not support",
         ),
         (
             lambda: Colony(

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, worlds
-from taichi_ants.checks import MAX_ANTS
+from taichi_ants.arguments import MAX_ANTS
 from taichi_ants.engines import arguments
 from taichi_ants.engines.colony.layout import NestRow
 from taichi_ants.learners.policies import random_policy, trail_follower

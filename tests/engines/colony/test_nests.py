@@ -9,12 +9,10 @@ import numpy as np
 import pytest
 from random_colonies import RandomColony, random_colony, with_nests
 
-from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, World, train
-from taichi_ants.analysis.bounds.limits import limits_of
+from taichi_ants import AntsError, Colony, Life, Task, TrainingConfig, World
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import AddAnts, Place, RemoveAnts
 from taichi_ants.learners.policies import load_policy, save_policy, trail_follower
-from taichi_ants.offline import record_colony
 from taichi_ants.protocol import At
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.rendering import colony_snapshots, frames
@@ -238,11 +236,6 @@ def test_pictures_show_every_queen():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: train(WORLD, TRAINING, 1, 1), "the world has 2 nests and 2 kinds of food; only"),
-        (lambda: limits_of(WORLD), "the world has 2 nests and 2 kinds of food"),
-        (lambda: limits_of(replace(WORLD, other_queens=(), food_kinds=()), Task(foods=KINDS)),
-         "`task.foods` has the kinds seed and sugar; a bound on deliveries does not support kinds"),
-        (lambda: record_colony(two_nests(), 1, 5), "record_colony supports one nest"),
         (lambda: AddAnts(number=1, nest=2).apply(Interventions(begun())), "nest is 2"),
         (lambda: Place("food", [[1, 0, 0]], kind="wax").apply(Interventions(begun())),
          "`place.kind` is 'wax'"),

@@ -13,7 +13,6 @@ from random_rewards import random_rewards
 from random_worlds import random_world
 
 from taichi_ants import (
-    AntsError,
     TrainingConfig,
     evaluate,
     learners,
@@ -23,7 +22,7 @@ from taichi_ants import (
 )
 from taichi_ants.reference.ants import starts
 from taichi_ants.settings import declared
-from taichi_ants.task import Life, Pheromone, Task, observations
+from taichi_ants.task import Pheromone, Task, observations
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 from taichi_ants.task.events import Event
 from taichi_ants.worlds import World, paper
@@ -229,22 +228,6 @@ def test_percepts_are_the_papers_states_whatever_the_observation():
         assert np.array_equal(other.percepts, papers.states)
         assert np.array_equal(other.next_percepts, papers.next_states)
         assert not np.array_equal(other.states, papers.states)
-
-
-@pytest.mark.parametrize(
-    ("task", "says"),
-    [
-        (Task(pheromone=Pheromone(evaporation="exponential")), "evaporation='exponential'"),
-        (Task(pheromone=Pheromone(diffusion=0.1)), "diffusion=0.1"),
-        (Task(life=Life(births=True)), "births=True"),
-        (Task(choice="deneubourg"), "is 'deneubourg'"),
-    ],
-)
-def test_what_runs_cannot_do_is_refused_by_name(task, says):
-    for function in (train, trace_training):
-        with pytest.raises(AntsError, match="use a Colony") as caught:
-            function(paper(), random_config(0, "sarsa"), 0, 1, 1, task=task)
-        assert says in str(caught.value)
 
 
 def test_starts_of_ants():

@@ -17,7 +17,7 @@ from taichi_ants import (
     train,
     worlds,
 )
-from taichi_ants.checks import checked_seeds, checked_seeds_for
+from taichi_ants.arguments import checked_seeds, checked_seeds_for
 from taichi_ants.engines.runs.engine import pieces, size_of_launch
 from taichi_ants.errors import checked_whole, shown
 from taichi_ants.rendering import Scene
@@ -44,11 +44,11 @@ def with_more(learner, **more):
 @pytest.mark.parametrize(
     ("configs", "text"),
     [
-        ([], "configs is empty"),
+        ([], "configs is []"),
         (None, "configs is None"),
         (3, "configs is 3"),
         ("q_learning", "configs is 'q_learning'"),
-        ([CONFIG, None], "a configuration is None"),
+        ([CONFIG, None], "the configuration is None"),
         (TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99), "there is no learner 'td_zero'"),
         (
             with_more("dyna_q", planning_steps=0),
