@@ -625,9 +625,7 @@ def test_what_the_task_or_the_page_lacks_is_refused_with_what_to_do():
     with pytest.raises(AntsError, match=r"castes.guide.policy` is '/etc/passwd', but the live pag"):
         replace(OF_GROUPS, task=GROUPS.but(castes={"guide": {"policy": "/etc/passwd"}}))
     policy = Policy(np.zeros((GROUPS.n_states, 5), np.float32), "ants", {"task": GROUPS.as_dict()})
-    with pytest.raises(
-        AntsError, match=r"`task.foods` has seed, sap, which the form of the live"
-    ):
+    with pytest.raises(AntsError, match=r"`task.foods` has seed, sap, which the form of the live"):
         Choices({"mine": policy})
 
 

@@ -7,7 +7,6 @@ import pytest
 from scipy.stats import chisquare
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, record, task, train, worlds
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
@@ -276,11 +275,6 @@ REFUSED = [
             TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0),
         ),
         "learner 'expected_sarsa'",
-    ),
-    (lambda: EpisodeBounds(worlds.paper(), Task(noise=Noise(slip=0.1))), "a task without noise"),
-    (
-        lambda: record_colony(Colony(worlds.paper(), CELLS, None, sharing="frozen")),
-        "probabilities of actions do not follow",
     ),
 ]
 
