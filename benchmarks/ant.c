@@ -46,7 +46,7 @@ static int observe(const World *world, const Ant *ant)
         for (int k = 0; k < 3; k++) {
             int ground = ant->ground[in_view(world, ant, k)];
             int lure = (ground == 0) & (nearer >> k);
-            state = state << 2 | (lure ? SEES_LURE : ground >> 2);
+            state = state << 2 | (lure ? SEES_CUE : ground >> 2);
         }
         return state;
     }
@@ -58,7 +58,7 @@ static int observe(const World *world, const Ant *ant)
         strongest = levels[k] > strongest ? levels[k] : strongest;
     }
     for (int k = 0; k < 3; k++)
-        state = state << 2 | (2 * levels[k] >= strongest ? SEES_LURE : grounds[k] & 3);
+        state = state << 2 | (2 * levels[k] >= strongest ? SEES_CUE : grounds[k] & 3);
     return state;
 }
 
@@ -74,7 +74,7 @@ static int act(const World *world, Ant *ant, int state, int action)
         ant->cell = target;
         if (ant->carries)
             ant->trail[target] = DEPOSIT;
-        return code == SEES_LURE;
+        return code == SEES_CUE;
     }
     int goals[3], n = 0;
     for (int k = 0; k < 3; k++)

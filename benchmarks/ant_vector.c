@@ -236,7 +236,7 @@ INLINE void judge(Ants *ants)
         Mask lure = (trail & (Mask)~ants->carries) | (near & ants->carries);
         Ints code = _mm512_srlv_epi32(ants->view[k], shift);
         code = _mm512_maskz_and_epi32(occupied, code, all(3));
-        code = _mm512_mask_mov_epi32(code, lure, all(SEES_LURE));
+        code = _mm512_mask_mov_epi32(code, lure, all(SEES_CUE));
         state = _mm512_or_si512(_mm512_slli_epi32(state, 2), code);
     }
     ants->state = state;

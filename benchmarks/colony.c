@@ -27,8 +27,8 @@ static int omp_get_num_threads(void) { return 1; }
 
 enum { EMPTY = 0, OBSTACLE = 5, QUEEN = 13 };
 enum { LEFT, FORWARD, RIGHT, PICK_UP, GIVE, N_ACTIONS };
-enum { ENTERED_EMPTY, FAILED, ENTERED_LURE, PICKED_UP, DELIVERED };
-enum { SEES_LURE = 2, ROW = 8, N_HEADINGS = 6 };
+enum { ENTERED_EMPTY, FAILED, ENTERED_CUE, PICKED_UP, DELIVERED };
+enum { SEES_CUE = 2, ROW = 8, N_HEADINGS = 6 };
 /* What the ant on a cell wants: nothing, to enter the cell at a heading, to take the food there. */
 enum { ENTER = 1, STANDS = 7, TAKE = 9, MARK = 15 };
 /* Flags in the same byte, which other ants read. */
@@ -178,11 +178,11 @@ INLINE int see(const Colony *c, int foraging, int cell, int heading, int carries
     }
     for (int k = 0; k < 3; k++) {
         if (carries) {
-            codes[k] = codes[k] == EMPTY && nearer >> k & 1 ? SEES_LURE : codes[k] >> 2;
+            codes[k] = codes[k] == EMPTY && nearer >> k & 1 ? SEES_CUE : codes[k] >> 2;
         } else {
             int visible = codes[k] == EMPTY ? levels[k] : 0;
             int lures = foraging ? visible >= strongest : 2 * visible >= strongest;
-            codes[k] = lures ? SEES_LURE : codes[k] & 3;
+            codes[k] = lures ? SEES_CUE : codes[k] & 3;
         }
     }
     if (foraging) {
@@ -304,7 +304,7 @@ INLINE int gives_way(const Colony *c, const Work *w, int cell)
     return !(mark & WINS) || w->wants[wanted_by(c, cell, mark & MARK)];
 }
 
-/* Under the rules of foraging: mark winners, and judge whether a cell with an ant is a lure. */
+/* Under the rules of foraging: mark winners, and judge whether a cell with an ant shows a cue. */
 INLINE void resolve(const Colony *c, const Work *w, Ant *ant, int tick, int clock)
 {
     int cell = ant->cell, want = ant->want;
@@ -321,7 +321,7 @@ INLINE void resolve(const Colony *c, const Work *w, Ant *ant, int tick, int cloc
         if (w->wants[ahead]) {
             int better = ant->carries ? c->closer[cell] >> ant->heading & 1
                                       : level_of(c, ahead, clock) > level_of(c, cell, clock);
-            code = better ? ENTERED_LURE : ENTERED_EMPTY;
+            code = better ? ENTERED_CUE : ENTERED_EMPTY;
         }
         ant->event = code;
     }

@@ -25,7 +25,7 @@ from taichi_ants.task.constants import EMPTY
 NESTS = "two nests"
 FEATURES: dict[str, dict[str, Any]] = {
     "two pheromones": {
-        "fields": {"from_nest": {"laid": "without_food"}},
+        "fields": {"from_nest": {"deposited_when": "without_food"}},
         "homing_cue": "from_nest",
     },
     NESTS: {},
@@ -39,7 +39,7 @@ def task_with(features: Sequence[str]) -> Task:
     """Return the foraging task with some features."""
     task = foraging()
     for name in features:
-        task = task.but(**FEATURES[name])
+        task = task.replace(**FEATURES[name])
     return task
 
 

@@ -196,11 +196,16 @@ MUTATIONS = [
     ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", ROLLOUT),
     ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
     ("envs/vector.py", "else rows.any(0)", "else rows[-1]", ROLLOUT),
-    ("engines/runs/kernels.py", "= percept, taken.state", "= seen, taken.state", RUNS),
+    ("engines/runs/kernels.py", "= paper_state, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
     ("engines/colony/life.py", "tick >= taken + waits", "tick > taken + waits", COLONY),
-    ("engines/colony/life.py", "(tick + 1) % c.wander", "tick % c.wander", COLONY),
+    (
+        "engines/colony/life.py",
+        "(tick + 1) % c.pile_move_interval",
+        "tick % c.pile_move_interval",
+        COLONY,
+    ),
     ("engines/colony/life.py", "== 1, FOOD, EMPTY)", "== 1, EMPTY, EMPTY)", COLONY),
     (
         "engines/colony/life.py",

@@ -27,7 +27,7 @@ RULES = {
         traffic=Traffic.named()["following"],
         delivery="truncates",
         evaporation_in_training=True,
-        life=Life(births=True, lifespan=40_000, regrowth=50, wander=100),
+        life=Life(births=True, lifespan=40_000, regrowth=50, pile_move_interval=100),
     ),
 }
 RANGES = (100, 100, 100)

@@ -24,7 +24,7 @@ DEFAULT = {"half_life": 50.0, "slope": 10}
 def deliveries(trail, seeds):
     """Return the food items that colonies deliver in 1000 ticks, one seed and world each."""
     trail = {"evaporation": "exponential", **trail}
-    rules = task.queueing().but(pheromone=trail, life={"regrowth": 0})
+    rules = task.queueing().replace(pheromone=trail, life={"regrowth": 0})
     places, how = [worlds.far_piles(seed) for seed in seeds], {"sharing": "frozen"}
     colony = Colony(places, rules, FOLLOW, seeds, ants=64, q_values=POLICY, **how)
     return colony.run(episodes=1, ticks=1000).deliveries[0].astype(float)

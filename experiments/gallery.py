@@ -147,12 +147,12 @@ def make_viewer(folder: Path, browser: Any) -> None:
 def make_live(folder: Path, browser: Any) -> None:
     """Take a picture of the live page, after ants have learned and a wall has been drawn."""
     from taichi_ants.live.choices import Choices
-    from taichi_ants.live.server import Room
+    from taichi_ants.live.server import SessionServer
     from taichi_ants.live.session import Session
 
     choices = Choices(watch.policies([]))
     session = Session(choices.setup(watch.START))
-    room = Room(session, choices)
+    room = SessionServer(session, choices)
     thread = threading.Thread(target=room.run, daemon=True)
     thread.start()
     page = opened(browser, room.url, _LIVE_WINDOW)

@@ -133,7 +133,7 @@ def meadow() -> World:
 
 def colony_of(seeds: list[int]) -> Colony:
     """Return colonies that have learned nothing, one for each seed, under the rules for queues."""
-    rules = task.queueing().but(
+    rules = task.queueing().replace(
         life={"regrowth": 0},
         delivery="terminates",
         pheromone={"level": LEVEL, "slope": LEVEL // 50},

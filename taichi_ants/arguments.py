@@ -95,7 +95,7 @@ def checked_configs(
     several = [configs] if isinstance(configs, TrainingConfig) else entries_of(configs)
     if not several:
         raise AntsError(f"configs is {shown(configs)}; give one TrainingConfig or several.")
-    settled = tuple(learners.settle(config) for config in several)
+    settled = tuple(learners.with_hyperparameters(config) for config in several)
     if task is not None:
         for config in settled:
             check_learner(config, task)

@@ -26,12 +26,12 @@ CHOICE |= {"choice.carriers_follow"}
 FIELDS = frozenset({"fields", "reads", "outbound_cue", "homing_cue"})
 FOODS = frozenset({"foods", "kinds of food"})
 CASTES = frozenset({"castes", "labour.rule", "labour.demand", "labour.relief", "labour.exponent"})
-CASTES |= {"labour.quit"}
+CASTES |= {"labour.stop_probability"}
 OWN_RULES = frozenset({"rules", "reward"})
 COLONY = LONE | CHOICE | FIELDS | FOODS | CASTES | OWN_RULES
 COLONY |= {"pheromone.evaporation", "pheromone.half_life", "pheromone.diffusion"}
 COLONY |= {"pheromone.deposit", "nests"}
-COLONY |= {"life.births", "life.lifespan", "life.regrowth", "life.wander"}
+COLONY |= {"life.births", "life.lifespan", "life.regrowth", "life.pile_move_interval"}
 
 
 def refuse_unsupported(

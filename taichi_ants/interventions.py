@@ -25,7 +25,7 @@ from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.policies import NAMED, checked_values, load_policy
 from taichi_ants.settings import (
-    Is,
+    Setting,
     Settings,
     Share,
     all_of,
@@ -46,14 +46,14 @@ if TYPE_CHECKING:
     from taichi_ants.grid.hexgrid import AxialGrid
     from taichi_ants.worlds.world import World
 
-One = TypeVar("One", bound="Record")
+One = TypeVar("One", bound="ShorthandSettings")
 _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
 _MOST = 2**24  # ants, see `arguments.MAX_ANTS`
-_CELLS = Is("cells, each [x, y, z], or the name of a region", or_region=True)
+_CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)
 _NAMED = {one.name: one for one in named_groups(Task)}
 
 
-class Record(Settings):
+class ShorthandSettings(Settings):
     """Settings that a mapping or, for some classes, a single value can stand for."""
 
     @classmethod
@@ -96,12 +96,12 @@ class Record(Settings):
 
 def _plain(value: Any) -> Any:
     """Return a value of a setting in the form that JSON has for it."""
-    if isinstance(value, Record):
+    if isinstance(value, ShorthandSettings):
         return value.as_dict()
     return [_plain(one) for one in value] if isinstance(value, tuple) else value
 
 
-class Intervention(Record):
+class Intervention(ShorthandSettings):
     """A change of a colony between two ticks; the path of the class is its name."""
 
     form = "a table of settings"
@@ -182,10 +182,10 @@ class RemoveAnts(OfAnts, path="remove_ants"):
     A share is rounded to a number of ants, halves up.
     """
 
-    number: Annotated[int | None, Is("number of ants", least=0, most=_MOST)] = None
-    share: Annotated[float | None, Is("share of the living ants", least=0, most=1)] = None
+    number: Annotated[int | None, Setting("number of ants", least=0, most=_MOST)] = None
+    share: Annotated[float | None, Setting("share of the living ants", least=0, most=1)] = None
     cells: Annotated[Sequence | None, _CELLS] = None
-    nest: Annotated[int | None, Is("nest of the ants; any if left out", least=0)] = None
+    nest: Annotated[int | None, Setting("nest of the ants; any if left out", least=0)] = None
 
     def apply(self, to: Interventions) -> None:
         if self.cells is None:
@@ -203,13 +203,14 @@ class AddAnts(OfAnts, path="add_ants"):
     `nest`, nests take turns, and ants on given cells belong to the nearest queen.
     """
 
-    number: Annotated[int | None, Is("number of ants", least=0, most=_MOST)] = None
-    share: Annotated[float | None, Is("share of the living ants", least=0)] = None
+    number: Annotated[int | None, Setting("number of ants", least=0, most=_MOST)] = None
+    share: Annotated[float | None, Setting("share of the living ants", least=0)] = None
     cells: Annotated[Sequence | None, _CELLS] = None
     heading: Annotated[
-        int | None, Is("heading of the new ants; random if left out", least=0, most=N_HEADINGS - 1)
+        int | None,
+        Setting("heading of the new ants; random if left out", least=0, most=N_HEADINGS - 1),
     ] = None
-    nest: Annotated[int | None, Is("nest of the new ants", least=0)] = None
+    nest: Annotated[int | None, Setting("nest of the new ants", least=0)] = None
 
     def apply(self, to: Interventions) -> None:
         if self.cells is None:
@@ -225,10 +226,10 @@ class Place(OfCells, path="place"):
     Rock and food leave out the cells of queens, and cells whose ant has no room nearby.
     """
 
-    what: Annotated[Literal["rock", "food", "queen"], Is("thing to place")]
+    what: Annotated[Literal["rock", "food", "queen"], Setting("thing to place")]
     cells: Annotated[Sequence, _CELLS]
-    nest: Annotated[int | None, Is("nest of the queen, by default 0", least=0)] = None
-    kind: Annotated[str | None, Is("kind of food; the first if left out")] = None
+    nest: Annotated[int | None, Setting("nest of the queen, by default 0", least=0)] = None
+    kind: Annotated[str | None, Setting("kind of food; the first if left out")] = None
 
     def check(self) -> None:
         super().check()
@@ -270,7 +271,7 @@ class Move(OfCells, path="move"):
     Has no effect if there is nothing to move, or the new cell is not free.
     """
 
-    cells: Annotated[Sequence, Is("cell to move from and cell to move to, each [x, y, z]")]
+    cells: Annotated[Sequence, Setting("cell to move from and cell to move to, each [x, y, z]")]
 
     def check(self) -> None:
         super().check()
@@ -298,14 +299,16 @@ class Clear(OfCells, path="clear"):
 
 
 @dataclass(frozen=True)
-class Trail(OfCells, path="trail"):
+class SetTrail(OfCells, path="trail"):
     """Set the trail, or a further field, of cells without rock; level 0 clears it."""
 
     form = "a level, which is a whole number, or a table of settings"
 
-    level: Annotated[int, Is("trail level", least=0, most=MAX_DEPOSIT)]
-    cells: Annotated[Sequence | None, _CELLS.but(Is("cells, or a region; all if left out"))] = None
-    field: Annotated[str, Is("name of the field")] = TRAIL
+    level: Annotated[int, Setting("trail level", least=0, most=MAX_DEPOSIT)]
+    cells: Annotated[
+        Sequence | None, _CELLS.replace(Setting("cells, or a region; all if left out"))
+    ] = None
+    field: Annotated[str, Setting("name of the field")] = TRAIL
 
     @classmethod
     def short(cls, value: Any) -> dict[str, Any] | None:
@@ -322,12 +325,12 @@ class Trail(OfCells, path="trail"):
 
 
 @dataclass(frozen=True)
-class Ants(Intervention, path="ants"):
+class SetAnts(Intervention, path="ants"):
     """Set the number of living ants; ants with the highest numbers are removed first."""
 
     form = "a whole number of ants, or a table of settings"
 
-    number: Annotated[int, Is("number of ants", least=1, most=_MOST)]
+    number: Annotated[int, Setting("number of ants", least=1, most=_MOST)]
 
     @classmethod
     def short(cls, value: Any) -> dict[str, Any] | None:
@@ -338,7 +341,7 @@ class Ants(Intervention, path="ants"):
 
 
 @dataclass(frozen=True)
-class TaskNumbers(Intervention, path="task"):
+class SetTask(Intervention, path="task"):
     """Change settings of the task that kernels read as numbers, for example "pheromone.half_life".
 
     A setting by which kernels are compiled, such as the observation, cannot change in an episode.
@@ -381,7 +384,7 @@ class TaskNumbers(Intervention, path="task"):
             known, of = getattr(task, group), rest.partition(".")[0]
             if group in _NAMED and of not in known:
                 raise AntsError(f"`task.{name}` {not_a_setting(of, known, f'task.{group}')}")
-        return task.but(**nested(dict(self.values)))
+        return task.replace(**nested(dict(self.values)))
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         check_same_kernels(task, self.changed(task), learns)
@@ -401,20 +404,20 @@ class _Rate(Intervention):
 
 
 @dataclass(frozen=True)
-class Epsilon(_Rate, path="epsilon"):
+class SetEpsilon(_Rate, path="epsilon"):
     """Set the exploration rate, which then does not decay."""
 
-    value: Annotated[Share, Is("exploration rate")]
+    value: Annotated[Share, Setting("exploration rate")]
 
     def apply(self, to: Interventions) -> None:
         to.set_epsilon(self.value)
 
 
 @dataclass(frozen=True)
-class LearningRate(_Rate, path="learning_rate"):
+class SetLearningRate(_Rate, path="learning_rate"):
     """Set the learning rate, which then does not decay."""
 
-    value: Annotated[Share, Is("learning rate")]
+    value: Annotated[Share, Setting("learning rate")]
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         check_learns(learns)
@@ -424,7 +427,7 @@ class LearningRate(_Rate, path="learning_rate"):
 
 
 @dataclass(frozen=True)
-class Policy(Intervention, path="policy"):
+class SetPolicy(Intervention, path="policy"):
     """Replace the policy that the ants follow; for colonies that do not learn.
 
     In Python, a table of action values or anything with `q_values` is a short form.
@@ -432,7 +435,7 @@ class Policy(Intervention, path="policy"):
 
     form = "a policy file, the name of a hand-written policy, or a table of settings"
 
-    source: Annotated[str, Is("policy file, or the name of a hand-written policy")]
+    source: Annotated[str, Setting("policy file, or the name of a hand-written policy")]
     table: np.ndarray | None = field(default=None, compare=False, repr=False)
     sha256: str = ""  # of the table; "" for hand-written policies
 
@@ -488,8 +491,8 @@ class Episode(Intervention, path="episode"):
 INTERVENTIONS: dict[str, type[Intervention]] = {
     one.path: one
     for one in (
-        *(RemoveAnts, AddAnts, Ants, Place, Move, Clear, Trail),
-        *(TaskNumbers, Epsilon, LearningRate, Policy, Episode),
+        *(RemoveAnts, AddAnts, SetAnts, Place, Move, Clear, SetTrail),
+        *(SetTask, SetEpsilon, SetLearningRate, SetPolicy, Episode),
     )
 }
 

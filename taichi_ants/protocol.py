@@ -3,8 +3,8 @@
     colony.run(4, 1000, protocol=[At(500, remove_ants=0.5), Every(100, trail=0)])
 
 An event has one or more interventions, each named as in `taichi_ants.interventions`. They are
-applied in the order of the fields of `Event`. Events of the same tick are applied in the order of
-the protocol.
+applied in the order of the fields of `ProtocolEvent`. Events of the same tick are applied in the
+order of the protocol.
 """
 
 from __future__ import annotations
@@ -19,58 +19,58 @@ from taichi_ants import measures
 from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.interventions import (
     AddAnts,
-    Ants,
     Clear,
-    Epsilon,
     Intervention,
-    LearningRate,
     Move,
     Place,
-    Policy,
-    Record,
     RemoveAnts,
-    TaskNumbers,
-    Trail,
+    SetAnts,
+    SetEpsilon,
+    SetLearningRate,
+    SetPolicy,
+    SetTask,
+    SetTrail,
+    ShorthandSettings,
     indices,
 )
-from taichi_ants.settings import Is
+from taichi_ants.settings import Setting
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS
 
 if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
 
-Tick = Annotated[int, Is(unit="ticks of the episode", least=0, most=MAX_STEPS)]
-Interval = Annotated[int, Is(unit="ticks", least=1, most=MAX_STEPS)]
+Tick = Annotated[int, Setting(unit="ticks of the episode", least=0, most=MAX_STEPS)]
+Interval = Annotated[int, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Event(Record):
+class ProtocolEvent(ShorthandSettings):
     """The interventions of an event, in the order in which they are applied."""
 
-    remove_ants: Annotated[RemoveAnts | None, Is("ants to remove")] = None
-    add_ants: Annotated[AddAnts | None, Is("ants to add")] = None
-    ants: Annotated[Ants | None, Is("new number of ants")] = None
-    clear: Annotated[Clear | None, Is("cells from which to remove rock and food")] = None
-    move: Annotated[Move | None, Is("rock, food or queen to move")] = None
-    place: Annotated[Place | None, Is("rock, food or queen to place")] = None
-    trail: Annotated[Trail | None, Is("trail to lay or to clear")] = None
-    task: Annotated[TaskNumbers | None, Is("settings of the task to change")] = None
-    epsilon: Annotated[Epsilon | None, Is("new exploration rate")] = None
-    learning_rate: Annotated[LearningRate | None, Is("new learning rate")] = None
-    policy: Annotated[Policy | None, Is("policy to follow")] = None
+    remove_ants: Annotated[RemoveAnts | None, Setting("ants to remove")] = None
+    add_ants: Annotated[AddAnts | None, Setting("ants to add")] = None
+    ants: Annotated[SetAnts | None, Setting("new number of ants")] = None
+    clear: Annotated[Clear | None, Setting("cells from which to remove rock and food")] = None
+    move: Annotated[Move | None, Setting("rock, food or queen to move")] = None
+    place: Annotated[Place | None, Setting("rock, food or queen to place")] = None
+    trail: Annotated[SetTrail | None, Setting("trail to lay or to clear")] = None
+    task: Annotated[SetTask | None, Setting("settings of the task to change")] = None
+    epsilon: Annotated[SetEpsilon | None, Setting("new exploration rate")] = None
+    learning_rate: Annotated[SetLearningRate | None, Setting("new learning rate")] = None
+    policy: Annotated[SetPolicy | None, Setting("policy to follow")] = None
 
     def check(self) -> None:
         """Check all settings."""
         super().check()
         if not self.interventions:
-            names = ", ".join(one.name for one in fields(Event))
+            names = ", ".join(one.name for one in fields(ProtocolEvent))
             raise AntsError(f"`{self.path}` has no intervention; give one or more of {names}.")
 
     @property
     def interventions(self) -> tuple[Intervention, ...]:
         """The interventions, in the order in which they are applied."""
-        several = (getattr(self, one.name) for one in fields(Event))
+        several = (getattr(self, one.name) for one in fields(ProtocolEvent))
         return tuple(one for one in several if one is not None)
 
     @property
@@ -101,10 +101,10 @@ class Event(Record):
 
 
 @dataclass(frozen=True)
-class At(Event, path="at"):
+class At(ProtocolEvent, path="at"):
     """Interventions after a number of ticks of each episode."""
 
-    tick: Annotated[Tick, Is("time of the event")]
+    tick: Annotated[Tick, Setting("time of the event")]
 
     def times(self, length: int) -> range:
         """Return the tick."""
@@ -113,18 +113,20 @@ class At(Event, path="at"):
 
 
 @dataclass(frozen=True)
-class Every(Event, path="every"):
+class Every(ProtocolEvent, path="every"):
     """Interventions at regular ticks of each episode."""
 
-    ticks: Annotated[Interval, Is("time between two events")]
+    ticks: Annotated[Interval, Setting("time between two events")]
     start: Annotated[
         int | None,
-        Is("time of the first event; `ticks` if left out", unit="ticks of the episode"),
-        Is(least=0, most=MAX_STEPS),
+        Setting("time of the first event; `ticks` if left out", unit="ticks of the episode"),
+        Setting(least=0, most=MAX_STEPS),
     ] = None
     stop: Annotated[
         int | None,
-        Is("time of the last possible event", unit="ticks of the episode", least=0, most=MAX_STEPS),
+        Setting(
+            "time of the last possible event", unit="ticks of the episode", least=0, most=MAX_STEPS
+        ),
     ] = None
 
     def check(self) -> None:
@@ -145,7 +147,7 @@ class Every(Event, path="every"):
 
 
 @dataclass(frozen=True)
-class When(Event, path="when"):
+class When(ProtocolEvent, path="when"):
     """Interventions when a measure of a world is above or below a bound.
 
     Each world is checked for itself, every `interval` ticks. While the measure has no value, the
@@ -153,11 +155,11 @@ class When(Event, path="when"):
     once in an episode, else at each check for which the condition holds.
     """
 
-    measure: Annotated[str, Is("name of a registered measure")]
-    above: Annotated[float | None, Is("bound that the measure exceeds")] = None
-    below: Annotated[float | None, Is("bound that the measure is less than")] = None
-    interval: Annotated[Interval, Is("time between two checks")] = 10
-    once: Annotated[bool, Is("let the event happen only once in an episode")] = True
+    measure: Annotated[str, Setting("name of a registered measure")]
+    above: Annotated[float | None, Setting("bound that the measure exceeds")] = None
+    below: Annotated[float | None, Setting("bound that the measure is less than")] = None
+    interval: Annotated[Interval, Setting("time between two checks")] = 10
+    once: Annotated[bool, Setting("let the event happen only once in an episode")] = True
 
     def check(self) -> None:
         """Check all settings."""
@@ -183,19 +185,24 @@ class When(Event, path="when"):
         return self.below is not None and value < self.below
 
 
-EVENTS: dict[str, type[Event]] = {one.path: one for one in (At, Every, When)}
+EVENTS: dict[str, type[ProtocolEvent]] = {one.path: one for one in (At, Every, When)}
 
 
-def checked_protocol(protocol: Any) -> tuple[Event, ...]:
-    """Return the events of a protocol; AntsError if one is not an `Event`."""
-    events = [protocol] if isinstance(protocol, Event) else entries_of(protocol)
-    if events is None or not all(isinstance(one, Event) for one in events):
+def checked_protocol(protocol: Any) -> tuple[ProtocolEvent, ...]:
+    """Return the events of a protocol; AntsError if one is not a `ProtocolEvent`."""
+    events = [protocol] if isinstance(protocol, ProtocolEvent) else entries_of(protocol)
+    if events is None or not all(isinstance(one, ProtocolEvent) for one in events):
         raise AntsError(f"protocol is {shown(protocol)}; it must be a list of At, Every and When.")
     return tuple(events)
 
 
 def check_room(
-    event: Event, of: Sequence[Event], task: Task, ants: int, capacity: int, length: int | None
+    event: ProtocolEvent,
+    of: Sequence[ProtocolEvent],
+    task: Task,
+    ants: int,
+    capacity: int,
+    length: int | None,
 ) -> None:
     """Raise AntsError if an event adds more ants than can ever have room in a colony.
 
@@ -224,11 +231,13 @@ def check_room(
         )
 
 
-def _number_added(event: Event) -> int:
+def _number_added(event: ProtocolEvent) -> int:
     return (event.add_ants and event.add_ants.number) or 0
 
 
-def check_queen(event: Event, of: Sequence[Event], world: World, length: int) -> None:
+def check_queen(
+    event: ProtocolEvent, of: Sequence[ProtocolEvent], world: World, length: int
+) -> None:
     """Raise AntsError if an event moves a queen to a cell that is certain not to be empty.
 
     It has rock or a queen in the world, and no event in `of` can remove it. `length` is that of
@@ -252,7 +261,7 @@ def check_queen(event: Event, of: Sequence[Event], world: World, length: int) ->
         )
 
 
-def read(tables: Mapping[str, Sequence[Any]]) -> tuple[Event, ...]:
+def read(tables: Mapping[str, Sequence[Any]]) -> tuple[ProtocolEvent, ...]:
     """Return the events of lists of tables by the names in `EVENTS`; those of `at` come first.
 
     Raises:
@@ -265,7 +274,7 @@ def read(tables: Mapping[str, Sequence[Any]]) -> tuple[Event, ...]:
     )
 
 
-def _event(kind: type[Event], table: Any, number: int) -> Event:
+def _event(kind: type[ProtocolEvent], table: Any, number: int) -> ProtocolEvent:
     try:
         return kind.from_dict(table)
     except AntsError as error:

@@ -1,15 +1,15 @@
 """Declarations of settings.
 
 A class of settings is a frozen dataclass whose fields declare range, unit, condition and help as
-`Annotated[type, Is(...)]`. These declarations generate checks, keys of sweep files, command-line
-options, controls of pages, and the tables of the documentation.
+`Annotated[type, Setting(...)]`. These declarations generate checks, keys of sweep files,
+command-line options, controls of pages, and the tables of the documentation.
 
     @dataclass(frozen=True)
     class Pheromone(Settings, path="task.pheromone"):
-        evaporation: Annotated[Literal["linear", "exponential"], Is("...")] = "linear"
+        evaporation: Annotated[Literal["linear", "exponential"], Setting("...")] = "linear"
         half_life: Annotated[
             float | None,
-            Is("time in which a trail halves", unit="ticks", above=0, usual=50.0,
+            Setting("time in which a trail halves", unit="ticks", above=0, usual=50.0,
                only=("evaporation", "exponential")),
         ] = None
 
@@ -56,7 +56,7 @@ _KINDS: dict[type, str] = {
 
 
 @dataclass(frozen=True)
-class Is:
+class Setting:
     """The declaration of a setting, except its type; several in one annotation are combined.
 
     Attributes:
@@ -87,24 +87,24 @@ class Is:
             bound = getattr(self, name)
             if bound is not None and (bound > self.most or (is_above and bound == self.most)):
                 raise AntsError(
-                    f"`Is({name}={bound}, most={self.most})` allows no number; give a larger "
+                    f"`Setting({name}={bound}, most={self.most})` allows no number; give a larger "
                     f"`most` than `{name}`."
                 )
 
-    def but(self, other: Is) -> Is:
+    def replace(self, other: Setting) -> Setting:
         """Return the combination of both; where `other` declares something, it takes precedence."""
         given = {one.name: getattr(other, one.name) for one in fields(other)}
-        usual = vars(Is())
+        usual = vars(Setting())
         return replace(self, **{k: v for k, v in given.items() if v is not usual[k] and v != ""})
 
 
-Share = Annotated[float, Is(least=0, most=1)]
-Count = Annotated[int, Is(least=1, most=2**31 - 1)]
-Seed = Annotated[int, Is("any whole number")]
-Flag = Annotated[bool, Is()]
+Share = Annotated[float, Setting(least=0, most=1)]
+Count = Annotated[int, Setting(least=1, most=2**31 - 1)]
+Seed = Annotated[int, Setting("any whole number")]
+Flag = Annotated[bool, Setting()]
 
 
-class Setting(NamedTuple):
+class DeclaredSetting(NamedTuple):
     """A declared setting.
 
     `path` is its full name. `kind` is bool, int, float, str, list, `Named`, or a class of settings;
@@ -118,7 +118,7 @@ class Setting(NamedTuple):
     words: tuple[str, ...]
     optional: bool
     default: Any
-    rule: Is
+    rule: Setting
     entry: type = NoneType
 
     @property
@@ -330,7 +330,7 @@ class Settings(metaclass=_Checked):
             if one.rule.only is not None:
                 self._settle(one)
 
-    def _settle(self, one: Setting) -> None:
+    def _settle(self, one: DeclaredSetting) -> None:
         """Refuse a setting that has no effect; replace None by the usual value if it has one."""
         assert one.rule.only is not None
         other, *values = one.rule.only
@@ -365,7 +365,7 @@ class Settings(metaclass=_Checked):
                 found[one.name + word] = f"`{one.path}` is {shown(value)}"
         return found
 
-    def but(self: Self, **changes: Any) -> Self:
+    def replace(self: Self, **changes: Any) -> Self:
         """Return the settings with changes; settings that lose their effect get their defaults.
 
         To change a group, give a mapping of its settings; its entry "" is the value to start from.
@@ -434,7 +434,9 @@ class Named(dict[str, Entry], Generic[Entry]):
     """
 
     def _refuse(self, *arguments: Any, **named: Any) -> Any:
-        raise TypeError("named settings are read-only; use `but` of the settings that have them")
+        raise TypeError(
+            "named settings are read-only; use `replace` of the settings that have them"
+        )
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     clear = pop = popitem = setdefault = update = _refuse
@@ -452,12 +454,12 @@ class Named(dict[str, Entry], Generic[Entry]):
         return Named, (dict(self),)
 
 
-def named_groups(cls: Any) -> Iterator[Setting]:
+def named_groups(cls: Any) -> Iterator[DeclaredSetting]:
     """Yield the settings of a class, and of its groups, that are mappings of named settings."""
     return (one for one in all_of(cls) if one.kind is Named)
 
 
-def settings_of_entry(group: Setting, name: str) -> dict[str, Setting]:
+def settings_of_entry(group: DeclaredSetting, name: str) -> dict[str, DeclaredSetting]:
     """Return the declarations of the entry of this name in a named group, by their full names."""
     entry: Any = group.entry.entry_named(name)  # type: ignore[attr-defined]
     several = {
@@ -466,17 +468,17 @@ def settings_of_entry(group: Setting, name: str) -> dict[str, Setting]:
     return {path: one._replace(path=path) for path, one in several.items()}
 
 
-_DECLARED: dict[Any, tuple[Setting, ...]] = {}
+_DECLARED: dict[Any, tuple[DeclaredSetting, ...]] = {}
 
 
-def declared(cls: Any) -> tuple[Setting, ...]:
-    """Return the settings of a class or function: its fields or arguments with an `Is`."""
+def declared(cls: Any) -> tuple[DeclaredSetting, ...]:
+    """Return the settings of a class or function: its fields or arguments with a `Setting`."""
     if cls not in _DECLARED:
         _DECLARED[cls] = tuple(_read(cls))
     return _DECLARED[cls]
 
 
-def _read(cls: Any) -> Iterator[Setting]:
+def _read(cls: Any) -> Iterator[DeclaredSetting]:
     hints = get_type_hints(cls, include_extras=True)
     for name, default in _defaults(cls):
         hint = hints.get(name)
@@ -485,13 +487,13 @@ def _read(cls: Any) -> Iterator[Setting]:
         if get_origin(hint) is not Annotated:
             continue
         kind, *rules = get_args(hint)
-        rule = Is()
+        rule = Setting()
         for more in rules:
-            rule = rule.but(more)
+            rule = rule.replace(more)
         entry = get_args(kind)[0] if get_origin(kind) is Named else NoneType
         kind, words, optional = _kind_of(kind)
         path = _below(getattr(cls, "path", "world"), name)  # functions build worlds
-        yield Setting(name, path, kind, words, optional, default, rule, entry)
+        yield DeclaredSetting(name, path, kind, words, optional, default, rule, entry)
 
 
 def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
@@ -528,7 +530,7 @@ def checked(function: Function, path: str = "world") -> Function:
 checked_arguments = partial(checked, path="")  # for functions that do not build worlds
 
 
-def all_of(cls: Any) -> Iterator[Setting]:
+def all_of(cls: Any) -> Iterator[DeclaredSetting]:
     """Yield the settings of a class, each group followed by its own settings."""
     for one in declared(cls):
         yield one

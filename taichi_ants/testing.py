@@ -53,11 +53,11 @@ class RuleCheck(NamedTuple):
 
 
 def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
-    """Return the result of a comparison of a rule in kernels with its twin.
+    """Return the result of a comparison of a rule in kernels with its Python function.
 
     First the results for drawn inputs are compared, then small drawn colonies that use the rule.
-    After each tick, cells, headings, loads, percepts, actions, events, rewards, states, levels and
-    action values must be equal in every bit.
+    After each tick, cells, headings, loads, paper states, actions, events, rewards, states, levels
+    and action values must be equal in every bit.
 
     Args:
         name: The name of a registered rule.
@@ -106,7 +106,7 @@ def _compared(task_of: Callable[[int], Task]) -> tuple[int, str]:
                 ticks += 1
     except AntsError:
         raise
-    except Exception as error:  # of the twin or the observation
+    except Exception as error:  # of the Python function or the observation
         return ticks, f"seed {seed} fails: {type(error).__name__}: {error}"
     return ticks, ""
 
@@ -137,15 +137,15 @@ def _task(rule: Rule, seed: int) -> Task:
         settings["homing_cue"] = ("compass", "trail")[drawn]
     else:
         pheromone[rule.kind] = rule.name
-        field = {"laid": _LAID[seed % len(_LAID)], rule.kind: rule.name}
+        field = {"deposited_when": _LAID[seed % len(_LAID)], rule.kind: rule.name}
         settings["fields"]["second"] = field
-    return Task().but(**settings, pheromone=pheromone)
+    return Task().replace(**settings, pheromone=pheromone)
 
 
 def _task_of(observation: Observation, seed: int) -> Task:
     """Return a drawn task with an observation; kernels are compiled for two tasks only."""
     drawn = seed % 2
-    return Task().but(
+    return Task().replace(
         observation=observation.name,
         fields=_fields(observation.reads),
         evaporation_in_training=True,
@@ -158,7 +158,7 @@ def _task_of(observation: Observation, seed: int) -> Task:
 
 def _fields(names: Iterable[str]) -> dict[str, dict[str, str]]:
     """Return further pheromones with these names."""
-    return {name: {"laid": "always"} for name in names if name != TRAIL}
+    return {name: {"deposited_when": "always"} for name in names if name != TRAIL}
 
 
 def _world(seed: int) -> World:
@@ -197,7 +197,7 @@ def _difference(colony: Colony, plain: ReferenceColony) -> str:
         "cells": (grid.cells(colony.cells[0, order]), [ant.cell for ant in ants]),
         "headings": (colony.headings[0, order], [ant.heading for ant in ants]),
         "loads": (colony.carrying[0, order], [ant.carries for ant in ants]),
-        "percepts": (colony.percepts[0, order], [ant.percept for ant in ants]),
+        "paper_states": (colony.paper_states[0, order], [ant.paper_state for ant in ants]),
         "states": (colony.states[0, order], [ant.state for ant in ants]),
         "actions": (colony.actions[0, order], [ant.action for ant in ants]),
         "events": (colony.events[0, order], [ant.event for ant in ants]),

@@ -35,7 +35,7 @@ from taichi_ants.live.choices import Choices
 from taichi_ants.live.setup import Setup
 from taichi_ants.reference.colony import ReferenceColony
 from taichi_ants.rendering.learning import learning_checkpoints
-from taichi_ants.settings import Is, declared
+from taichi_ants.settings import Setting, declared
 from taichi_ants.studies.points import ColonyPoint, RunPoint
 from taichi_ants.task import Task
 
@@ -48,7 +48,7 @@ NESTS = World((7, 7, 7), (0, 6, 0), [(0, 0, 5)], other_queens=[(6, 0, 0)])
 class ToyTask(Task, path="task"):
     """A task with a feature that no set names."""
 
-    toy: Annotated[bool, Is("a feature")] = False
+    toy: Annotated[bool, Setting("a feature")] = False
 
 
 def record_from(rules):
@@ -143,7 +143,7 @@ REFUSED = [  # changes of the paper's task, the words of the message, and who do
 def test_features_are_refused_where_they_are_not_supported(changes, words, who):
     message = rf"^{re.escape(words)}, which .* does not support; [^.]*\.$"
     with pytest.raises(AntsError, match=message):
-        ALL[who](Task().but(**changes))
+        ALL[who](Task().replace(**changes))
 
 
 @pytest.mark.parametrize("run", [
@@ -171,7 +171,7 @@ def test_colonies_support_all_features_and_sets_name_no_other():
 
 def test_tasks_use_what_differs_from_the_paper():
     assert Task().uses() == WORLD.uses() == {}
-    rules = Task().but(
+    rules = Task().replace(
         observation="ants", fields={"home": {}}, choice="softmax", noise={"slip": 0.25}
     )
     assert rules.uses() == {
@@ -182,5 +182,5 @@ def test_tasks_use_what_differs_from_the_paper():
         "noise.slip": "`task.noise.slip` is 0.25",
     }
     assert set(task.queueing().uses()) <= LONE | {"observation=queues"} | {
-        f"traffic.{name}" for name in ("swap", "follow", "carriers_first", "grant")
+        f"traffic.{name}" for name in ("swap", "follow", "carriers_first", "reward_pushed")
     } | {"pheromone.view=strongest_under_carriers"}

@@ -18,7 +18,7 @@ from command_lines import ROOT
 
 from taichi_ants import AntsError, At, TrainingConfig, learners
 from taichi_ants.settings import (
-    Is,
+    DeclaredSetting,
     Named,
     Setting,
     Settings,
@@ -47,7 +47,7 @@ WRONG = {
 }
 
 
-def wrong_values(one: Setting) -> list:
+def wrong_values(one: DeclaredSetting) -> list:
     """Values that are not allowed."""
     if one.is_group:
         return ["no such name", 3, {}]
@@ -95,11 +95,13 @@ def test_defaults_and_bounds_are_allowed_and_plain(one):
 class Soup(Settings, path="kitchen.soup"):
     """Settings of a test."""
 
-    kind: Annotated[Literal["thin", "thick"], Is("how thick it is")] = "thin"
+    kind: Annotated[Literal["thin", "thick"], Setting("how thick it is")] = "thin"
     flour: Annotated[
-        float | None, Is("of flour", unit="g", above=0, usual=20.0, only=("kind", "thick"))
+        float | None, Setting("of flour", unit="g", above=0, usual=20.0, only=("kind", "thick"))
     ] = None
-    salt: Annotated[int, Is("of salt", unit="g", least=0, most=20_000), Is(most=50_000)] = 3
+    salt: Annotated[
+        int, Setting("of salt", unit="g", least=0, most=20_000), Setting(most=50_000)
+    ] = 3
     note: str = ""  # not a setting
 
 
@@ -152,7 +154,7 @@ def test_sentences():
 def test_what_depends_on_another_setting():
     assert Soup("thick").flour == 20
     assert replace(Soup("thick", 7), salt=5) == Soup("thick", 7, 5)
-    assert Soup("thick", 7).but(kind="thin") == Soup()
+    assert Soup("thick", 7).replace(kind="thin") == Soup()
     assert refused(lambda: replace(Soup("thick"), kind="thin")).endswith(
         "unless `kind` is 'thick'."
     )
@@ -162,7 +164,7 @@ def test_what_depends_on_another_setting():
 class Kitchen(Settings, path="kitchen"):
     """Settings of a test, with named ones."""
 
-    soups: Annotated[Named[NamedSoup], Is("the soups")] = field(default_factory=Named)
+    soups: Annotated[Named[NamedSoup], Setting("the soups")] = field(default_factory=Named)
 
 
 def test_named_settings_are_checked_changed_and_compared_by_name_and_order():
@@ -172,7 +174,7 @@ def test_named_settings_are_checked_changed_and_compared_by_name_and_order():
     assert hash(one) == hash(Kitchen(deepcopy(one.soups)))
     assert asdict(one)["soups"]["first"]["salt"] == 5
     assert one != Kitchen(dict(reversed(one.soups.items())))
-    more = one.but(soups={"first": {"kind": "thick"}, "third": {}})
+    more = one.replace(soups={"first": {"kind": "thick"}, "third": {}})
     assert list(more.soups.values()) == [NamedSoup("thick", salt=5), NamedSoup(salt=7), NamedSoup()]
     with pytest.raises(TypeError, match="read-only"):
         one.soups["first"] = NamedSoup()
@@ -201,8 +203,8 @@ def test_options_of_named_settings_take_any_name():
 
 
 def test_full_names_become_tables_in_any_order():
-    tree = {"task": {"traffic": {"": "following", "grant": False}}}
-    named = [("task.traffic", "following"), ("task.traffic.grant", False)]
+    tree = {"task": {"traffic": {"": "following", "reward_pushed": False}}}
+    named = [("task.traffic", "following"), ("task.traffic.reward_pushed", False)]
     assert nested(dict(named)) == nested(dict(named[::-1])) == tree
 
 
@@ -213,7 +215,7 @@ def test_the_rules_of_a_task_that_depend_on_each_other():
         lambda: Pheromone(cap=10),
         lambda: Pheromone(slope=10),
         lambda: Pheromone(deposit="none", level=3),
-        lambda: Traffic(grant=True),
+        lambda: Traffic(reward_pushed=True),
         lambda: Traffic(carriers_first=True),
     ):
         assert re.fullmatch(r"`task\.\w+\.\w+` is .*; leave it out unless .*\.", refused(make))
@@ -221,24 +223,26 @@ def test_the_rules_of_a_task_that_depend_on_each_other():
 
 
 def test_cues_are_fields_of_the_task():
-    home = {"home": {"laid": "without_food"}}
+    home = {"home": {"deposited_when": "without_food"}}
     task = Task(fields=home, homing_cue="home")
-    assert task == Task().but(fields=home, homing_cue="home") == Task.from_dict(task.as_dict())
-    assert task.fields["home"] == Field(laid="without_food")
+    assert task == Task().replace(fields=home, homing_cue="home") == Task.from_dict(task.as_dict())
+    assert task.fields["home"] == Field(deposited_when="without_food")
     end = (
-        "or the name of a field that you add to `task.fields` (for no cue, one with laid = "
-        "'never')."
+        "or the name of a field that you add to `task.fields` (for no cue, one with "
+        "deposited_when = 'never')."
     )
     for wrong, cues in (("hoem", "compass, trail, home"), ("", "compass, trail, home")):
         says = f"`task.homing_cue` is {wrong!r}; it must be one of {cues}, {end}"
-        assert refused(lambda wrong=wrong: task.but(homing_cue=wrong)) == says
+        assert refused(lambda wrong=wrong: task.replace(homing_cue=wrong)) == says
     says = f"`task.outbound_cue` is 'compass'; it must be one of trail, {end}"
     assert refused(lambda: Task(outbound_cue="compass")) == says
     for name in ("trail", "compass", "all", "none"):
         says = f"`task.fields` has a field {name!r}, but that name is taken; choose another name."
         assert refused(lambda name=name: Task(fields={name: {}})) == says
-    says = "`task.fields.home.laid` is 'often'; it must be one of with_food, without_food, "
-    assert refused(lambda: Task(fields={"home": {"laid": "often"}})).startswith(says)
+    says = (
+        "`task.fields.home.deposited_when` is 'often'; it must be one of with_food, without_food, "
+    )
+    assert refused(lambda: Task(fields={"home": {"deposited_when": "often"}})).startswith(says)
     says = "`task.fields.home.slope` is 3; leave it out unless `deposit` is 'fading'."
     assert refused(lambda: Task(fields={"home": {"slope": 3}})) == says
 
@@ -265,7 +269,7 @@ def test_unknown_and_wrong_settings_are_named_before_an_entry_has_a_name():
     castes = {"scout": {"threshold": {"distribution": "fixed", "valu": 3}}}
     assert refused(lambda: Task(castes=castes)) == says
     assert refused(lambda: Threshold("fixed", -1)).startswith("`Threshold.value` is -1; it must")
-    assert refused(lambda: Threshold().but(valu=1)) == (
+    assert refused(lambda: Threshold().replace(valu=1)) == (
         "`Threshold.valu` is not a setting; choose value."
     )
     assert refused(lambda: Caste(threshold=-1)).startswith("`Caste.threshold.value` is -1; it must")
@@ -279,7 +283,7 @@ def test_unknown_and_wrong_settings_are_named_before_an_entry_has_a_name():
 
 @pytest.mark.parametrize(("bound", "most"), [("least", 0), ("above", 1), ("above", 0.5)])
 def test_a_declaration_must_allow_a_number(bound, most):
-    assert refused(lambda: Is(**{bound: 1, "most": most})) == (
-        f"`Is({bound}=1, most={most})` allows no number; give a larger `most` than `{bound}`."
+    assert refused(lambda: Setting(**{bound: 1, "most": most})) == (
+        f"`Setting({bound}=1, most={most})` allows no number; give a larger `most` than `{bound}`."
     )
-    assert Is(least=1, most=1).most == 1
+    assert Setting(least=1, most=1).most == 1

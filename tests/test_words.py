@@ -138,7 +138,15 @@ def docstrings(path: Path, nodes: list[ast.AST]) -> Iterator[Docstring]:
 
 def messages(path: Path, nodes: list[ast.AST]) -> Iterator[Text]:
     """The text of errors, of help and of settings: strings of two words or more in calls."""
-    named = ("AntsError", "Is", "add_argument", "add", "add_parser", "Parser", "MissingPackage")
+    named = (
+        "AntsError",
+        "Setting",
+        "add_argument",
+        "add",
+        "add_parser",
+        "Parser",
+        "MissingPackage",
+    )
     for node in nodes:
         if not isinstance(node, ast.Call):
             continue

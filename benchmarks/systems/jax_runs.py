@@ -12,10 +12,10 @@ import numpy as np
 
 from systems.paper_world import (
     CONFIGS,
+    CUE,
     DEPOSIT,
     GIVE,
     GOAL,
-    LURE,
     N_ACTIONS,
     N_STATES,
     PICK_UP,
@@ -51,9 +51,9 @@ def look(run: Run) -> Any:
     looks = run.ground[view]
     empty = looks == 0
     levels = jnp.where(empty, run.trail[view], 0)
-    to_forager = jnp.where(2 * levels >= jnp.maximum(levels.max(), 2), LURE, looks & 3)
+    to_forager = jnp.where(2 * levels >= jnp.maximum(levels.max(), 2), CUE, looks & 3)
     nearer = _CLOSER[:, run.cell, run.heading]
-    to_carrier = jnp.where(nearer & empty, LURE, looks >> 2)
+    to_carrier = jnp.where(nearer & empty, CUE, looks >> 2)
     return jnp.where(run.carries, to_carrier, to_forager).astype(jnp.int32)
 
 
@@ -89,7 +89,7 @@ def step(run: Run, numbers: Settings, words: Any, max_steps: int) -> tuple[Run, 
     ground = run.ground.at[food].set(jnp.where(takes, 0, run.ground[food]))
     trail = run.trail.at[cell].set(jnp.where(lays, DEPOSIT, run.trail[cell]))
     trail = trail.at[food].set(jnp.where(takes, DEPOSIT, trail[food]))
-    reward = jnp.where(enters, (code == LURE).astype(jnp.int32), -1)
+    reward = jnp.where(enters, (code == CUE).astype(jnp.int32), -1)
     reward = jnp.where(takes, 3, jnp.where(gives, 10, reward))
     after = run._replace(
         cell=cell,

@@ -14,10 +14,10 @@ import numpy as np
 
 from systems.paper_world import (
     CONFIGS,
+    CUE,
     DEPOSIT,
     GIVE,
     GOAL,
-    LURE,
     N_ACTIONS,
     N_STATES,
     PICK_UP,
@@ -52,7 +52,7 @@ def _look(world, ground, trail, cell, heading, carries):
         for k in range(3):
             look = ground[cell + world.ahead[k, heading]]
             lure = look == 0 and world.closer[k, cell, heading]
-            state = state << 2 | (LURE if lure else look >> 2)
+            state = state << 2 | (CUE if lure else look >> 2)
         return state
     strongest = 2
     for k in range(3):
@@ -62,7 +62,7 @@ def _look(world, ground, trail, cell, heading, carries):
     for k in range(3):
         there = cell + world.ahead[k, heading]
         lure = ground[there] == 0 and 2 * trail[there] >= strongest
-        state = state << 2 | (LURE if lure else ground[there] & 3)
+        state = state << 2 | (CUE if lure else ground[there] & 3)
     return state
 
 
@@ -118,7 +118,7 @@ def _run(world, stream, rate, discount, epsilon, decay, least, max_steps, q, ret
                 heading = (heading + action + 5) % 6
                 code = state >> (4 - 2 * action) & 3
                 if code & 1 == 0:
-                    reward = np.int64(code == LURE)
+                    reward = np.int64(code == CUE)
                     cell = target
                     if carries:
                         trail[cell] = DEPOSIT

@@ -8,10 +8,10 @@ import numpy as np
 
 from systems.paper_world import (
     CONFIGS,
+    CUE,
     DEPOSIT,
     GIVE,
     GOAL,
-    LURE,
     N_ACTIONS,
     N_STATES,
     PICK_UP,
@@ -60,9 +60,9 @@ class NumpyRuns:
         looks = self.ground.take(places)
         empty = looks == 0
         levels = self.trail.take(places) * empty
-        to_forager = np.where(2 * levels >= np.maximum(levels.max(axis=0), 2), LURE, looks & 3)
+        to_forager = np.where(2 * levels >= np.maximum(levels.max(axis=0), 2), CUE, looks & 3)
         nearer = self.closer.take(self.cell * 6 + self.heading, axis=1)
-        to_carrier = np.where(nearer & empty, LURE, looks >> 2)
+        to_carrier = np.where(nearer & empty, CUE, looks >> 2)
         self.codes = np.where(self.carries, to_carrier, to_forager)
         left, forward, right = self.codes
         state = self.carries * np.int64(64) + left * 16 + forward * 4 + right
@@ -96,7 +96,7 @@ class NumpyRuns:
         moves, position = action < PICK_UP, np.minimum(action, 2)
         code = self.codes[position, self.runs]
         enters = moves & ((code & 1) == 0)
-        rewards = np.where(enters, (code == LURE).astype(np.int64), -1)
+        rewards = np.where(enters, (code == CUE).astype(np.int64), -1)
         goal = self.codes == GOAL
         sees = goal.any(axis=0)
         (takes,) = np.nonzero((action == PICK_UP) & sees & ~self.carries)

@@ -16,7 +16,7 @@ from taichi_ants.analysis.paper.published import GRID
 
 N_STATES, N_ACTIONS = 128, 5
 PICK_UP, GIVE = 3, 4
-LURE, GOAL = 2, 3  # codes of cells in view
+CUE, GOAL = 2, 3  # codes of cells in view
 DEPOSIT = 250
 
 CONFIGS = [TrainingConfig("q_learning", *point) for point in GRID]

@@ -20,8 +20,8 @@ FOLLOW = TrainingConfig("q_learning", 1.0, 1.0, epsilon=0.05, epsilon_decay=1.0)
 
 def foraging_over_time(seeds, demand):
     """Return who forages every STEP ticks (seeds, times, ants), thresholds, and deliveries."""
-    labour = Labour("thresholds", demand=demand, relief=RELIEF, quit=0.2)
-    rules = task.foraging().but(castes=WORKERS, labour=labour, life={"regrowth": 0})
+    labour = Labour("thresholds", demand=demand, relief=RELIEF, stop_probability=0.2)
+    rules = task.foraging().replace(castes=WORKERS, labour=labour, life={"regrowth": 0})
     world = worlds.open_world(seed=1, ranges=(20, 20, 20))
     options = {"sharing": "frozen", "q_values": trail_follower("ants"), "start": "spread"}
     colony, forages = Colony(world, rules, FOLLOW, seeds, ants=ANTS, **options), []

@@ -43,8 +43,8 @@ ON_THE_RETURN = Task(
     turns_at_queen=True,
 )
 MODELS = {
-    "both ways": ON_THE_RETURN.but(
-        fields={"both": Field(laid="always", **MARKS)}, choice={"carriers_follow": "both"}
+    "both ways": ON_THE_RETURN.replace(
+        fields={"both": Field(deposited_when="always", **MARKS)}, choice={"carriers_follow": "both"}
     ),
     "on the return": ON_THE_RETURN,
 }

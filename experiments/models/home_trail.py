@@ -16,10 +16,10 @@ EPISODES, TICKS, ANTS = 30, 1000, 32
 LEARNING = TrainingConfig(
     "sarsa", 0.1, 0.9, 0.3, 0.9, learning_rate_decay=0.9, min_learning_rate=0.01, initial_q=5.0
 )
-COMPASS = foraging().but(delivery="truncates", life={"regrowth": 0})
-HOME = Field(deposit="fading", level=500, slope=10, view="strongest", laid="without_food")
-HOME_TRAIL = COMPASS.but(fields={"home": HOME}, homing_cue="home")
-NO_CUE = HOME_TRAIL.but(fields={"home": {"laid": "never"}})
+COMPASS = foraging().replace(delivery="truncates", life={"regrowth": 0})
+HOME = Field(deposit="fading", level=500, slope=10, view="strongest", deposited_when="without_food")
+HOME_TRAIL = COMPASS.replace(fields={"home": HOME}, homing_cue="home")
+NO_CUE = HOME_TRAIL.replace(fields={"home": {"deposited_when": "never"}})
 MODELS = {"compass": COMPASS, "home trail": HOME_TRAIL, "no cue": NO_CUE}
 
 

@@ -28,7 +28,7 @@ RATES = (0.0, 0.01, 0.03, 0.1, 0.2, 0.4)
 ANTS, EPISODES, TICKS, RANGES = 64, 40, 1000, (24, 24, 24)
 LEARNING = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.3, epsilon_decay=0.9, min_epsilon=0.01)
 FORAGING = replace(task.foraging(), delivery="truncates", life=Life(regrowth=0))
-RULES = {"with trails": FORAGING, "without": FORAGING.but(pheromone={"deposit": "none"})}
+RULES = {"with trails": FORAGING, "without": FORAGING.replace(pheromone={"deposit": "none"})}
 SERIES = (*RULES, "difference")
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from taichi_ants import Colony, Field, Interventions, Pheromone, Task, World, rules
 from taichi_ants.rules import pick, power
-from taichi_ants.settings import Is
+from taichi_ants.settings import Setting
 from taichi_ants.studies import model_script
 from taichi_ants.task import Choice, Life, Traffic
 
@@ -27,8 +27,8 @@ HALF_LIVES = (200.0, 50.0)  # of the path, in ticks
 def no_entry(
     level,
     carried,
-    patience: Annotated[int, Is("search time", unit="ticks", least=0, most=1000)] = 60,
-    amount: Annotated[float, Is("level of a mark", least=0, most=1000)] = AMOUNT,
+    patience: Annotated[int, Setting("search time", unit="ticks", least=0, most=1000)] = 60,
+    amount: Annotated[float, Setting("level of a mark", least=0, most=1000)] = AMOUNT,
 ):
     """Return the level of a cell after an ant without food has entered it."""
     return max(level, amount) if carried > patience else level
@@ -43,8 +43,10 @@ def wary(
     nearer,
     carries,
     random,
-    k: Annotated[float, Is("attraction of a cell without a trail", least=0.1, most=1000)] = 20.0,
-    fear: Annotated[float, Is("strength of the repellent", least=0, most=10)] = FEAR,
+    k: Annotated[
+        float, Setting("attraction of a cell without a trail", least=0.1, most=1000)
+    ] = 20.0,
+    fear: Annotated[float, Setting("strength of the repellent", least=0, most=10)] = FEAR,
 ):
     """Return an action: the rule "deneubourg" with exponent 2, divided by the repellent."""
     sees_nearer = 0
@@ -67,12 +69,12 @@ def wary(
 
 # The repellent of each model: its name, then its field.
 MARKS = {
-    "without repellent": Field(laid="never"),
+    "without repellent": Field(deposited_when="never"),
     "after a search in vain": Field(
-        "exponential", half_life=100.0, deposit="no_entry", laid="without_food"
+        "exponential", half_life=100.0, deposit="no_entry", deposited_when="without_food"
     ),
-    "at dead ends": Field("exponential", half_life=100.0, level=AMOUNT, laid="dead_end"),
-    "on wrong branches": Field("none", laid="never"),
+    "at dead ends": Field("exponential", half_life=100.0, level=AMOUNT, deposited_when="dead_end"),
+    "on wrong branches": Field("none", deposited_when="never"),
 }
 PLACED = "on wrong branches"
 
@@ -110,7 +112,9 @@ def decision_tree() -> World:
 
 def task(mark: Field, half_life: float, fear: float = FEAR) -> Task:
     """Return the task of a colony whose repellent is a field, and the half-life of its path."""
-    path = Field("exponential", half_life, deposit="add", level=20, cap=400, laid="always")
+    path = Field(
+        "exponential", half_life, deposit="add", level=20, cap=400, deposited_when="always"
+    )
     return Task(
         pheromone=Pheromone(deposit="none"),
         fields={"path": path, "no_entry": mark},

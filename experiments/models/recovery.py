@@ -12,7 +12,7 @@ from taichi_ants.interventions import RemoveAnts
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies import model_script
 
-RULES = task.foraging().but(life={"births": True, "lifespan": 1000, "regrowth": 0})
+RULES = task.foraging().replace(life={"births": True, "lifespan": 1000, "regrowth": 0})
 SHARES, REMOVAL, TICKS, STEP = (0.0, 0.25, 0.5, 0.75), 2000, 4000, 50
 
 

@@ -12,7 +12,7 @@ from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies import model_script
 from taichi_ants.task import Food
 
-RULES = task.foraging().but(foods={"seed": Food(loads=20)})
+RULES = task.foraging().replace(foods={"seed": Food(loads=20)})
 # The distances of the queens from the pile, in cells.
 DISTANCES, TICKS, STEP = ((10, 10), (8, 12), (6, 14)), 500, 20
 # The centre of the world and the cells around it, so that neither nest is nearer to an edge.

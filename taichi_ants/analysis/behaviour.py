@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from taichi_ants.task.constants import N_STATES, RIGHT, SEES_LURE
+from taichi_ants.task.constants import N_STATES, RIGHT, SEES_CUE
 
 if TYPE_CHECKING:
     from taichi_ants.engines.runs.traces import Trace
@@ -42,10 +42,10 @@ def classify(trace: Trace, max_steps: int) -> tuple[np.ndarray, np.ndarray]:
     def count(which: np.ndarray) -> np.ndarray:
         return np.bincount(episode[which], minlength=episode[-1] + 1)
 
-    carries = trace.percepts >= N_STATES // 2
+    carries = trace.paper_states >= N_STATES // 2
     # Moves onto a cell of the kind T or S are rewarded.
-    ahead = trace.percepts >> (4 - 2 * np.minimum(trace.actions, RIGHT)) & 3
-    paid = late & (trace.actions <= RIGHT) & (ahead == SEES_LURE)
+    ahead = trace.paper_states >> (4 - 2 * np.minimum(trace.actions, RIGHT)) & 3
+    paid = late & (trace.actions <= RIGHT) & (ahead == SEES_CUE)
     steps, with_food = count(late), count(late & carries)
     often = count(paid) >= _PAID_SHARE * steps
     walks, circles = often & (with_food == 0), often & (with_food == steps)

@@ -25,7 +25,7 @@ from taichi_ants.baselines.open_cells import open_cells
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
 from taichi_ants.grid.randomness import stream_state
-from taichi_ants.settings import Count, Is, Seed, checked_arguments
+from taichi_ants.settings import Count, Seed, Setting, checked_arguments
 from taichi_ants.worlds.world import World
 
 Method = Literal["ant_system", "max_min"]
@@ -61,13 +61,13 @@ class Search:
 @checked_arguments
 def search(
     world: World,
-    method: Annotated[Method, Is()] = "max_min",
+    method: Annotated[Method, Setting()] = "max_min",
     *,
     iterations: Count = 200,
     ants: Count = 32,
     colonies: Count = 20,
-    alpha: Annotated[int, Is(least=1, most=8)] = 1,
-    evaporation: Annotated[float | None, Is(above=0, most=1)] = None,
+    alpha: Annotated[int, Setting(least=1, most=8)] = 1,
+    evaporation: Annotated[float | None, Setting(above=0, most=1)] = None,
     max_steps: Count = 100_000,
     seed: Seed = 0,
     threads: int | None = None,

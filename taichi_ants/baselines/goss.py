@@ -27,7 +27,7 @@ from taichi_ants import runtime
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.grid.constants import STREAM_BRIDGE
 from taichi_ants.grid.randomness import stream_state
-from taichi_ants.settings import Count, Is, Seed, checked_arguments
+from taichi_ants.settings import Count, Seed, Setting, checked_arguments
 
 # Percent of colonies for each ratio r of the branches, by the share of ants on the short branch:
 # 0-20 %, 20-40 %, 40-60 %, 60-80 %, 80-100 %.
@@ -44,7 +44,7 @@ _LAUNCH = 1 << 14  # colonies per launch, which takes less than half a second
 
 
 @checked_arguments
-def crossing_steps(ratio: Annotated[float, Is(least=1, most=100)]) -> tuple[int, int]:
+def crossing_steps(ratio: Annotated[float, Setting(least=1, most=100)]) -> tuple[int, int]:
     """Return the steps to cross the short branch and a branch that is `ratio` times as long."""
     return SHORT_CELLS - 1, round(SHORT_CELLS * ratio) - 1
 
@@ -56,8 +56,8 @@ def choices(
     colonies: Count = 10_000,
     *,
     ants: Count = 1000,
-    k: Annotated[float, Is(above=0, most=1e9)] = 20.0,
-    n: Annotated[int, Is(least=1, most=MAX_EXPONENT)] = 2,
+    k: Annotated[float, Setting(above=0, most=1e9)] = 20.0,
+    n: Annotated[int, Setting(least=1, most=MAX_EXPONENT)] = 2,
     opens: int = 0,
     seed: Seed = 0,
     threads: int | None = None,

@@ -28,7 +28,7 @@ from taichi_ants.baselines.open_cells import open_cells
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_FORAGER
 from taichi_ants.grid.randomness import stream_state
-from taichi_ants.settings import Count, Is, Seed, Share, checked_arguments
+from taichi_ants.settings import Count, Seed, Setting, Share, checked_arguments
 from taichi_ants.worlds.world import World
 
 EVERY = 10  # ticks between measurements of the path
@@ -71,7 +71,7 @@ def forage(
     ants: Count = 64,
     colonies: Count = 20,
     capacity: Count = 10,
-    discount: Annotated[float, Is(above=0, most=math.nextafter(1, 0))] = 0.9,
+    discount: Annotated[float, Setting(above=0, most=math.nextafter(1, 0))] = 0.9,
     evaporation: Share = 0.001,
     exploration: Share = 0.1,
     momentum: Share = 0.8,

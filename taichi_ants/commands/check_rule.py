@@ -1,8 +1,8 @@
 """Compare the rules and observations that a file registers with the plain reference, bit by bit.
 
-The command loads a Python file, and compares each of its rules in kernels with its Python twin, for
-drawn inputs and in drawn colonies, and each of its observations in drawn colonies. It prints a line
-for each, and exits with status 1 if one differs. See docs/rules.md.
+The command loads a Python file, and compares each of its rules in kernels with its Python function,
+for drawn inputs and in drawn colonies, and each of its observations in drawn colonies. It prints a
+line for each, and exits with status 1 if one differs. See docs/rules.md.
 """
 
 from __future__ import annotations

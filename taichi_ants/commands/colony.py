@@ -177,7 +177,7 @@ def _learning(epsilon: float) -> TrainingConfig:
 
 def training_config(settings: argparse.Namespace, epsilon: float) -> TrainingConfig:
     """Return the training with the settings of the command line."""
-    return _learning(epsilon).but(**command_line.given_settings(settings).get("training", {}))
+    return _learning(epsilon).replace(**command_line.given_settings(settings).get("training", {}))
 
 
 def study(settings: argparse.Namespace) -> None:
@@ -293,7 +293,7 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     base = named or (policy.task if policy else queueing())
     if policy:
         base = replace(base, observation=policy.observation)
-    return base.but(**command_line.given_settings(settings).get("task", {}))
+    return base.replace(**command_line.given_settings(settings).get("task", {}))
 
 
 def start(settings: argparse.Namespace) -> None:

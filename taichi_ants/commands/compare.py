@@ -114,7 +114,7 @@ def points(settings: argparse.Namespace, world: World) -> tuple[RunPoint, ...]:
 
     deliveries = DELIVERIES if settings.delivery == "both" else (settings.delivery,)
     given = given_settings(settings).get("task", {})
-    tasks = [Task().but(delivery=delivery, **given) for delivery in deliveries]
+    tasks = [Task().replace(delivery=delivery, **given) for delivery in deliveries]
     numbers = itertools.product(
         settings.learning_rates, settings.discounts, settings.epsilons, settings.epsilon_decays
     )

@@ -262,12 +262,12 @@ def find_policy(settings: argparse.Namespace, world: World) -> tuple[np.ndarray,
 
 
 def _task(settings: argparse.Namespace) -> Task:
-    return TASK.but(**given_settings(settings).get("task", {}))
+    return TASK.replace(**given_settings(settings).get("task", {}))
 
 
 def training_config(settings: argparse.Namespace) -> TrainingConfig:
     """Return the training configuration with the given options."""
-    return TRAINING.but(**given_settings(settings).get("training", {}))
+    return TRAINING.replace(**given_settings(settings).get("training", {}))
 
 
 def noted_checkpoints(settings: argparse.Namespace, world: World) -> tuple[int, list[Checkpoint]]:

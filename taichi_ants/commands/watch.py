@@ -83,7 +83,7 @@ def watch(settings: argparse.Namespace) -> None:
     """Serve the page until the session ends."""
     from taichi_ants import runtime
     from taichi_ants.live.choices import Choices
-    from taichi_ants.live.server import Room
+    from taichi_ants.live.server import SessionServer
     from taichi_ants.live.session import Session
 
     load_plugin(settings.plugin)
@@ -96,7 +96,7 @@ def watch(settings: argparse.Namespace) -> None:
         session = Session(choices.setup(START))
         session.leap(LEARNED)
     prepare = partial(load_plugin, settings.plugin) if settings.plugin else None
-    room = Room(session, choices, settings.port, prepare, playing=not settings.session)
+    room = SessionServer(session, choices, settings.port, prepare, playing=not settings.session)
     print(f"{room.url}\nOpen this address; Ctrl-C ends.", flush=True)
     with ExitStack() as opened:
         if not settings.no_browser and sys.stdout.isatty():

@@ -32,8 +32,8 @@ RETURNS, STEPS, DELIVERIES = range(len(OUTCOMES))
 
 # The columns of a trace, which has one row per step, by the names of fields of `Trace`.
 TRACE = (
-    *("episodes", "steps", "cells", "headings", "percepts", "states", "actions", "rewards"),
-    *("next_percepts", "next_states", "terminated", "events"),
+    *("episodes", "steps", "cells", "headings", "paper_states", "states", "actions", "rewards"),
+    *("next_paper_states", "next_states", "terminated", "events"),
     "executed",
 )
 

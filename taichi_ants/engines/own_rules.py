@@ -1,7 +1,7 @@
-"""Rules that you wrote, as Taichi functions, and their comparison with their twins.
+"""Rules that you wrote, as Taichi functions, and their comparison with their Python functions.
 
-Each rule is compiled, and compared with its twin for many inputs, in a forked process before a
-kernel includes it. See `taichi_ants.rules`.
+Each rule is compiled, and compared with its Python function for many inputs, in a forked process
+before a kernel includes it. See `taichi_ants.rules`.
 """
 
 import linecache
@@ -83,7 +83,7 @@ def bounded_function(rule: Rule) -> Callable[..., Any]:
     """Return a `ti.func` as `plain_function`, whose results are in the range of the rule's kind.
 
     A result that is not a number becomes the smallest one. Results of kinds with whole numbers are
-    rounded down, as i32; others are f64. AntsError if the rule does not equal its twin.
+    rounded down, as i32; others are f64. AntsError if the rule does not equal its Python function.
     """
     _check(rule)
     kind, function = KINDS[rule.kind], plain_function(rule)
@@ -116,7 +116,7 @@ def _check(rule: Rule) -> None:
 
 
 def difference(rule: Rule, n: int = TRIES) -> str:
-    """Return the first difference of a rule and its twin for n drawn inputs, or an empty string."""
+    """Return the first difference of a rule and its Python function for n drawn inputs, or ""."""
     drawn = list(tries(rule, n))
     names = (*rule.inputs, *rule.parameters)
     lengths = [rule.inputs[name].length if name in rule.inputs else 0 for name in names]
@@ -133,13 +133,15 @@ def difference(rule: Rule, n: int = TRIES) -> str:
         return last_line(error)
     for (inputs, parameters), result in zip(drawn, found.tolist(), strict=True):
         try:
-            twin = float(rule.twin(**inputs, **parameters))
+            reference = float(rule.reference(**inputs, **parameters))
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
-            return f"its twin fails ({said}) for {values_shown(inputs, parameters)}"
-        if result != twin:
+            return f"its Python function fails ({said}) for {values_shown(inputs, parameters)}"
+        if result != reference:
             given = values_shown(inputs, parameters)
-            return f"its kernel returns {result!r}, but its twin {twin!r}, for {given}"
+            return (
+                f"its kernel returns {result!r}, but its Python function {reference!r}, for {given}"
+            )
     return ""
 
 

@@ -29,12 +29,12 @@ def view_type(observation: Observation, dense: bool, reads_dense: tuple[bool, ..
         read |= {name: ti.types.vector(n, kind), f"own_{name}": kind}
     return ti.types.struct(
         carries=ti.i32,
-        percept=ti.i32,
+        paper_state=ti.i32,
         codes=of_cells,
         levels=ti.types.vector(n, level),
         strongest=level,
         ants=of_cells,
-        strangers=of_cells,
+        other_nest_ants=of_cells,
         nearer=of_cells,
         own_level=level,
         **read,
@@ -42,10 +42,10 @@ def view_type(observation: Observation, dense: bool, reads_dense: tuple[bool, ..
 
 
 @ti.func
-def judge(
+def fill_codes(
     half: ti.template(), homing: ti.template(), view: ti.template(), observation: ti.template()
 ):
-    """Complete a view: replace the ground in `codes` by the paper's codes, and set the percept.
+    """Complete a view: replace the ground in `codes` by the paper's codes, and set `paper_state`.
 
     `half` says whether the view of the outbound cue is "half"; `homing` is the view of the homing
     cue, or "" for the compass.
@@ -61,7 +61,7 @@ def judge(
             carrying = see_by_level(homing == "half", view.codes[k] >> 2, level, view.strongest)
         foraging = see_foraging(half, view.codes[k], level, view.strongest)
         view.codes[k] = ti.select(view.carries == 1, carrying, foraging)
-    view.percept = state_index(
+    view.paper_state = state_index(
         view.carries, view.codes[left], view.codes[forward], view.codes[right]
     )
 

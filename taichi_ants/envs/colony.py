@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from taichi_ants import arguments
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.rollout import Choices, Rollout
+from taichi_ants.envs.rollout import Rollout, TablePolicy
 from taichi_ants.envs.vector import (
     ACTION_MASKS,
     Ants,
@@ -85,9 +85,9 @@ class ColonyWorlds(Ants):
         if new.any():
             # As for one ant, seeds count modulo 2**64.
             given = [seed % 2**64 for seed, one in zip(seeds, new, strict=True) if one]  # type: ignore[operator]
-            self.colony.begin_some(new, given)
+            self.colony.reset_worlds(new, given)
         if (which & ~new).any():
-            self.colony.begin_some(which & ~new)
+            self.colony.reset_worlds(which & ~new)
         self.events = np.where(which[:, None], Event.NONE, self.events)
         self.deliveries[which], self._counted[which] = 0, 0
 
@@ -154,7 +154,7 @@ class ColonyWorlds(Ants):
         finals: np.ndarray,
         mode: AutoresetMode,
         waiting: np.ndarray,
-        choices: Choices | None,
+        choices: TablePolicy | None,
     ) -> None:
         masks = choices.masks() if choices is not None else None
         for t, actions in enumerate(into.actions):
@@ -192,7 +192,7 @@ class ColonyWorlds(Ants):
         because they turn the ant.
         """
         colony, traffic = self.colony, self.task.traffic
-        masks = ACTION_MASKS.take(colony.percepts, axis=0, mode="clip")
+        masks = ACTION_MASKS.take(colony.paper_states, axis=0, mode="clip")
         if traffic.shared:
             base = np.arange(len(masks))[:, None] * colony.grid.size
             towards = colony.headings[..., None] + np.arange(-1, RIGHT)

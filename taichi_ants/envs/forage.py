@@ -16,7 +16,7 @@ from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
-from taichi_ants.envs.rollout import Choices, Rollout
+from taichi_ants.envs.rollout import Rollout, TablePolicy
 from taichi_ants.envs.vector import (
     ACTION_MASKS,
     Ants,
@@ -95,7 +95,7 @@ class LoneAnts(Ants):
         finals: np.ndarray,
         mode: AutoresetMode,
         waiting: np.ndarray,
-        choices: Choices | None,
+        choices: TablePolicy | None,
     ) -> None:
         policy = choices and (choices.masks(), choices.streams, choices.epsilon)
         rows = {
@@ -264,7 +264,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         arrays = self._arrays
         return self._ants.shown.show(arrays["states"])[0], {
             "state": np.int64(arrays["states"][0]),
-            "action_mask": ACTION_MASKS[arrays["percepts"][0]].copy(),
+            "action_mask": ACTION_MASKS[arrays["paper_states"][0]].copy(),
             "event": np.int64(arrays["events"][0]),
             "reason": np.int64(arrays["reasons"][0]),
             "deliveries": np.int64(arrays["deliveries"][0]),
@@ -274,7 +274,7 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         """Return the actions that can succeed now, bool (5,): `info["action_mask"]` as bool."""
         if not self._begun:
             raise ResetNeeded("no episode has begun; call reset() before action_masks().")
-        return ACTION_MASKS[self._arrays["percepts"][0]].astype(bool)
+        return ACTION_MASKS[self._arrays["paper_states"][0]].astype(bool)
 
     def render(self) -> Any:
         """Return a picture or a text map of the world, depending on `render_mode`, or None."""

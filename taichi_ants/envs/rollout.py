@@ -69,7 +69,7 @@ class Rollout(NamedTuple):
                 )
 
 
-class Choices(NamedTuple):
+class TablePolicy(NamedTuple):
     """The choices of n ants by a table of action values.
 
     Attributes:
@@ -84,7 +84,7 @@ class Choices(NamedTuple):
     epsilon: float
 
     @classmethod
-    def of(cls, q_values: np.ndarray, n: int, epsilon: float, seed: int) -> Choices:
+    def of(cls, q_values: np.ndarray, n: int, epsilon: float, seed: int) -> TablePolicy:
         """Return the choices of n ants with random streams of a seed."""
         return cls(q_values, stream_state(seed, STREAM_ROLLOUT, np.arange(n)), epsilon)
 

@@ -18,7 +18,7 @@ from gymnasium.vector.utils import batch_space
 
 from taichi_ants import arguments
 from taichi_ants.envs.formats import ObservationFormat, Shown
-from taichi_ants.envs.rollout import Choices, Rollout, checked_actions, checked_plan
+from taichi_ants.envs.rollout import Rollout, TablePolicy, checked_actions, checked_plan
 from taichi_ants.errors import (
     AntsError,
     check_one_of,
@@ -44,8 +44,8 @@ Rules = Task | Mapping[str, Any] | str
 
 def _action_masks() -> np.ndarray:
     masks = np.zeros((N_STATES, N_ACTIONS), np.int8)
-    for percept, mask in enumerate(masks):
-        state = state_from_index(percept)
+    for paper_state, mask in enumerate(masks):
+        state = state_from_index(paper_state)
         mask[:PICK_UP] = [code % 2 == 0 for code in state.view]  # E, T and S can be entered
         mask[GIVE if state.carries else PICK_UP] = 3 in state.view
         if not mask.any():  # a dead end, in which moves turn the ant
@@ -53,7 +53,7 @@ def _action_masks() -> np.ndarray:
     return masks
 
 
-ACTION_MASKS = _action_masks()  # the actions that can succeed, by percept: int8 (128, 5)
+ACTION_MASKS = _action_masks()  # the actions that can succeed, by the paper's state: int8 (128, 5)
 
 
 class Arguments(NamedTuple):
@@ -119,7 +119,7 @@ class Ants(ABC):
         finals: np.ndarray,
         mode: AutoresetMode,
         waiting: np.ndarray,
-        choices: Choices | None,
+        choices: TablePolicy | None,
     ) -> None:
         """Take the steps of a rollout, and write its arrays.
 
@@ -416,7 +416,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             into = into._replace(actions=actions)
         if q_values is not None:
             drawn = int(self.np_random.integers(2**63)) if seed is None else whole("seed", seed)
-            choices = Choices.of(q_values, n, epsilon, drawn)
+            choices = TablePolicy.of(q_values, n, epsilon, drawn)
         finals = np.empty((length, n), np.int32)
         into.observations[0] = ants.shown.show(ants.states())
         ants.play(into, finals, self.autoreset_mode, waiting, choices)

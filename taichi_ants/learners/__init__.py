@@ -2,20 +2,20 @@
 
 from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 from taichi_ants.learners.learner import Learner, Memory, td_learner
-from taichi_ants.learners.registry import get, label, names, register, settle
-from taichi_ants.settings import Is
+from taichi_ants.learners.registry import get, label, names, register, with_hyperparameters
+from taichi_ants.settings import Setting
 
 __all__ = [
     "Hyperparameters",
-    "Is",
     "Learner",
     "Memory",
+    "Setting",
     "TrainingConfig",
     "get",
     "label",
     "names",
     "register",
-    "settle",
     "td_learner",
+    "with_hyperparameters",
 ]
 __dir__ = __all__.copy  # completion lists only public names

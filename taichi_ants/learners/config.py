@@ -9,13 +9,13 @@ from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any
 
 from taichi_ants.errors import AntsError, shown
-from taichi_ants.settings import Is, Settings, Share, declared
+from taichi_ants.settings import Setting, Settings, Share, declared
 
 if TYPE_CHECKING:
     import numpy as np
 
-Factor = Annotated[float, Is(above=0, most=1)]
-InitialValue = Annotated[float, Is(least=-1_000_000, most=1_000_000)]
+Factor = Annotated[float, Setting(above=0, most=1)]
+InitialValue = Annotated[float, Setting(least=-1_000_000, most=1_000_000)]
 
 
 @dataclass(frozen=True, init=False)
@@ -31,25 +31,28 @@ class TrainingConfig(Settings, path="training"):
     """
 
     learner: Annotated[
-        str, Is("name of the learner, such as sarsa or q_learning; see docs/learners_reference.md")
+        str,
+        Setting("name of the learner, such as sarsa or q_learning; see docs/learners_reference.md"),
     ]
     # Smaller step sizes could underflow to zero in float32.
-    learning_rate: Annotated[float, Is("learning rate of the first episode", least=1e-37, most=1)]
-    discount: Annotated[Share, Is("discount factor")]
-    epsilon: Annotated[
-        Share, Is("exploration rate (probability of a random action) in the first episode")
+    learning_rate: Annotated[
+        float, Setting("learning rate of the first episode", least=1e-37, most=1)
     ]
-    epsilon_decay: Annotated[Factor, Is("factor that multiplies epsilon after each episode")]
-    min_epsilon: Annotated[Share, Is("smallest value to which epsilon decays")] = 0.01
+    discount: Annotated[Share, Setting("discount factor")]
+    epsilon: Annotated[
+        Share, Setting("exploration rate (probability of a random action) in the first episode")
+    ]
+    epsilon_decay: Annotated[Factor, Setting("factor that multiplies epsilon after each episode")]
+    min_epsilon: Annotated[Share, Setting("smallest value to which epsilon decays")] = 0.01
     learning_rate_decay: Annotated[
-        Factor, Is("factor that multiplies the learning rate after each episode")
+        Factor, Setting("factor that multiplies the learning rate after each episode")
     ] = 1.0
-    min_learning_rate: Annotated[Share, Is("smallest value to which the learning rate decays")] = (
-        0.0
-    )
+    min_learning_rate: Annotated[
+        Share, Setting("smallest value to which the learning rate decays")
+    ] = 0.0
     initial_q: Annotated[
         InitialValue,
-        Is("action values before learning; high values make ants try every action"),
+        Setting("action values before learning; high values make ants try every action"),
     ] = 0.0
     hyperparameters: tuple[tuple[str, float], ...] = ()
 
@@ -131,8 +134,8 @@ class TrainingConfig(Settings, path="training"):
 class Hyperparameters(Settings, path="training"):
     """Base of the hyperparameters of a learner; by itself, no hyperparameters.
 
-    Declare each field as `Annotated[int, Is(...)]` or `Annotated[float, Is(...)]`; in kernels it is
-    i32 or f32.
+    Declare each field as `Annotated[int, Setting(...)]` or `Annotated[float, Setting(...)]`; in
+    kernels it is i32 or f32.
     """
 
     def __post_init__(self) -> None:
@@ -141,7 +144,7 @@ class Hyperparameters(Settings, path="training"):
             if kinds.get(one.name) not in (int, float):
                 raise AntsError(
                     f"the field {one.name} has the type {one.type}; declare it as "
-                    "Annotated[int, Is(...)] or Annotated[float, Is(...)]."
+                    "Annotated[int, Setting(...)] or Annotated[float, Setting(...)]."
                 )
         self.check()
 

@@ -13,7 +13,7 @@ import taichi as ti
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.memory import values_of
-from taichi_ants.settings import Is
+from taichi_ants.settings import Setting
 from taichi_ants.task.constants import MOST_REWARD, N_ACTIONS, ROW
 from taichi_ants.task.rules.policy import best_value
 
@@ -29,7 +29,7 @@ class Planning(Hyperparameters):
     """The hyperparameters of learners that plan."""
 
     planning_steps: Annotated[
-        int, Is("updates from the model after each step", least=1, most=1000)
+        int, Setting("updates from the model after each step", least=1, most=1000)
     ] = 5
 
 

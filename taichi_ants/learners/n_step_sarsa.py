@@ -8,7 +8,7 @@ import taichi as ti
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of
-from taichi_ants.settings import Is
+from taichi_ants.settings import Setting
 from taichi_ants.task.constants import ROW
 
 
@@ -17,7 +17,7 @@ class Steps(Hyperparameters):
     """The hyperparameter of n-step SARSA; targets near the end of an episode have fewer rewards."""
 
     n_steps: Annotated[
-        int, Is("number of rewards in the target of an update", least=1, most=64)
+        int, Setting("number of rewards in the target of an update", least=1, most=64)
     ] = 4
 
 

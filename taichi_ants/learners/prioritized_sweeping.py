@@ -7,7 +7,7 @@ import taichi as ti
 
 from taichi_ants.learners import model
 from taichi_ants.learners.learner import Learner
-from taichi_ants.settings import Is
+from taichi_ants.settings import Setting
 from taichi_ants.task.constants import N_ACTIONS, ROW
 
 
@@ -17,7 +17,9 @@ class Sweeping(model.Planning):
 
     threshold: Annotated[
         float,
-        Is("absolute TD error above which planning updates a state-action pair", least=0, most=1e9),
+        Setting(
+            "absolute TD error above which planning updates a state-action pair", least=0, most=1e9
+        ),
     ] = 0.0001
 
 

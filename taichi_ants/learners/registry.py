@@ -92,7 +92,7 @@ def label(name: str) -> str:
     return BUILT_IN.get(name, name)
 
 
-def settle(config: TrainingConfig) -> TrainingConfig:
+def with_hyperparameters(config: TrainingConfig) -> TrainingConfig:
     """Return the configuration with all hyperparameters of its learner.
 
     Raises AntsError if the learner or a hyperparameter does not exist, or a value is not allowed.

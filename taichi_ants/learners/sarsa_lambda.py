@@ -8,7 +8,7 @@ import taichi as ti
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.memory import discount_of
-from taichi_ants.settings import Is
+from taichi_ants.settings import Setting
 from taichi_ants.task.constants import ROW
 
 
@@ -17,9 +17,12 @@ class Traces(Hyperparameters):
     """The hyperparameters of SARSA(lambda); a new trace replaces the oldest if there is no room."""
 
     trace_decay: Annotated[
-        float, Is("lambda: factor on traces per step, in addition to the discount", least=0, most=1)
+        float,
+        Setting("lambda: factor on traces per step, in addition to the discount", least=0, most=1),
     ] = 0.9
-    trace_length: Annotated[int, Is("largest number of eligibility traces", least=1, most=256)] = 32
+    trace_length: Annotated[
+        int, Setting("largest number of eligibility traces", least=1, most=256)
+    ] = 32
 
 
 @ti.func

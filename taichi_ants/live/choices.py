@@ -19,7 +19,7 @@ from taichi_ants.features import refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
 from taichi_ants.live.setup import FORM_SUPPORTS, MOST_ANTS, MOST_TEXT, Setup
-from taichi_ants.settings import MISSING, Named, Setting, all_of, declared, flat, nested
+from taichi_ants.settings import MISSING, DeclaredSetting, Named, all_of, declared, flat, nested
 from taichi_ants.task import Labour, Task, observations
 
 WORLDS = {
@@ -63,7 +63,7 @@ def fields() -> Iterator[dict[str, Any]]:
                 yield {**_field(one), "world": name}
 
 
-def _field(one: Setting) -> dict[str, Any]:
+def _field(one: DeclaredSetting) -> dict[str, Any]:
     rule, group = one.rule, one.path.rpartition(".")[0]
     usual = one.default if rule.usual is None else rule.usual
     return {
@@ -147,7 +147,7 @@ class Choices:
         elif not name:
             check_one_of("the policy", policy, [f"{FOLLOWS}{one}" for one in self.policies])
             file = self.policies[policy.removeprefix(FOLLOWS)]
-            task, table = task.but(observation=file.observation), file.q_values
+            task, table = task.replace(observation=file.observation), file.q_values
         size = checked_whole("the size", chosen["size"], *SIZES)
         shares = table is not None or learners.get(name).td_error is not None
         training = {**_LEARNING, **settings.get("training", {})}

@@ -2,11 +2,11 @@
 
 The server is reachable only from this machine. It serves the live page and a WebSocket for each
 open page; a socket requires the server's own page and its token. Pages send requests as JSON, see
-`Room._do`; the server sends JSON messages and frames, see `taichi_ants.viewer.frames`.
+`SessionServer._do`; the server sends JSON messages and frames, see `taichi_ants.viewer.frames`.
 
-One thread serves the sockets. Another one, which calls `Room.run`, owns the session. Requests pass
-through a queue to it, and messages for pages return to the socket thread. Further threads check
-uploaded files, and worker processes replay them, see `exports.Making`.
+One thread serves the sockets. Another one, which calls `SessionServer.run`, owns the session.
+Requests pass through a queue to it, and messages for pages return to the socket thread. Further
+threads check uploaded files, and worker processes replay them, see `exports.Making`.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ class Page:
         self.tell(*messages)
 
 
-class Room:
+class SessionServer:
     """The server of a session that several pages can watch and change together.
 
     Pages offer `choices`. The server listens on `port`; 0 means any free port. Worker processes

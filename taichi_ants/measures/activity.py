@@ -26,7 +26,7 @@ def activity(snapshot: Snapshot) -> float:
     Ants that were pushed do not count. The value is nan without ants.
     """
     events = snapshot.ant_events
-    return share_of((events == Event.ENTERED_EMPTY) | (events == Event.ENTERED_LURE))
+    return share_of((events == Event.ENTERED_EMPTY) | (events == Event.ENTERED_CUE))
 
 
 def synchrony(values: np.ndarray, snapshot: Snapshot) -> float:

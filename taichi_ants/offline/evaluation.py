@@ -20,9 +20,9 @@ from taichi_ants.learners.config import InitialValue
 from taichi_ants.learners.policies import action_probabilities, checked_values
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.offline.learners import Discount, EmpiricalModel
-from taichi_ants.settings import Flag, Is, Share, checked_arguments
+from taichi_ants.settings import Flag, Setting, Share, checked_arguments
 
-Resamples = Annotated[int, Is(least=0, most=100_000)]
+Resamples = Annotated[int, Setting(least=0, most=100_000)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -19,12 +19,12 @@ from taichi_ants import runtime
 from taichi_ants.errors import expect
 from taichi_ants.learners.config import InitialValue
 from taichi_ants.offline.dataset import Dataset
-from taichi_ants.settings import Count, Flag, Is, Share, checked_arguments
+from taichi_ants.settings import Count, Flag, Setting, Share, checked_arguments
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.task.events import Event
 
 # Below 1, so that values of endless episodes are finite; at 0.9999 Q iteration takes half a second.
-Discount = Annotated[Share, Is(most=0.9999)]
+Discount = Annotated[Share, Setting(most=0.9999)]
 
 
 @checked_arguments
@@ -82,7 +82,7 @@ def fitted_q_iteration(
 def pessimistic_q_iteration(
     data: Dataset,
     discount: Discount = 0.9,
-    penalty: Annotated[float, Is(least=0, most=1e9)] = 1.0,
+    penalty: Annotated[float, Setting(least=0, most=1e9)] = 1.0,
     by_run: Flag = False,
     threads: int | None = None,
 ) -> np.ndarray:

@@ -17,9 +17,9 @@ from taichi_ants.task.constants import (
     EMPTY,
     GIVE,
     PICK_UP,
+    SEES_CUE,
     SEES_EMPTY,
     SEES_GOAL,
-    SEES_LURE,
 )
 from taichi_ants.task.events import Event
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 PAID = {
     Event.ENTERED_EMPTY: "empty",
     Event.PUSHED: "empty",
-    Event.ENTERED_LURE: "shaping",
+    Event.ENTERED_CUE: "shaping",
     Event.PICKED_UP: "pick_up",
     Event.DELIVERED: "deliver",
     Event.BLOCKED: "failed",
@@ -55,7 +55,7 @@ class Intent:
     action: int
     heading: int = 0
     target: Cell | None = None
-    lured: bool = False
+    shows_cue: bool = False
     gives: bool = False
     rests: bool = False
 
@@ -66,11 +66,11 @@ class Intent:
 
 
 def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent:
-    """Return the intent of an ant's action, from its percept.
+    """Return the intent of an ant's action, from its `paper_state`.
 
     If a pick-up can choose between several food items, the ant draws from its random stream.
     """
-    codes = (ant.percept >> 4 & 3, ant.percept >> 2 & 3, ant.percept & 3)
+    codes = (ant.paper_state >> 4 & 3, ant.paper_state >> 2 & 3, ant.paper_state & 3)
     if action == GIVE:
         return Intent(ant, action, gives=ant.carries and SEES_GOAL in codes)
     if action == PICK_UP:
@@ -86,10 +86,10 @@ def intend(world: WorldState, ant: Ant, action: int, traffic: Traffic) -> Intent
     heading = (ant.heading + action - 1) % N_HEADINGS
     target = neighbour(ant.cell, heading)
     if traffic.shared and nestmate(world, ant, target):
-        return Intent(ant, action, heading, target, lured=is_better(world, ant, target))
-    if codes[action] not in (SEES_EMPTY, SEES_LURE):
+        return Intent(ant, action, heading, target, shows_cue=is_better(world, ant, target))
+    if codes[action] not in (SEES_EMPTY, SEES_CUE):
         return Intent(ant, action, heading)
-    return Intent(ant, action, heading, target, lured=codes[action] == SEES_LURE)
+    return Intent(ant, action, heading, target, shows_cue=codes[action] == SEES_CUE)
 
 
 def winners(
@@ -113,7 +113,7 @@ def winners(
     return {slot for *_, slot in best.values()}
 
 
-def settle(
+def resolve_moves(
     intents: Sequence[Intent], winning: set[int], traffic: Traffic
 ) -> tuple[dict[int, Cell], dict[int, Cell]]:
     """Return two dictionaries by slot: cells that ants enter, and cells onto which ants are pushed.
@@ -146,7 +146,7 @@ def settle(
         if other.ant.carries or other.ant.slot in entered or picks_up:
             continue
         entered[ant.slot] = intent.target
-        granted = traffic.grant and other.enters and other.target == ant.cell
+        granted = traffic.reward_pushed and other.enters and other.target == ant.cell
         (entered if granted else pushed)[other.ant.slot] = ant.cell
     return entered, pushed
 
@@ -159,7 +159,7 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
     a pheromone. Ants lay one pheromone after the other, the trail first.
     """
     winning = winners(intents, tick, world.index, task.traffic.carriers_first)
-    entered, pushed = settle(intents, winning, task.traffic)
+    entered, pushed = resolve_moves(intents, winning, task.traffic)
     acted: list[tuple[Intent, Cell, bool]] = []
     for intent in intents:
         ant, slot = intent.ant, intent.ant.slot
@@ -184,7 +184,7 @@ def carry_out(world: WorldState, intents: Sequence[Intent], tick: int, task: Tas
         ant.event, ant.reward = event, paid
         acted.append((intent, start, had_food))
     for name, trail in world.pheromones.items():
-        laid = task.fields[name].laid if name in task.fields else "with_food"
+        laid = task.fields[name].deposited_when if name in task.fields else "with_food"
         for intent, start, had_food in acted:
             ant = intent.ant
             for cell in _marked(laid, intent, start, had_food) if lays(task, ant, name) else ():
@@ -201,7 +201,7 @@ def _marked(laid: str, intent: Intent, start: Cell, had_food: bool) -> list[Cell
     """
     ant = intent.ant
     if laid == "dead_end":
-        return [start] if not had_food and ant.percept == 0b01_01_01 else []
+        return [start] if not had_food and ant.paper_state == 0b01_01_01 else []
     if laid == "failed_pick_up":
         fails = intent.action == PICK_UP and ant.event is Event.FAILED
         return [start] if fails and not had_food else []
@@ -222,7 +222,7 @@ def _move(intent: Intent, destination: Cell | None) -> Event:
     if destination is None:
         return Event.BLOCKED
     intent.ant.cell = destination
-    return Event.ENTERED_LURE if intent.lured else Event.ENTERED_EMPTY
+    return Event.ENTERED_CUE if intent.shows_cue else Event.ENTERED_EMPTY
 
 
 def _handle(world: WorldState, intent: Intent, wins: bool, task: Task) -> Event:

@@ -40,7 +40,7 @@ class Ant:
         threshold: Its response threshold, 0 without one.
         trait: Its number from 0 to less than 1, which never changes.
         idle: Whether it does not forage; its last action is then -1 and its last event NONE.
-        percept: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
+        paper_state: Load and codes of the three cells ahead, 0 to 127; decides what an action does.
         state: The state index, by which the ant chooses and learns.
         misread: The codes of cells in view that the ant misreads, by turns from its heading.
         action, event, reward: The last ones; -1, NONE and 0 before the first tick.
@@ -56,7 +56,7 @@ class Ant:
     stream: RandomStream = field(default_factory=lambda: RandomStream(0))
     age: int = 0
     carried: int = 0
-    percept: int = 0
+    paper_state: int = 0
     state: int = 0
     misread: dict[int, int] = field(default_factory=dict)
     action: int = -1

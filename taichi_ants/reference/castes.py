@@ -132,7 +132,7 @@ def starts_foraging(ant: Ant, stimulus: float, labour: Labour) -> bool:
 
 def stops_foraging(ant: Ant, queen: Cell, task: Task) -> bool:
     """Return whether a forager becomes idle, by a draw if it can."""
-    caste, chance = list(task.castes.values())[ant.caste], task.labour.quit
+    caste, chance = list(task.castes.values())[ant.caste], task.labour.stop_probability
     at_nest = queen in [neighbour(ant.cell, heading) for heading in range(N_HEADINGS)]
     if not chance or caste.threshold.distribution == "none" or ant.carries or not at_nest:
         return False

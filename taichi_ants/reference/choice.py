@@ -25,9 +25,9 @@ from taichi_ants.task.constants import (
     N_ACTIONS,
     PICK_UP,
     RIGHT,
+    SEES_CUE,
     SEES_EMPTY,
     SEES_GOAL,
-    SEES_LURE,
 )
 
 if TYPE_CHECKING:
@@ -87,8 +87,8 @@ def choose_cell(world: WorldState, ant: Ant, choice: Choice, traffic: Traffic) -
     for side in (LEFT, FORWARD, RIGHT):
         cell = neighbour(ant.cell, (ant.heading + side - 1) % N_HEADINGS)
         misread = side - 1 in ant.misread
-        nearer[side] = seen[side] == SEES_LURE
-        enters = seen[side] in (SEES_EMPTY, SEES_LURE)
+        nearer[side] = seen[side] == SEES_CUE
+        enters = seen[side] in (SEES_EMPTY, SEES_CUE)
         if nestmate(world, ant, cell) and not misread and traffic.shared:
             enters = ant.carries or traffic.follow
             nearer[side] = ant.carries and is_better(world, ant, cell)

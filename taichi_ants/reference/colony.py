@@ -41,7 +41,7 @@ from taichi_ants.reference.choice import (
 )
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
-from taichi_ants.reference.learners import LEARNERS, Learner
+from taichi_ants.reference.learners import LEARNERS, ReferenceLearner
 from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
 from taichi_ants.reference.own_observations import state_by
 from taichi_ants.reference.own_rules import choose_by_rule, pay
@@ -166,7 +166,7 @@ class ReferenceColony:
         """The kinds of food of the task; none for the usual food."""
         return list(self.task.foods.values())
 
-    def _mind(self, make: Callable[..., Learner], group: int, table: Any) -> FrozenTable:
+    def _mind(self, make: Callable[..., ReferenceLearner], group: int, table: Any) -> FrozenTable:
         """Return the table of a group of ants, frozen if its caste follows a policy."""
         policy = self.castes[group % len(self.castes)].policy if self.castes else None
         if policy is None:
@@ -239,8 +239,8 @@ class ReferenceColony:
         return tables.reshape(*axes, *tables.shape[1:])
 
     def observe(self, ant: Ant) -> None:
-        """Update the percept and the state index of an ant, which may misread cells in view."""
-        ant.percept, ant.misread = observe(self.world, ant), {}
+        """Update the paper's state and the state index of an ant, which may misread cells."""
+        ant.paper_state, ant.misread = observe(self.world, ant), {}
         if self.task.noise.misread > 0 and self.episode >= 0:  # not before the first episode
             codes = codes_in_view(self.world, ant, self._turns)
             ant.misread = misread_codes(codes, self._turns, self.task.noise.misread, ant.stream)
@@ -261,7 +261,7 @@ class ReferenceColony:
         self.epsilon = max(least, self.epsilon * training.epsilon_decay)
         least = min(training.min_learning_rate, training.learning_rate)
         self.learning_rate = max(least, self.learning_rate * training.learning_rate_decay)
-        self.minds.pace(self.learning_rate)
+        self.minds.set_learning_rate(self.learning_rate)
         self.records.append(self.record)
 
     def run_episode(self, ticks: int) -> Iterator[list[Transition]]:
@@ -324,8 +324,8 @@ class ReferenceColony:
         life = self.task.life
         delays = [food.regrowth for food in self.foods] or [life.regrowth]
         self.record.regrown += self.food_sources.regrow(self.world, delays, tick)
-        if life.wander is not None and (tick + 1) % life.wander == 0:
-            self.food_sources.wander(self.world, self.queen_stream)
+        if life.pile_move_interval is not None and (tick + 1) % life.pile_move_interval == 0:
+            self.food_sources.move_piles(self.world, self.queen_stream)
         foraged = [not ant.idle for ant in acting]
         stopping = set()
         if self.task.labour.rule == "thresholds":

@@ -38,7 +38,7 @@ class FoodSources:
         self.food_sources = [FoodSource(cell, kinds[cell]) for cell in sorted(cells)]
         self._piles = _connected(self.food_sources)
 
-    def give(self, cell: Cell, kind: int = 0) -> None:
+    def put(self, cell: Cell, kind: int = 0) -> None:
         """Note that an intervention put food of a kind on a cell.
 
         The first waiting food source of the cell gets its food back. If the cell has no food
@@ -94,7 +94,7 @@ class FoodSources:
             regrown += world.full(source.kind)
         return regrown
 
-    def wander(self, world: WorldState, stream: RandomStream) -> None:
+    def move_piles(self, world: WorldState, stream: RandomStream) -> None:
         """Move each pile by one cell, in a random direction.
 
         Food items move one by one, those in front first, each only if the cell ahead is empty. A

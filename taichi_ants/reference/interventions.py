@@ -81,7 +81,7 @@ class Interventions:
             if what == FOOD:
                 self._kinds[cell] = kind
                 world.put_food(cell, kind, loads)
-                self.colony.food_sources.give(cell, kind)
+                self.colony.food_sources.put(cell, kind)
             else:
                 self.colony.food_sources.end(cell)
         self._new_trail()
@@ -266,7 +266,7 @@ class Interventions:
     def set_learning_rate(self, learning_rate: float) -> None:
         """Set the learning rate for this and all later episodes."""
         self._learning_rate = self.colony.learning_rate = learning_rate
-        self.colony.minds.pace(learning_rate)
+        self.colony.minds.set_learning_rate(learning_rate)
 
     def begin_episode(self) -> None:
         """End the episode, and start the next one in the world as interventions have changed it."""

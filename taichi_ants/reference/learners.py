@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from taichi_ants.learners.config import TrainingConfig
 
 
-class Learner:
+class ReferenceLearner:
     """A learner with its table of action values and its memory.
 
     A simple learner overrides `next_value`; a learner with a memory also overrides `learn`, and
@@ -92,14 +92,14 @@ class Learner:
         self.rows[state][action] = self.rows[state][action] + weight * error
 
 
-class QLearning(Learner):
+class QLearning(ReferenceLearner):
     """Q-learning (Watkins 1989): the next state has the value of its best action."""
 
     def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
         return max(self.rows[step.next_state])
 
 
-class Sarsa(Learner):
+class Sarsa(ReferenceLearner):
     """SARSA (Rummery and Niranjan 1994): the next state has the value of the next action."""
 
     draws_next_action = True
@@ -108,7 +108,7 @@ class Sarsa(Learner):
         return self.rows[step.next_state][step.next_action or 0]  # None if the step terminated
 
 
-class ExpectedSarsa(Learner):
+class ExpectedSarsa(ReferenceLearner):
     """Expected SARSA (van Seijen et al. 2009): the next state has the policy's expected value."""
 
     def next_value(self, step: Transition, epsilon: np.float32) -> np.float32:
@@ -141,7 +141,7 @@ class DynaQ(QLearning):
         return list(self.model.values())[pick(high, len(self.model))]
 
 
-class DoubleQ(Learner):
+class DoubleQ(ReferenceLearner):
     """Double Q-learning (van Hasselt 2010): one table chooses the best action, the other values it.
 
     Ants act by the mean of both tables.
@@ -253,7 +253,7 @@ class PrioritizedSweeping(DynaQ):
                     self._priorities[before] = max(self._priorities[before], abs(error))
 
 
-LEARNERS: dict[str, type[Learner]] = {
+LEARNERS: dict[str, type[ReferenceLearner]] = {
     "q_learning": QLearning,
     "sarsa": Sarsa,
     "expected_sarsa": ExpectedSarsa,

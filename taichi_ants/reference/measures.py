@@ -77,7 +77,7 @@ def blocked_share(colony: ReferenceColony) -> float:
 
 def activity(colony: ReferenceColony) -> float:
     """Return the share of the living ants that entered a cell in the last tick."""
-    entered = [a.event in (Event.ENTERED_EMPTY, Event.ENTERED_LURE) for a in colony.ants.values()]
+    entered = [a.event in (Event.ENTERED_EMPTY, Event.ENTERED_CUE) for a in colony.ants.values()]
     return entered.count(True) / len(entered) if entered else NONE
 
 

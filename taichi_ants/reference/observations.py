@@ -12,9 +12,9 @@ from taichi_ants.task.constants import (
     EMPTY,
     FOOD,
     QUEEN,
+    SEES_CUE,
     SEES_EMPTY,
     SEES_GOAL,
-    SEES_LURE,
     SEES_OBSTACLE,
 )
 
@@ -62,7 +62,7 @@ def is_better(world: WorldState, ant: Ant, cell: Cell) -> bool:
 
 
 def codes_in_view(world: WorldState, ant: Ant, turns: tuple[int, ...] = AHEAD) -> list[int]:
-    """Return the code of each cell: SEES_EMPTY, SEES_OBSTACLE, SEES_LURE or SEES_GOAL."""
+    """Return the code of each cell: SEES_EMPTY, SEES_OBSTACLE, SEES_CUE or SEES_GOAL."""
     strongest = 0 if world.has_compass(ant) else strongest_in_view(world, ant)
     return [_code(world, ant, cell, strongest) for cell in cells_in_view(ant, turns)]
 
@@ -76,17 +76,17 @@ def _code(world: WorldState, ant: Ant, cell: Cell, strongest: Level) -> int:
     if content != EMPTY:  # also the queen for foragers, and food for carriers
         return SEES_OBSTACLE
     if world.has_compass(ant):
-        lures = is_better(world, ant, cell)
+        shows_cue = is_better(world, ant, cell)
     else:
         trail = world.cue(ant)
         level = trail.level(cell)
         enough = 2 * level if trail.rule.view == "half" else level
-        lures = bool(level >= 1 and enough >= strongest)
-    return SEES_LURE if lures else SEES_EMPTY
+        shows_cue = bool(level >= 1 and enough >= strongest)
+    return SEES_CUE if shows_cue else SEES_EMPTY
 
 
 def observe(world: WorldState, ant: Ant) -> int:
-    """Return the percept, the paper's state: load, left, forward and right as a number, 0..127."""
+    """Return the paper's state: load, left, forward and right as a number, 0..127."""
     left, forward, right = codes_in_view(world, ant)
     return 64 * ant.carries + 16 * left + 4 * forward + right
 
@@ -130,7 +130,7 @@ def trail_levels(world: WorldState, ant: Ant) -> int:
         elif code == SEES_OBSTACLE:
             codes.append(OBSTACLE)
         elif ant.carries:
-            codes.append(STRONG if code == SEES_LURE else NOTHING)
+            codes.append(STRONG if code == SEES_CUE else NOTHING)
         else:
             # Ants do not see trails under food or the queen, or on cells that they misread.
             sees = turn not in ant.misread and world.content(cell) == EMPTY

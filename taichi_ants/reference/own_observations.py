@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 def state_by(observation: Observation) -> Callable[[WorldState, Ant], int]:
     """Return a function of a world and an ant that returns the ant's state index.
 
-    AntsError for an observation of the package, which must have a twin in `OBSERVATIONS`.
+    AntsError for an observation of the package, which must have a function in `OBSERVATIONS`.
     """
     if observation.encode.__module__.startswith("taichi_ants."):
         check_one_of("observation", observation.name, tuple(OBSERVATIONS))
@@ -65,14 +65,14 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
     left, forward, right = (codes[turns.index(turn)] for turn in (-1, 0, 1))
     view: dict[str, Any] = {
         "carries": int(ant.carries),
-        "percept": 64 * ant.carries + 16 * left + 4 * forward + right,
+        "paper_state": 64 * ant.carries + 16 * left + 4 * forward + right,
         "codes": Vector(codes),
         "levels": ahead,
         "ants": Vector(
             1 + other.carries if shows and other is not None and other.nest == ant.nest else 0
             for other, shows in zip(others, shown, strict=True)
         ),
-        "strangers": Vector(
+        "other_nest_ants": Vector(
             int(shows and other is not None and other.nest != ant.nest)
             for other, shows in zip(others, shown, strict=True)
         ),

@@ -1,4 +1,4 @@
-"""Your own rules in the reference: their inputs, from which their twins compute results."""
+"""Your own rules in the reference: the inputs of their Python functions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from taichi_ants.reference.geometry import Cell, neighbour
 from taichi_ants.reference.observations import is_better, nestmate
 from taichi_ants.reference.world_state import Level, WorldState
 from taichi_ants.rules.inputs import Vector
-from taichi_ants.task.constants import EMPTY, SEES_EMPTY, SEES_LURE
+from taichi_ants.task.constants import EMPTY, SEES_CUE, SEES_EMPTY
 
 if TYPE_CHECKING:
     from taichi_ants.rules import Rule
@@ -38,11 +38,11 @@ def choose_by_rule(
     rule = task.choice.own_rule
     assert rule is not None
     high, low = ant.stream.draw()
-    seen = ant.state if task.observation == "paper" else ant.percept
+    seen = ant.state if task.observation == "paper" else ant.paper_state
     codes = [seen >> 4 & 3, seen >> 2 & 3, seen & 3]
     cells = _ahead(ant)
-    is_open = [code in (SEES_EMPTY, SEES_LURE) for code in codes]
-    nearer = [code == SEES_LURE and world.has_compass(ant) for code in codes]
+    is_open = [code in (SEES_EMPTY, SEES_CUE) for code in codes]
+    nearer = [code == SEES_CUE and world.has_compass(ant) for code in codes]
     for side, cell in enumerate(cells):
         if cell in world.ants and side - 1 not in ant.misread:
             nearer[side] = world.has_compass(ant) and is_better(world, ant, cell)
@@ -54,7 +54,7 @@ def choose_by_rule(
         "is_open": lambda: is_open,
         "nearer": lambda: nearer,
         "carries": lambda: ant.carries,
-        "percept": lambda: seen,
+        "paper_state": lambda: seen,
         "epsilon": lambda: int(epsilon * _WORDS) / _WORDS,
         "random": lambda: low / _WORDS,
         "random_2": lambda: high / _WORDS,
@@ -70,8 +70,8 @@ def pay(world: WorldState, was: Ant, ant: Ant, rule: Rule, task: Task, tick: int
         "reward": lambda: ant.reward,
         "event": lambda: ant.event,
         "carries": lambda: ant.carries,
-        "percept": lambda: was.percept,
-        "next_percept": lambda: ant.percept,
+        "paper_state": lambda: was.paper_state,
+        "next_paper_state": lambda: ant.paper_state,
         **_of_ants(world, ant, tick),
         **_levels(world, ant, rule, misreads=False),
     }

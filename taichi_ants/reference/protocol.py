@@ -8,7 +8,7 @@ from typing import Any
 
 import taichi_ants.interventions as language
 from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.protocol import At, Event, Every, When
+from taichi_ants.protocol import At, Every, ProtocolEvent, When
 from taichi_ants.reference.colony import EpisodeRecord, ReferenceColony
 from taichi_ants.reference.geometry import Cell, listed_cells, normal_form
 from taichi_ants.reference.interventions import Interventions
@@ -25,7 +25,7 @@ class Protocol:
     tick.
     """
 
-    def __init__(self, colony: ReferenceColony, events: Sequence[Event]) -> None:
+    def __init__(self, colony: ReferenceColony, events: Sequence[ProtocolEvent]) -> None:
         self._colony, self._events = colony, events
 
     def run(self, episodes: int, ticks: int) -> list[EpisodeRecord]:
@@ -54,7 +54,7 @@ class Protocol:
         colony.task, colony.epsilon, learning_rate, tables = self._before
         colony.pheromone, colony.fields = self._pheromones
         colony.take_castes()
-        colony.minds.pace(learning_rate)
+        colony.minds.set_learning_rate(learning_rate)
         colony.learning_rate = learning_rate
         if colony.sharing == "frozen":
             for learner, rows in zip(colony.minds.tables, tables, strict=True):
@@ -70,7 +70,7 @@ class Protocol:
                     if isinstance(getattr(event, name), language.Intervention):
                         self.apply(getattr(event, name))
 
-    def _happens(self, number: int, event: Event) -> bool:
+    def _happens(self, number: int, event: ProtocolEvent) -> bool:
         tick = self._colony.record.ticks
         if isinstance(event, At):
             return tick == event.tick
@@ -96,7 +96,7 @@ class Protocol:
                 to.add_some(self._amount(one), one.heading, one.nest)
             case language.AddAnts():
                 to.add_ants(self._cells(one), one.heading, one.nest)
-            case language.Ants():
+            case language.SetAnts():
                 to.set_ants(one.number)
             case language.Place(what="queen"):
                 to.move_queen(self._cells(one)[0], one.nest or 0)
@@ -108,22 +108,22 @@ class Protocol:
                 to.move(*self._cells(one))
             case language.Clear():
                 to.put(self._cells(one), EMPTY)
-            case language.Trail(cells=None):
+            case language.SetTrail(cells=None):
                 to.lay_trail(list(self._colony.world.ground), one.level, one.field)
-            case language.Trail():
+            case language.SetTrail():
                 to.lay_trail(self._cells(one), one.level, one.field)
-            case language.Epsilon():
+            case language.SetEpsilon():
                 self._colony.epsilon = one.value
-            case language.LearningRate():
+            case language.SetLearningRate():
                 to.set_learning_rate(one.value)
-            case language.Policy():
+            case language.SetPolicy():
                 make = {"random": random_policy, "trail_follower": trail_follower}
                 to.set_policy(
                     make[one.source](self._colony.task.observation)
                     if one.table is None
                     else one.table
                 )
-            case language.TaskNumbers():
+            case language.SetTask():
                 to.set_task(one.changed(self._colony.task))
 
     def _amount(self, one: Any) -> int:

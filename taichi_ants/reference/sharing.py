@@ -11,14 +11,14 @@ import numpy as np
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.config import update_weights
 from taichi_ants.reference.ants import Ant, Pair, Transition
-from taichi_ants.reference.learners import DynaQ, Learner
+from taichi_ants.reference.learners import DynaQ, ReferenceLearner
 from taichi_ants.reference.random_stream import RandomStream
 
 if TYPE_CHECKING:
     from taichi_ants.task import Caste
 
 # Makes a learner from a table (n_states, 5), which it copies; None: the initial value.
-Make = Callable[[np.ndarray | None], Learner]
+Make = Callable[[np.ndarray | None], ReferenceLearner]
 
 _ONE = 1 << 32  # TD errors are summed in units of 2**-32
 
@@ -35,7 +35,7 @@ class FrozenTable:
     def __init__(self, make: Make, slots: int, q_values: np.ndarray | None) -> None:
         self.tables = [make(q_values)]
 
-    def of(self, ant: Ant) -> Learner:
+    def of(self, ant: Ant) -> ReferenceLearner:
         """Return the learner of an ant."""
         return self.tables[0]
 
@@ -49,7 +49,7 @@ class FrozenTable:
     def born(self, slot: int) -> None:
         """Note that an ant was born into a slot."""
 
-    def pace(self, learning_rate: float) -> None:
+    def set_learning_rate(self, learning_rate: float) -> None:
         """Set the learning rate."""
         for table in self.tables:
             table.learning_rate = np.float32(learning_rate)
@@ -82,10 +82,10 @@ class SharedTable(FrozenTable):
             )
         self.draws_next_action = self._common.draws_next_action
         self._slots = slots
-        self.pace(float(self._common.learning_rate))
+        self.set_learning_rate(float(self._common.learning_rate))
 
-    def pace(self, learning_rate: float) -> None:
-        super().pace(learning_rate)
+    def set_learning_rate(self, learning_rate: float) -> None:
+        super().set_learning_rate(learning_rate)
         self._weights = update_weights(learning_rate, self._slots)
 
     def learn(
@@ -134,7 +134,7 @@ class IndependentTables(FrozenTable):
         self._make = make
         self.draws_next_action = self.tables[0].draws_next_action
 
-    def of(self, ant: Ant) -> Learner:
+    def of(self, ant: Ant) -> ReferenceLearner:
         return self.tables[ant.slot]
 
     def born(self, slot: int) -> None:
@@ -172,7 +172,7 @@ class ByGroup(FrozenTable):
                 table.discount = np.float32(discount if own is None else own)
         for group, rate in zip(self._groups, self._by_group(self._learning_rates), strict=True):
             if rate is not None:
-                group.pace(rate)
+                group.set_learning_rate(rate)
 
     def _by_group(self, numbers: Sequence[float | None]) -> list[float | None]:
         return [*numbers] * (len(self._groups) // self._n_castes)
@@ -181,16 +181,16 @@ class ByGroup(FrozenTable):
         """Return the number of the group of an ant."""
         return ant.nest * self._n_castes + ant.caste
 
-    def of(self, ant: Ant) -> Learner:
+    def of(self, ant: Ant) -> ReferenceLearner:
         return self.tables[self.group(ant)]
 
     def draws_ahead(self, ant: Ant) -> bool:
         return self._groups[self.group(ant)].draws_next_action
 
-    def pace(self, learning_rate: float) -> None:
+    def set_learning_rate(self, learning_rate: float) -> None:
         own = self._by_group(self._learning_rates)
         for group, rate in zip(self._groups, own, strict=True):
-            group.pace(learning_rate if rate is None else rate)
+            group.set_learning_rate(learning_rate if rate is None else rate)
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float

@@ -75,8 +75,8 @@ class Trail:
     ) -> None:
         """Deposit the pheromone of an ant that has had its load for `ant.carried` ticks.
 
-        The ant has the load and the event after its action, and the percept before it. `others`
-        are all pheromones by name, `stimulus` is that of the ant's nest.
+        The ant has the load and the event after its action, and the paper's state before it.
+        `others` are all pheromones by name, `stimulus` is that of the ant's nest.
         """
         place, rule, carried = self._place[cell], self.rule, ant.carried
         if rule.own_deposit is not None:
@@ -86,7 +86,11 @@ class Trail:
                 "event": ant.event,
                 "tick": tick,
             }
-            facts |= {"percept": ant.percept, "trait": ant.trait, "threshold": ant.threshold}
+            facts |= {
+                "paper_state": ant.paper_state,
+                "trait": ant.trait,
+                "threshold": ant.threshold,
+            }
             facts["stimulus"] = stimulus
             facts |= {f"level_{name}": one.level(cell) for name, one in others.items()}
             level = self._computed(rule.own_deposit, place, facts)

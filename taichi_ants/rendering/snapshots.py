@@ -14,7 +14,7 @@ import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.records import Snapshot
-from taichi_ants.engines.runs.traces import Made, Trace, rollout
+from taichi_ants.engines.runs.traces import RolloutArguments, Trace, rollout
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
@@ -95,7 +95,7 @@ class Episode:
         return cls(trace, "greedy" if epsilon == 0 else f"epsilon {epsilon:g}")
 
     @property
-    def made(self) -> Made:
+    def made(self) -> RolloutArguments:
         """The world, task, policy and seed of the episode."""
         assert self.trace.made is not None  # `rollout` sets it
         return self.trace.made
@@ -133,7 +133,7 @@ class Episode:
         return _status_of(sees, state, table[state], action, trace.q_values, lines, last)
 
 
-def colony_of_rollout(made: Made) -> Colony:
+def colony_of_rollout(made: RolloutArguments) -> Colony:
     """Return a colony of one ant that repeats a `rollout`: it has the same random numbers."""
     frozen: dict[str, Any] = {"sharing": "frozen", "q_values": made.q_values}
     steady = TrainingConfig.frozen(made.epsilon)

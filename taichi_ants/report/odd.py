@@ -16,7 +16,7 @@ from taichi_ants.analysis.colony.study import OF_STUDY
 from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
 from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
-from taichi_ants.settings import Setting, declared, flat
+from taichi_ants.settings import DeclaredSetting, declared, flat
 from taichi_ants.studies.sweep_file import declaration_of, measure_of
 from taichi_ants.task import observations
 
@@ -91,7 +91,7 @@ class Model:
                 row["evaluation_epsilon"] = 0.0 if row.get("policy.name") else least
             yield row
 
-    def declaration(self, name: str, row: Mapping[str, Any]) -> Setting | None:
+    def declaration(self, name: str, row: Mapping[str, Any]) -> DeclaredSetting | None:
         """Return the declaration of a setting; None for settings of points and of plugins."""
         *group, own = name.split(".")
         if group != ["training", "hyperparameters"]:
@@ -100,7 +100,7 @@ class Model:
         several = learner in learners.names() and declared(learners.get(learner).hyperparameters)
         return next((one for one in several or () if one.name == own), None)
 
-    def uses(self, row: Mapping[str, Any], name: str, one: Setting | None) -> bool:
+    def uses(self, row: Mapping[str, Any], name: str, one: DeclaredSetting | None) -> bool:
         """Return whether a setting has an effect at a point, as far as declarations tell."""
         group, _, own = name.rpartition(".")
         if _EVENT.match(name):

@@ -24,7 +24,7 @@ from taichi_ants.analysis.paper.figures import CURVES, curve_row, curves_of, dra
 from taichi_ants.analysis.paper.measures import MEASURES, measures_of_runs
 from taichi_ants.analysis.paper.report import Results, report, table2_markdown
 from taichi_ants.analysis.paper.table2 import example_name, examples
-from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, Made, trace_policies
+from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, RolloutArguments, trace_policies
 from taichi_ants.engines.runs.training import evaluate
 from taichi_ants.files import archives
 from taichi_ants.files.results import MANIFEST, REPORT
@@ -71,7 +71,7 @@ def do_comparison(
     where, first = {"threads": settings.threads, "arch": settings.arch}, study.points[0]
     world, task, steps = first.world, first.task, first.max_steps
     shows = not settings.no_figures
-    worker.begin(rehearse, first, settings.plugin, where, settings.quick)
+    worker.begin(warm_up, first, settings.plugin, where, settings.quick)
     discounts = tuple(dict.fromkeys(settings.discounts))
     exact = worker.begin(bounds.bound_rows, world, task, discounts, steps)
     with chosen(settings) as how:
@@ -113,12 +113,12 @@ def do_comparison(
     return results, Seen()
 
 
-def rehearse(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
+def warm_up(point: RunPoint, plugin: str | None, where: Mapping[str, Any], draws: bool) -> None:
     """Compile and import all that a worker process needs to record and draw, in advance."""
     load_plugin(plugin)
     runtime.start(**where)
     nothing = np.zeros((point.task.n_states, N_ACTIONS), np.float32)
-    colony = colony_of_rollout(Made(point.world, point.task, 0, 1, q_values=nothing))
+    colony = colony_of_rollout(RolloutArguments(point.world, point.task, 0, 1, q_values=nothing))
     next(frames(colony_snapshots(colony), SIZE))
     record_colony(colony, 1)
     for kind in ("png", "svg") if draws else ():

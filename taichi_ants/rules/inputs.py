@@ -21,7 +21,7 @@ class Input(NamedTuple):
     length: int = 0
 
 
-class Kind(NamedTuple):
+class RuleKind(NamedTuple):
     """A kind of rule: its result and the range of its result, and its inputs by name."""
 
     result: str
@@ -41,8 +41,8 @@ _OF_ANTS = {  # of all kinds of rules that ants follow
     "stimulus": Input("stimulus of the ant's nest; needs `task.labour`"),
     "tick": Input("number of the tick in the episode, from 0"),
 }
-KINDS: dict[str, Kind] = {
-    "choice": Kind(
+KINDS: dict[str, RuleKind] = {
+    "choice": RuleKind(
         "an action: 0 left, 1 forward, 2 right, 3 pick up, 4 give",
         *(0, 4, True),
         {
@@ -53,7 +53,7 @@ KINDS: dict[str, Kind] = {
             "is_open": Input("1 if the ant can try to enter the cell, else 0", AHEAD),
             "level": Input("level of the ant's cue on its own cell"),
             "carries": Input("1 with food, else 0"),
-            "percept": Input("the paper's state, 0 to 127"),
+            "paper_state": Input("the paper's state, 0 to 127"),
             "epsilon": Input("exploration rate"),
             "random": Input("random number from 0 to less than 1"),
             "random_2": Input("another random number from 0 to less than 1"),
@@ -61,7 +61,7 @@ KINDS: dict[str, Kind] = {
         },
         of_fields=(LEVELS, LEVEL),
     ),
-    "deposit": Kind(
+    "deposit": RuleKind(
         "the new level of the cell; the level itself for no deposit",
         *(0, MOST_LEVEL, False),
         {
@@ -69,12 +69,12 @@ KINDS: dict[str, Kind] = {
             "carried": Input("ticks since the ant's load changed"),
             "carries": Input("1 if the ant has food after its action, else 0"),
             "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
-            "percept": Input("the paper's state of the ant before its action, 0 to 127"),
+            "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
             **_OF_ANTS,
         },
         of_fields=(LEVEL,),
     ),
-    "evaporation": Kind(
+    "evaporation": RuleKind(
         "the level of a cell after the tick, before diffusion",
         *(0, MOST_LEVEL, False),
         {
@@ -82,15 +82,15 @@ KINDS: dict[str, Kind] = {
             "tick": Input("number of the tick in the episode, from 0"),
         },
     ),
-    "reward": Kind(
+    "reward": RuleKind(
         "the reward of the ant's action",
         *(-MOST_REWARD, MOST_REWARD, True),
         {
             "reward": Input("reward by `task.rewards` and `task.foods`"),
             "event": Input("result of the ant's action, see `taichi_ants.task.events.Event`"),
             "carries": Input("1 if the ant has food after its action, else 0"),
-            "percept": Input("the paper's state of the ant before its action, 0 to 127"),
-            "next_percept": Input("the paper's state after the tick, 0 to 127"),
+            "paper_state": Input("the paper's state of the ant before its action, 0 to 127"),
+            "next_paper_state": Input("the paper's state after the tick, 0 to 127"),
             "levels": Input(f"levels of {_CUE}, after the tick; 0 on obstacles and food", AHEAD),
             "level": Input("level of the ant's cue on its own cell, after the tick"),
             **_OF_ANTS,
@@ -168,5 +168,5 @@ def _drawn(rng: np.random.Generator, name: str) -> float:
 
 _MOST = {
     **{"codes": 3, "nearer": 1, "is_open": 1, "carries": 1, "event": 7},
-    **{"percept": 127, "next_percept": 127},
+    **{"paper_state": 127, "next_paper_state": 127},
 }

@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 from taichi_ants.errors import AntsError, check_new_name, check_one_of, expect, shown
 from taichi_ants.rules.inputs import KINDS, Input, drawn, field_of, input_of, values_shown
 from taichi_ants.rules.language import LanguageError, kernel_source
-from taichi_ants.settings import Is, Settings, declared
+from taichi_ants.settings import Setting, Settings, declared
 
 TRIES = 2000  # drawn sets of inputs with which `register` tries a rule
 BUILT_IN = {
@@ -48,7 +48,7 @@ class Rule:
             the field NAME in the three cells ahead, and `level_NAME` is that of the ant's own cell.
             In "deposit", `level_NAME` is that of the cell of the deposit.
             Arguments with a default are parameters, whole numbers or floats.
-        twin: The function that the reference calls; `function` itself unless another one is given.
+        reference: The Python function that the reference calls; by default, `function` itself.
         inputs: The inputs by name, in the order of the arguments.
         settings: The class of the parameters.
         source: The source of the function for kernels.
@@ -58,7 +58,7 @@ class Rule:
     name: str
     kind: str
     function: Callable[..., Any]
-    twin: Callable[..., Any]
+    reference: Callable[..., Any]
     inputs: Mapping[str, Input]
     settings: type[Parameters]
     source: str
@@ -75,12 +75,12 @@ class Rule:
         return tuple(dict.fromkeys(filter(None, map(field_of, self.inputs))))
 
     def result(self, inputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> float:
-        """Return the result of the twin; it is limited to the range of the kind.
+        """Return the result of the Python function; it is limited to the range of the kind.
 
         Actions and rewards are rounded down. A result that is not a number counts as the smallest.
         """
         numbers = {name: float(value) for name, value in parameters.items()}
-        kind, result = KINDS[self.kind], float(self.twin(**inputs, **numbers))
+        kind, result = KINDS[self.kind], float(self.reference(**inputs, **numbers))
         result = min(max(result, kind.least), kind.most) if result == result else kind.least
         return math.floor(result) if kind.is_whole else result
 
@@ -92,7 +92,7 @@ def register(
     kind: str,
     *,
     name: str | None = None,
-    twin: Callable[..., Any] | None = None,
+    reference: Callable[..., Any] | None = None,
     summary: str = "",
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Return a decorator that registers a function as a rule and returns the function.
@@ -102,7 +102,7 @@ def register(
     Args:
         kind: "choice", "deposit", "evaporation" or "reward".
         name: The name of the rule, by default that of the function.
-        twin: Another function of the same arguments, which the reference calls instead.
+        reference: Another function of the same arguments, which the reference calls instead.
         summary: A short description.
 
     Raises:
@@ -124,7 +124,7 @@ def register(
                 f"{called!r} is the name of a rule of the kind {_RULES[called].kind!r}; choose "
                 "another name."
             )
-        rule = _rule(called, kind, function, twin, summary)
+        rule = _rule(called, kind, function, reference, summary)
         _try(rule)
         _RULES[called] = rule
         return function
@@ -162,7 +162,7 @@ def _rule(
     name: str,
     kind: str,
     function: Callable[..., Any],
-    twin: Callable[..., Any] | None,
+    reference: Callable[..., Any] | None,
     summary: str,
 ) -> Rule:
     inputs: dict[str, Input] = {}
@@ -180,10 +180,10 @@ def _rule(
                     "give it a default, which makes it a parameter."
                 )
             inputs[argument.name] = one
-    if twin is not None and list(inspect.signature(twin).parameters) != list(arguments):
+    if reference is not None and list(inspect.signature(reference).parameters) != list(arguments):
         raise AntsError(
-            f"twin of the rule {name!r} is {shown(twin)}; it must have the same arguments in the "
-            "same order."
+            f"reference of the rule {name!r} is {shown(reference)}; it must have the same "
+            "arguments in the same order."
         )
     settings = _settings(name, function)
     lengths = {a: inputs[a].length if a in inputs else 0 for a in arguments}
@@ -191,7 +191,7 @@ def _rule(
         source = kernel_source(function, lengths)
     except LanguageError as error:
         raise _unusable(name, error) from None
-    return Rule(name, kind, function, twin or function, inputs, settings, source, summary)
+    return Rule(name, kind, function, reference or function, inputs, settings, source, summary)
 
 
 def _settings(name: str, function: Callable[..., Any]) -> type[Parameters]:
@@ -201,7 +201,7 @@ def _settings(name: str, function: Callable[..., Any]) -> type[Parameters]:
         if argument.default is not argument.empty:
             hint = hints.get(argument.name, type(argument.default))
             if get_origin(hint) is not Annotated:
-                hint = Annotated[hint, Is("parameter")]
+                hint = Annotated[hint, Setting("parameter")]
             if get_args(hint)[0] not in (int, float):
                 raise AntsError(
                     f"the parameter {argument.name!r} of the rule {name!r} is "

@@ -117,7 +117,7 @@ def plan(
 
 
 # Kinds of world in which food moves or takes time to grow back.
-LIVES = {"moving": Life(regrowth=0, wander=100), "slow": Life(regrowth=100)}
+LIVES = {"moving": Life(regrowth=0, pile_move_interval=100), "slow": Life(regrowth=100)}
 RANGES = {"small": (15, 15, 15), "wide": (60, 60, 60), "large": (100, 100, 100)}
 _PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # number of piles; there is no other food
 
@@ -207,7 +207,7 @@ def measured(
         bound, of_point = bounds[condition], values[point]
         share = of_point["deliveries"] / np.where(bound > 0, bound, np.nan)
         calm = values[greedy(point)]["deliveries"]
-        found[condition] = {**of_point, "greedy": calm, "bound": bound, "of_bound": share}
+        found[condition] = {**of_point, "greedy": calm, "bound": bound, "bound_share": share}
     return found
 
 

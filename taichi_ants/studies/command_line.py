@@ -16,7 +16,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
-from taichi_ants.settings import Named, Setting, Settings, declared, nested
+from taichi_ants.settings import DeclaredSetting, Named, Settings, declared, nested
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 if TYPE_CHECKING:
@@ -225,7 +225,7 @@ def add_settings(parser: Parser, base: Settings) -> None:
             add_settings(parser, value)
 
 
-def _help_of_entries(group: Setting) -> str:
+def _help_of_entries(group: DeclaredSetting) -> str:
     """Return the help of options such as --task.fields.home.level, for any name."""
     names = ", ".join(one.name.replace("_", "-") for one in declared(group.entry))
     option = f"--{group.path.replace('_', '-')}.NAME.SETTING"

@@ -20,7 +20,7 @@ from taichi_ants.features import COLONY
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder, stops
-from taichi_ants.protocol import Event, When, check_queen, check_room, checked_protocol
+from taichi_ants.protocol import ProtocolEvent, When, check_queen, check_room, checked_protocol
 from taichi_ants.settings import flat
 from taichi_ants.studies.blocks import Outcome
 from taichi_ants.task import Task
@@ -217,7 +217,7 @@ class ColonyPoint:
     evaluation_epsilon: float | None = None
     measures: tuple[str, ...] = ()
     measure_every: int | None = None
-    protocol: tuple[Event, ...] = ()
+    protocol: tuple[ProtocolEvent, ...] = ()
     during: str = "evaluation"
 
     def __post_init__(self) -> None:
@@ -270,10 +270,10 @@ class ColonyPoint:
                         f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
                     ) from error
 
-    def _check_times(self, event: Event, learns: bool) -> None:
+    def _check_times(self, event: ProtocolEvent, learns: bool) -> None:
         event.times(self.ticks)
 
-    def _check_event(self, event: Event, learns: bool) -> None:
+    def _check_event(self, event: ProtocolEvent, learns: bool) -> None:
         places = self.pool if learns and self.pool else self.places_of_evaluation
         of, start = self.events(learns), (self.ants, self.capacity, self.start, False)
         capacity = arguments.checked_capacity(self.task, *start)
@@ -331,7 +331,7 @@ class ColonyPoint:
             return self.evaluation_epsilon
         return 0.0 if self.policy else self.training.least_epsilon
 
-    def events(self, learns: bool) -> tuple[Event, ...]:
+    def events(self, learns: bool) -> tuple[ProtocolEvent, ...]:
         """Return the events of episodes of training or, if not `learns`, of the evaluation."""
         return self.protocol if self.during in ("both", DURING[learns]) else ()
 

@@ -26,7 +26,7 @@ from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.settings import (
-    Setting,
+    DeclaredSetting,
     all_of,
     declared,
     flat,
@@ -280,7 +280,7 @@ def _check_amounts(name: str, values: Sequence[Any]) -> None:
         )
 
 
-def declaration_of(name: str, fixed: Settings) -> Setting | None:
+def declaration_of(name: str, fixed: Settings) -> DeclaredSetting | None:
     """Return the declaration of a setting; None if the task, training, world and events lack it.
 
     Also None for the short form of an intervention.
@@ -364,7 +364,7 @@ def _point(
     world, task, training = (tree.pop(part, {}) for part in _PARTS[:3])
     preset = task.pop("preset", "paper")
     check_one_of("task.preset", preset, tuple(Task.named()))
-    chosen = Task.named()[preset].but(**task)
+    chosen = Task.named()[preset].replace(**task)
     if "policy" in tree:
         key = f"{tree['policy']!r} {chosen.observation}"
         if key not in built:

@@ -8,7 +8,7 @@ from numbers import Real
 from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, is_flag
-from taichi_ants.settings import Is, Settings
+from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.constants import MAX_NESTS, MAX_STEPS
 
 Distribution = Literal["none", "fixed", "uniform", "normal", "lognormal"]
@@ -29,17 +29,19 @@ class Threshold(Settings, path="task.castes.NAME.threshold"):
 
     distribution: Annotated[
         Distribution,
-        Is("distribution of thresholds over the ants of the caste; with none, they always forage"),
+        Setting(
+            "distribution of thresholds over the ants of the caste; with none, they always forage"
+        ),
     ] = "none"
     value: Annotated[
         float | None,
-        Is("threshold, or the middle of its distribution", unit="units of stimulus"),
-        Is(least=0, most=1e6, usual=10.0, only=("distribution", *DISTRIBUTIONS[1:])),
+        Setting("threshold, or the middle of its distribution", unit="units of stimulus"),
+        Setting(least=0, most=1e6, usual=10.0, only=("distribution", *DISTRIBUTIONS[1:])),
     ] = None
     spread: Annotated[
         float | None,
-        Is("width of the distribution: half the range, or a standard deviation"),
-        Is(least=0, most=1e6, usual=1.0, only=("distribution", *DISTRIBUTIONS[2:])),
+        Setting("width of the distribution: half the range, or a standard deviation"),
+        Setting(least=0, most=1e6, usual=1.0, only=("distribution", *DISTRIBUTIONS[2:])),
     ] = None
 
     def __post_init__(self) -> None:
@@ -83,56 +85,62 @@ class Caste(Settings, path="task.castes.NAME"):
     """
 
     share: Annotated[
-        float | None, Is("share of the ants of a nest that `ants` does not give to castes"),
-        Is(least=0, most=1),
+        float | None, Setting("share of the ants of a nest that `ants` does not give to castes"),
+        Setting(least=0, most=1),
     ] = None  # fmt: skip
     ants: Annotated[
-        int | None, Is("number of ants in each nest at the start, instead of a share"),
-        Is(least=0, most=1 << 24),
+        int | None, Setting("number of ants in each nest at the start, instead of a share"),
+        Setting(least=0, most=1 << 24),
     ] = None  # fmt: skip
     nest: Annotated[
         int | None,
-        Is("number of the nest that has the caste; off: each nest", least=0, most=MAX_NESTS - 1),
+        Setting(
+            "number of the nest that has the caste; off: each nest", least=0, most=MAX_NESTS - 1
+        ),
     ] = None
     policy: Annotated[
         str | None,
-        Is("policy file, or the name of a hand-written policy, that the ants follow; off: learn"),
+        Setting(
+            "policy file, or the name of a hand-written policy, that the ants follow; off: learn"
+        ),
     ] = None
-    epsilon: Annotated[float | None, Is("constant exploration rate", least=0, most=1)] = None
+    epsilon: Annotated[float | None, Setting("constant exploration rate", least=0, most=1)] = None
     epsilon_spread: Annotated[
         float | None,
-        Is("half the range of the exploration rates of the ants around `epsilon`"),
-        Is(least=0, most=0.5),
+        Setting("half the range of the exploration rates of the ants around `epsilon`"),
+        Setting(least=0, most=0.5),
     ] = None
     learning_rate: Annotated[
-        float | None, Is("constant learning rate", least=1e-37, most=1)
+        float | None, Setting("constant learning rate", least=1e-37, most=1)
     ] = None  # fmt: skip
-    discount: Annotated[float | None, Is("discount factor", least=0, most=1)] = None
+    discount: Annotated[float | None, Setting("discount factor", least=0, most=1)] = None
     temperature: Annotated[
-        float | None, Is("temperature of the rule softmax", least=1e-6, most=1e6)
+        float | None, Setting("temperature of the rule softmax", least=1e-6, most=1e6)
     ] = None
     k: Annotated[
         float | None,
-        Is("attraction of a cell without a trail, for the rule deneubourg", least=0.001, most=1e6),
+        Setting(
+            "attraction of a cell without a trail, for the rule deneubourg", least=0.001, most=1e6
+        ),
     ] = None
     exponent: Annotated[
         float | None,
-        Is("exponent of the attraction of a cell, for the rule deneubourg", least=0, most=20),
+        Setting("exponent of the attraction of a cell, for the rule deneubourg", least=0, most=20),
     ] = None
     lays: Annotated[
-        str, Is("pheromones that the ants lay: all, none, or names separated by commas")
+        str, Setting("pheromones that the ants lay: all, none, or names separated by commas")
     ] = ALL
     outbound_cue: Annotated[
-        str | None, Is("pheromone that ants without food see as T; off: that of the task")
+        str | None, Setting("pheromone that ants without food see as T; off: that of the task")
     ] = None
     homing_cue: Annotated[
-        str | None, Is("what ants with food see as S; off: the cue of the task")
+        str | None, Setting("what ants with food see as S; off: the cue of the task")
     ] = None
     lifespan: Annotated[
-        int | None, Is("age at which an ant dies; off: that of the task", unit="ticks"),
-        Is(least=1, most=MAX_STEPS),
+        int | None, Setting("age at which an ant dies; off: that of the task", unit="ticks"),
+        Setting(least=1, most=MAX_STEPS),
     ] = None  # fmt: skip
-    threshold: Annotated[Threshold, Is("response thresholds of the ants")] = field(
+    threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = field(
         default_factory=Threshold
     )
 
@@ -174,7 +182,7 @@ class Caste(Settings, path="task.castes.NAME"):
         varies = bool(self.epsilon_spread)
         return self.share, self.ants, self.nest, self.policy, self.threshold.exists, varies
 
-    def laid(self, names: Sequence[str]) -> list[str]:
+    def pheromones_laid(self, names: Sequence[str]) -> list[str]:
         """Return the pheromones that the ants lay, of those with these names."""
         if self.lays in (ALL, NOTHING):
             return list(names) if self.lays == ALL else []

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from taichi_ants.rules.registry import BUILT_IN, Rule, own, words
-from taichi_ants.settings import Is, Settings, Share
+from taichi_ants.settings import Setting, Settings, Share
 
 if TYPE_CHECKING:
     import numpy as np
@@ -32,27 +32,29 @@ class Choice(Settings, path="task.choice"):
     """
 
     rule: Annotated[
-        str, Is("rule by which ants choose actions", choices=partial(words, "choice"))
+        str, Setting("rule by which ants choose actions", choices=partial(words, "choice"))
     ] = "greedy"
     temperature: Annotated[
         float | None,
-        Is("difference of action values that makes an action e times as likely"),
-        Is(least=1e-6, most=1e6, usual=1.0, only=("rule", "softmax")),
+        Setting("difference of action values that makes an action e times as likely"),
+        Setting(least=1e-6, most=1e6, usual=1.0, only=("rule", "softmax")),
     ] = None
     k: Annotated[
         float | None,
-        Is("attraction of a cell without a trail", unit="units of trail level"),
-        Is(least=0.001, most=1e6, usual=20.0, only=("rule", "deneubourg")),
+        Setting("attraction of a cell without a trail", unit="units of trail level"),
+        Setting(least=0.001, most=1e6, usual=20.0, only=("rule", "deneubourg")),
     ] = None
     exponent: Annotated[
         float | None,
-        Is("exponent of the attraction of a cell; larger values follow stronger trails more"),
-        Is(least=0, most=20, usual=2.0, only=("rule", "deneubourg")),
+        Setting("exponent of the attraction of a cell; larger values follow stronger trails more"),
+        Setting(least=0, most=20, usual=2.0, only=("rule", "deneubourg")),
     ] = None
     carriers_follow: Annotated[
         str | None,
-        Is("pheromone whose levels ants with food and a compass compare; none: the outbound cue"),
-        Is(only=("rule", "deneubourg")),
+        Setting(
+            "pheromone whose levels ants with food and a compass compare; none: the outbound cue"
+        ),
+        Setting(only=("rule", "deneubourg")),
     ] = None
 
     @classmethod
@@ -90,10 +92,10 @@ class Noise(Settings, path="task.noise"):
     """
 
     slip: Annotated[
-        Share, Is("probability that an ant executes a random action instead of the chosen one")
+        Share, Setting("probability that an ant executes a random action instead of the chosen one")
     ] = 0.0
     misread: Annotated[
-        Share, Is("probability with which a cell in view is seen as another of the four codes")
+        Share, Setting("probability with which a cell in view is seen as another of the four codes")
     ] = 0.0
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 # Codes of the cells in view (two bits each in a state index).
 SEES_EMPTY = 0  # E
 SEES_OBSTACLE = 1  # O
-SEES_LURE = 2  # T without food (a trail), S with food (nearer to the queen)
+SEES_CUE = 2  # T without food (a trail), S with food (nearer to the queen)
 SEES_GOAL = 3  # F without food, Q with food
 
 # The content of a cell (uint8) is how ants see it: the lower two bits are the code for an ant

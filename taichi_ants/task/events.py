@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum, auto
 
-from taichi_ants.task.constants import SEES_EMPTY, SEES_LURE
+from taichi_ants.task.constants import SEES_CUE, SEES_EMPTY
 
 
 class Event(IntEnum):
@@ -13,7 +13,7 @@ class Event(IntEnum):
     NONE = 0  # the ant has not acted in this episode
     ENTERED_EMPTY = SEES_EMPTY + 1
     BLOCKED = auto()  # a move that only turned the ant
-    ENTERED_LURE = SEES_LURE + 1  # a cell seen as T or S
+    ENTERED_CUE = SEES_CUE + 1  # a cell seen as T or S
     PICKED_UP = auto()
     DELIVERED = auto()
     FAILED = auto()  # a pick-up or a delivery that was not possible

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntFlag
 from typing import Annotated, Literal
 
-from taichi_ants.settings import Is
+from taichi_ants.settings import Setting
 from taichi_ants.task.pheromone import Pheromone
 
 Laid = Literal["with_food", "without_food", "always", "dead_end", "failed_pick_up", "never"]
@@ -40,8 +40,8 @@ OCCASIONS: dict[str, Occasion] = {
 class Field(Pheromone, path="task.fields.NAME"):
     """The rules of a further pheromone, which has a level in each cell, 0 at the start.
 
-    All settings of `Pheromone` apply, and `laid` says when ants deposit. `view` has an effect only
-    if the field is a cue. By `laid`:
+    All settings of `Pheromone` apply, and `deposited_when` says when ants deposit. `view` has an
+    effect only if the field is a cue. By `deposited_when`:
 
     - "with_food": like the trail, on each cell that an ant enters with food and, when it picks up
       food, on the cell of the food and on its own cell.
@@ -55,15 +55,15 @@ class Field(Pheromone, path="task.fields.NAME"):
     start of the episode.
     """
 
-    laid: Annotated[
+    deposited_when: Annotated[
         Laid,
-        Is("occasions on which ants deposit; a cue that is never laid gives no direction"),
+        Setting("occasions on which ants deposit; a cue that is never laid gives no direction"),
     ] = "with_food"
 
     @property
     def counts_without_food(self) -> bool:
         """Whether deposits depend on the time for which an ant has been without food."""
-        without = ~_WITH_FOOD & OCCASIONS[self.laid]
+        without = ~_WITH_FOOD & OCCASIONS[self.deposited_when]
         rule = self.own_deposit
         reads = self.deposit == "fading" if rule is None else "carried" in rule.inputs
         return reads and bool(without)
@@ -71,4 +71,4 @@ class Field(Pheromone, path="task.fields.NAME"):
     @property
     def numbers(self) -> dict[str, int | float]:
         """The settings as numbers for kernels, by name."""
-        return {**super().numbers, "laid": int(OCCASIONS[self.laid])}
+        return {**super().numbers, "deposited_when": int(OCCASIONS[self.deposited_when])}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from taichi_ants.settings import Is, Settings
+from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.task.rewards import Reward
 
@@ -20,11 +20,11 @@ class Food(Settings, path="task.foods.NAME"):
     last load is taken; `regrowth` ticks later, it has all its loads again.
     """
 
-    pick_up: Annotated[Reward, Is("reward for picking up this food")] = 3
-    deliver: Annotated[Reward, Is("reward for giving this food to the queen")] = 10
-    loads: Annotated[int, Is("loads in a cell", least=1, most=MAX_LOADS)] = 1
+    pick_up: Annotated[Reward, Setting("reward for picking up this food")] = 3
+    deliver: Annotated[Reward, Setting("reward for giving this food to the queen")] = 10
+    loads: Annotated[int, Setting("loads in a cell", least=1, most=MAX_LOADS)] = 1
     regrowth: Annotated[
         int | None,
-        Is("time until an empty cell has all its loads again", unit="ticks"),
-        Is(least=0, most=MAX_STEPS),
+        Setting("time until an empty cell has all its loads again", unit="ticks"),
+        Setting(least=0, most=MAX_STEPS),
     ] = None

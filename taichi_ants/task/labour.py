@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
-from taichi_ants.settings import Is, Settings
+from taichi_ants.settings import Setting, Settings
 
 LabourRule = Literal["none", "thresholds"]
 
@@ -19,29 +19,29 @@ class Labour(Settings, path="task.labour"):
     rises by `demand` in each tick and falls by `relief` with each delivery, but not below 0. An
     idle ant with the threshold t starts foraging with the probability s^n / (s^n + t^n) per tick,
     for a stimulus s and n = `exponent`. A forager without food next to its queen becomes idle with
-    the probability `quit` per tick. See `docs/colony.md`.
+    the probability `stop_probability` per tick. See `docs/colony.md`.
     """
 
-    rule: Annotated[LabourRule, Is("rule by which ants start and stop foraging")] = "none"
+    rule: Annotated[LabourRule, Setting("rule by which ants start and stop foraging")] = "none"
     demand: Annotated[
         float | None,
-        Is("rise of the stimulus of each nest", unit="units of stimulus per tick"),
-        Is(least=0, most=1e6, usual=1.0, only=("rule", "thresholds")),
+        Setting("rise of the stimulus of each nest", unit="units of stimulus per tick"),
+        Setting(least=0, most=1e6, usual=1.0, only=("rule", "thresholds")),
     ] = None
     relief: Annotated[
         float | None,
-        Is("fall of the stimulus with each delivery", unit="units of stimulus"),
-        Is(least=0, most=1e6, usual=10.0, only=("rule", "thresholds")),
+        Setting("fall of the stimulus with each delivery", unit="units of stimulus"),
+        Setting(least=0, most=1e6, usual=10.0, only=("rule", "thresholds")),
     ] = None
     exponent: Annotated[
         float | None,
-        Is("exponent of the response to the stimulus; larger values make it steeper"),
-        Is(least=0, most=20, usual=2.0, only=("rule", "thresholds")),
+        Setting("exponent of the response to the stimulus; larger values make it steeper"),
+        Setting(least=0, most=20, usual=2.0, only=("rule", "thresholds")),
     ] = None
-    quit: Annotated[
+    stop_probability: Annotated[
         float | None,
-        Is("probability per tick that a forager without food next to its queen becomes idle"),
-        Is(least=0, most=1, usual=0.2, only=("rule", "thresholds")),
+        Setting("probability per tick that a forager without food next to its queen becomes idle"),
+        Setting(least=0, most=1, usual=0.2, only=("rule", "thresholds")),
     ] = None
 
     @classmethod

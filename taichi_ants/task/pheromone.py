@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated, Literal, TypeVar, get_args
 
 from taichi_ants.rules.registry import BUILT_IN, Rule, own, words
-from taichi_ants.settings import Is, Settings
+from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 
 if TYPE_CHECKING:
@@ -20,7 +20,9 @@ VIEWS: tuple[str, ...] = get_args(View)
 MAX_DEPOSIT = 1_000_000
 LINEAR = -1.0  # marks linear evaporation in place of a decay factor
 
-Level = Annotated[int | None, Is(unit="ticks of linear evaporation", least=1, most=MAX_DEPOSIT)]
+Level = Annotated[
+    int | None, Setting(unit="ticks of linear evaporation", least=1, most=MAX_DEPOSIT)
+]
 
 
 @dataclass(frozen=True)
@@ -42,20 +44,21 @@ class Pheromone(Settings, path="task.pheromone"):
 
     evaporation: Annotated[
         str,
-        Is("decrease of trails per tick: by 1 (linear) or by a factor (exponential)"),
-        Is(choices=partial(words, "evaporation")),
+        Setting("decrease of trails per tick: by 1 (linear) or by a factor (exponential)"),
+        Setting(choices=partial(words, "evaporation")),
     ] = "linear"
     half_life: Annotated[
         float | None,
-        Is("time in which a trail halves", unit="ticks", above=0, usual=50.0),
-        Is(only=("evaporation", "exponential")),
+        Setting("time in which a trail halves", unit="ticks", above=0, usual=50.0),
+        Setting(only=("evaporation", "exponential")),
     ] = None
     diffusion: Annotated[
-        float, Is("share of a trail that spreads to the six neighbours per tick", least=0, most=1)
+        float,
+        Setting("share of a trail that spreads to the six neighbours per tick", least=0, most=1),
     ] = 0.0
     deposit: Annotated[
         str,
-        Is(
+        Setting(
             "level that an ant lays on a cell: the cell's level becomes level (set), grows by "
             "level (add), or rises to level minus slope per tick since the ant's load changed "
             "(fading)",
@@ -64,20 +67,20 @@ class Pheromone(Settings, path="task.pheromone"):
     ] = "set"
     level: Annotated[
         int,
-        Is("trail level of a new deposit", least=1, most=MAX_DEPOSIT),
-        Is(unit="ticks of linear evaporation", only=("deposit", "set", "add", "fading")),
+        Setting("trail level of a new deposit", least=1, most=MAX_DEPOSIT),
+        Setting(unit="ticks of linear evaporation", only=("deposit", "set", "add", "fading")),
     ] = DEPOSIT_LEVEL
     cap: Annotated[
-        Level, Is("largest level that deposits add up to", usual=1000, only=("deposit", "add"))
+        Level, Setting("largest level that deposits add up to", usual=1000, only=("deposit", "add"))
     ] = None
     slope: Annotated[
         Level,
-        Is("decrease of an ant's deposits per tick since its load changed", usual=10),
-        Is(only=("deposit", "fading")),
+        Setting("decrease of an ant's deposits per tick since its load changed", usual=10),
+        Setting(only=("deposit", "fading")),
     ] = None
     view: Annotated[
         View,
-        Is(
+        Setting(
             "lowest level that ants see as T or S: half of the highest level in view (half) or the "
             "highest itself (strongest), also counting trails under ants with food "
             "(strongest_under_carriers)"
@@ -112,7 +115,7 @@ class Pheromone(Settings, path="task.pheromone"):
     @property
     def lasting(self: Own) -> Own:
         """This pheromone without evaporation."""
-        return self.but(evaporation="none")
+        return self.replace(evaporation="none")
 
     @property
     def decay(self) -> np.float32:

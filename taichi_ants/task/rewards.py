@@ -5,29 +5,30 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from taichi_ants.settings import Is, Settings
+from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.constants import MOST_REWARD
 from taichi_ants.task.events import Event
 
 if TYPE_CHECKING:
     import numpy as np
 
-Reward = Annotated[int, Is(least=-MOST_REWARD, most=MOST_REWARD)]
+Reward = Annotated[int, Setting(least=-MOST_REWARD, most=MOST_REWARD)]
 
 
 @dataclass(frozen=True)
 class Rewards(Settings, path="task.rewards"):
     """The reward of each event, a whole number; by default, those of table 1 of the paper."""
 
-    empty: Annotated[Reward, Is("reward for a move onto a cell seen as empty (E)")] = 0
+    empty: Annotated[Reward, Setting("reward for a move onto a cell seen as empty (E)")] = 0
     failed: Annotated[
-        Reward, Is("reward for a blocked move, failed pick-up or failed delivery")
+        Reward, Setting("reward for a blocked move, failed pick-up or failed delivery")
     ] = -1
     shaping: Annotated[
-        Reward, Is("reward for a move onto a cell seen as T (trail) or S (nearer to the queen)")
+        Reward,
+        Setting("reward for a move onto a cell seen as T (trail) or S (nearer to the queen)"),
     ] = 1
-    pick_up: Annotated[Reward, Is("reward for picking up food")] = 3
-    deliver: Annotated[Reward, Is("reward for giving food to the queen")] = 10
+    pick_up: Annotated[Reward, Setting("reward for picking up food")] = 3
+    deliver: Annotated[Reward, Setting("reward for delivering food to the queen")] = 10
 
     def by_event(self) -> np.ndarray:
         """Return the rewards by `Event`, int32 (8,)."""
@@ -36,7 +37,7 @@ class Rewards(Settings, path="task.rewards"):
         rewards = np.zeros(len(Event), np.int32)
         rewards[[Event.ENTERED_EMPTY, Event.PUSHED]] = self.empty
         rewards[[Event.BLOCKED, Event.FAILED]] = self.failed
-        rewards[Event.ENTERED_LURE] = self.shaping
+        rewards[Event.ENTERED_CUE] = self.shaping
         rewards[Event.PICKED_UP], rewards[Event.DELIVERED] = self.pick_up, self.deliver
         return rewards
 

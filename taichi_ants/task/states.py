@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from taichi_ants.errors import checked_whole
-from taichi_ants.task.constants import N_STATES, SEES_GOAL, SEES_LURE
+from taichi_ants.task.constants import N_STATES, SEES_CUE, SEES_GOAL
 
 # Indexed by `carries`; letters are then indexed by code.
 TASK_NAMES: tuple[str, str] = ("foraging", "carrying")
@@ -20,7 +20,7 @@ CELL_LETTERS: tuple[str, str] = ("EOTF", "EOSQ")
 
 
 class State(NamedTuple):
-    """The percept of an ant: whether it carries food, and the codes 0 to 3 of the cells in view."""
+    """The paper's state of an ant: whether it carries food, and the codes of the cells in view."""
 
     carries: bool
     left: int
@@ -58,12 +58,12 @@ state_name = name_of_codes(3, *CELL_LETTERS)
 
 
 def _can_occur(state: State) -> bool:  # see section 1.5 of the paper
-    queens, nearer = state.view.count(SEES_GOAL), state.view.count(SEES_LURE)
+    queens, nearer = state.view.count(SEES_GOAL), state.view.count(SEES_CUE)
     if not state.carries:
         return True
     if queens:  # there is only one, and no cell is nearer to her than her neighbours
         return queens == 1 and nearer == 0
-    return not state.left == state.right == SEES_LURE
+    return not state.left == state.right == SEES_CUE
 
 
 # The 100 indices that can occur under the rules, ascending.

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, get_args
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.rules.inputs import LABOUR
 from taichi_ants.rules.registry import Parameters, Rule, own, words
-from taichi_ants.settings import Is, Named, Settings
+from taichi_ants.settings import Named, Setting, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
@@ -26,7 +26,7 @@ from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
-Ticks = Annotated[int | None, Is(unit="ticks", least=1, most=MAX_STEPS)]
+Ticks = Annotated[int | None, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 
 
 @dataclass(frozen=True)
@@ -42,17 +42,18 @@ class Traffic(Settings, path="task.traffic"):
     """
 
     swap: Annotated[
-        bool, Is("allow carriers (ants with food) to change places with foragers (ants without)")
-    ] = False
-    follow: Annotated[bool, Is("allow ants to enter a cell whose ant leaves in the same tick")] = (
-        False
-    )
-    carriers_first: Annotated[
-        bool, Is("let carriers win cells that foragers want too; requires swap or follow")
-    ] = False
-    grant: Annotated[
         bool,
-        Is(
+        Setting("allow carriers (ants with food) to change places with foragers (ants without)"),
+    ] = False
+    follow: Annotated[
+        bool, Setting("allow ants to enter a cell whose ant leaves in the same tick")
+    ] = False
+    carriers_first: Annotated[
+        bool, Setting("let carriers win cells that foragers want too; requires swap or follow")
+    ] = False
+    reward_pushed: Annotated[
+        bool,
+        Setting(
             "reward a pushed ant as for its own move if it is pushed onto the cell that it wanted",
             only=("swap", True),
         ),
@@ -72,7 +73,7 @@ class Traffic(Settings, path="task.traffic"):
         return {
             "blocking": cls(),
             "right_of_way": cls(swap=True),
-            "following": cls(swap=True, follow=True, carriers_first=True, grant=True),
+            "following": cls(swap=True, follow=True, carriers_first=True, reward_pushed=True),
         }
 
     @property
@@ -89,10 +90,16 @@ class Life(Settings, path="task.life"):
     0, food grows back in the same tick.
     """
 
-    births: Annotated[bool, Is("turn each food item that the queen receives into an ant")] = False
-    lifespan: Annotated[Ticks, Is("age at which an ant dies")] = None
-    regrowth: Annotated[Ticks, Is("time until taken food grows back in its cell", least=0)] = None
-    wander: Annotated[Ticks, Is("interval at which each pile of food moves by one cell")] = None
+    births: Annotated[bool, Setting("turn each food item that the queen receives into an ant")] = (
+        False
+    )
+    lifespan: Annotated[Ticks, Setting("age at which an ant dies")] = None
+    regrowth: Annotated[Ticks, Setting("time until taken food grows back in its cell", least=0)] = (
+        None
+    )
+    pile_move_interval: Annotated[
+        Ticks, Setting("interval at which each pile of food moves by one cell")
+    ] = None
 
     @property
     def changes(self) -> bool:
@@ -111,60 +118,69 @@ class Task(Settings, path="task"):
     as numbers.
     """
 
-    observation: Annotated[str, Is("observation of an ant", choices=observations.names)] = "paper"
-    rewards: Annotated[Rewards, Is("reward of each event")] = field(default_factory=Rewards)
-    pheromone: Annotated[Pheromone, Is("rules by which trails are laid, evaporate and spread")] = (
-        field(default_factory=Pheromone)
+    observation: Annotated[str, Setting("observation of an ant", choices=observations.names)] = (
+        "paper"
     )
-    fields: Annotated[Named[Field], Is("further pheromones, by name")] = field(
+    rewards: Annotated[Rewards, Setting("reward of each event")] = field(default_factory=Rewards)
+    pheromone: Annotated[
+        Pheromone, Setting("rules by which trails are laid, evaporate and spread")
+    ] = field(default_factory=Pheromone)
+    fields: Annotated[Named[Field], Setting("further pheromones, by name")] = field(
         default_factory=Named
     )
     outbound_cue: Annotated[
-        str, Is("pheromone that ants without food see as T: trail, or the name of a field")
+        str, Setting("pheromone that ants without food see as T: trail, or the name of a field")
     ] = TRAIL
     homing_cue: Annotated[
         str,
-        Is("what ants with food see as S: compass (nearer cells), trail, or the name of a field"),
+        Setting(
+            "what ants with food see as S: compass (nearer cells), trail, or the name of a field"
+        ),
     ] = COMPASS
-    traffic: Annotated[Traffic, Is("rules for entering a cell with an ant on it")] = field(
+    traffic: Annotated[Traffic, Setting("rules for entering a cell with an ant on it")] = field(
         default_factory=Traffic
     )
-    turns_at_queen: Annotated[bool, Is("turn ants around after a delivery")] = False
+    turns_at_queen: Annotated[bool, Setting("turn ants around after a delivery")] = False
     delivery: Annotated[
         Delivery,
-        Is(
+        Setting(
             "end of an ant's episode at a delivery: as in Gymnasium, updates bootstrap only if it "
             "truncates"
         ),
     ] = "terminates"
-    evaporation_in_training: Annotated[bool, Is("evaporate trails while ants learn")] = False
+    evaporation_in_training: Annotated[bool, Setting("evaporate trails while ants learn")] = False
     evaporation_in_evaluation: Annotated[
-        bool, Is("evaporate trails while ants follow a fixed policy")
+        bool, Setting("evaporate trails while ants follow a fixed policy")
     ] = True
-    life: Annotated[Life, Is("changes of ants and food in colonies")] = field(default_factory=Life)
-    choice: Annotated[Choice, Is("rule by which ants choose actions")] = field(
+    life: Annotated[Life, Setting("changes of ants and food in colonies")] = field(
+        default_factory=Life
+    )
+    choice: Annotated[Choice, Setting("rule by which ants choose actions")] = field(
         default_factory=Choice
     )
-    noise: Annotated[Noise, Is("failures of actions and observations")] = field(
+    noise: Annotated[Noise, Setting("failures of actions and observations")] = field(
         default_factory=Noise
     )
     foods: Annotated[
-        Named[Food], Is("kinds of food, in the order of their numbers in worlds; colonies only")
+        Named[Food],
+        Setting("kinds of food, in the order of their numbers in worlds; colonies only"),
     ] = field(default_factory=Named)
     castes: Annotated[
-        Named[Caste], Is("castes of ants, in the order of their numbers; colonies only")
+        Named[Caste], Setting("castes of ants, in the order of their numbers; colonies only")
     ] = field(default_factory=Named)
-    labour: Annotated[Labour, Is("rule by which ants start and stop foraging")] = field(
+    labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = field(
         default_factory=Labour
     )
     reward: Annotated[
         str,
-        Is("rule of rewards: by_event (task.rewards), or the name of your rule; colonies only"),
-        Is(choices=partial(words, "reward")),
+        Setting(
+            "rule of rewards: by_event (task.rewards), or the name of your rule; colonies only"
+        ),
+        Setting(choices=partial(words, "reward")),
     ] = "by_event"
-    rules: Annotated[Named[Parameters], Is("parameters of the rules that you wrote, by name")] = (
-        field(default_factory=Named)
-    )
+    rules: Annotated[
+        Named[Parameters], Setting("parameters of the rules that you wrote, by name")
+    ] = field(default_factory=Named)
 
     def __post_init__(self) -> None:
         self.check()
@@ -184,10 +200,10 @@ class Task(Settings, path="task"):
                 f"`task.life.regrowth` is {self.life.regrowth}; with `task.foods`, set the "
                 "regrowth of each kind instead."
             )
-        if self.life.wander and (len(self.foods) > 1 or self.has_loads):
+        if self.life.pile_move_interval and (len(self.foods) > 1 or self.has_loads):
             raise AntsError(
-                f"`task.life.wander` is {self.life.wander}; only food of one kind with one load in "
-                "a cell can wander, so leave it out."
+                f"`task.life.pile_move_interval` is {self.life.pile_move_interval}; only "
+                "food of one kind with one load in a cell can wander, so leave it out."
             )
 
     @property
@@ -251,7 +267,7 @@ class Task(Settings, path="task"):
     def food_changes(self) -> bool:
         """Whether food grows back or wanders."""
         grows = any(food.regrowth is not None for food in self.foods.values())
-        return self.life.regrowth is not None or self.life.wander is not None or grows
+        return self.life.regrowth is not None or self.life.pile_move_interval is not None or grows
 
     @property
     def ants_change(self) -> bool:
@@ -298,7 +314,7 @@ class Task(Settings, path="task"):
                     f"is {self.choice.rule!r}."
                 )
         pheromones = (TRAIL, *self.fields)
-        for name in caste.laid(pheromones):
+        for name in caste.pheromones_laid(pheromones):
             if name not in pheromones:
                 raise AntsError(
                     f"{path}.lays` is {shown(caste.lays)}; it must be all, none, or names of "
@@ -322,7 +338,7 @@ class Task(Settings, path="task"):
     def with_policies(self, policy: str) -> Task:
         """Return the task with another policy for the castes that have one."""
         follow = [name for name, caste in self.castes.items() if caste.policy is not None]
-        return self.but(castes={name: {"policy": policy} for name in follow})
+        return self.replace(castes={name: {"policy": policy} for name in follow})
 
     @property
     def all_cues(self) -> tuple[tuple[int, int], ...]:
@@ -368,8 +384,8 @@ class Task(Settings, path="task"):
             if cue not in cues:
                 raise AntsError(
                     f"`task.{setting}` is {shown(cue)}; it must be one of {', '.join(cues)}, or "
-                    "the name of a field that you add to `task.fields` (for no cue, one with laid "
-                    "= 'never')."
+                    "the name of a field that you add to `task.fields` (for no cue, one with "
+                    "deposited_when = 'never')."
                 )
         for name in self.sees.reads:
             if name not in pheromones:
@@ -415,7 +431,7 @@ class Task(Settings, path="task"):
             "births": int(life.births),
             "lifespan": life.lifespan or off,
             "regrowth": off if life.regrowth is None else life.regrowth,
-            "wander": life.wander or off,
+            "pile_move_interval": life.pile_move_interval or off,
             **self.noise.numbers,
         }
 
@@ -495,7 +511,7 @@ def queueing() -> Task:
     If an ant with food is on the strongest trail in view, no weaker trail is seen as T.
     """
     view = {"view": "strongest_under_carriers"}
-    return foraging().but(
+    return foraging().replace(
         observation="queues", pheromone=view, traffic="following", turns_at_queen=True
     )
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid, normal_form
-from taichi_ants.settings import Is, checked
+from taichi_ants.settings import Setting, checked
 from taichi_ants.worlds.world import World
 
 ROOM_RADIUS = 5  # radius of the rooms around queen and food, with space for 90 ants and the queen
@@ -30,16 +30,16 @@ _BULGE = 3  # preferred number of steps of the short branch to the side
 
 
 Short = Annotated[
-    int, Is("length of the short branch", unit="steps", least=MIN_STEPS, most=MAX_STEPS)
+    int, Setting("length of the short branch", unit="steps", least=MIN_STEPS, most=MAX_STEPS)
 ]
 Long = Annotated[
-    int, Is("length of the long branch", unit="steps", least=MIN_STEPS, most=2 * MAX_STEPS)
+    int, Setting("length of the long branch", unit="steps", least=MIN_STEPS, most=2 * MAX_STEPS)
 ]
-Mirrored = Annotated[bool, Is("put the short branch to the left of ants that leave the nest")]
+Mirrored = Annotated[bool, Setting("put the short branch to the left of ants that leave the nest")]
 Aside = Annotated[
     int,
-    Is("shift of the food to the side of the long branch", unit="steps"),
-    Is(least=0, most=MAX_STEPS - MIN_STEPS),
+    Setting("shift of the food to the side of the long branch", unit="steps"),
+    Setting(least=0, most=MAX_STEPS - MIN_STEPS),
 ]
 
 

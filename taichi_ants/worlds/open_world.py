@@ -10,7 +10,7 @@ import numpy as np
 from taichi_ants.errors import AntsError, whole
 from taichi_ants.grid.hexgrid import AxialGrid, axial, cube
 from taichi_ants.grid.randomness import Stream, choose
-from taichi_ants.settings import Is, checked
+from taichi_ants.settings import Setting, checked
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
@@ -26,9 +26,11 @@ _STREAM_ROCKS = int.from_bytes(b"rocks", "big")
 _STREAM_FOOD = int.from_bytes(b"food", "big")
 _BATCH_CELLS = 1 << 22  # the most cells under hexagons that are placed at once, to bound memory
 
-Ranges = Annotated[Sequence[int] | None, Is("size of the world along x, y and z", unit="cells")]
-RockShare = Annotated[float, Is("share of the cells under rocks", least=0, most=MAX_SHARE)]
-Piles = Annotated[int, Is("number of piles of food", most=3)]
+Ranges = Annotated[
+    Sequence[int] | None, Setting("size of the world along x, y and z", unit="cells")
+]
+RockShare = Annotated[float, Setting("share of the cells under rocks", least=0, most=MAX_SHARE)]
+Piles = Annotated[int, Setting("number of piles of food", most=3)]
 
 
 @checked
@@ -37,9 +39,9 @@ def open_world(
     ranges: Ranges = None,
     rock_share: RockShare = 0.15,
     food_share: Annotated[
-        float, Is("single food items as a share of the cells", least=0, most=MAX_SHARE)
+        float, Setting("single food items as a share of the cells", least=0, most=MAX_SHARE)
     ] = 0.03,
-    piles: Annotated[Piles, Is(least=0)] = 3,
+    piles: Annotated[Piles, Setting(least=0)] = 3,
 ) -> World:
     """Return a random world with rocks, single food items and up to three piles of food.
 
@@ -77,7 +79,7 @@ def far_piles(
     seed: int = 0,
     ranges: Ranges = (30, 30, 30),
     rock_share: RockShare = 0.15,
-    piles: Annotated[Piles, Is(least=1)] = 3,
+    piles: Annotated[Piles, Setting(least=1)] = 3,
 ) -> World:
     """Return an open world in which all food lies in piles far from the queen."""
     return open_world(seed, ranges, rock_share, 0.0, piles)

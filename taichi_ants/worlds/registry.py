@@ -9,7 +9,7 @@ from typing import Any
 
 from taichi_ants.errors import AntsError, expect, shown, whole
 from taichi_ants.files import inputs
-from taichi_ants.settings import Setting, declared, not_a_setting
+from taichi_ants.settings import DeclaredSetting, declared, not_a_setting
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world
 from taichi_ants.worlds.text_map import load_map
@@ -77,7 +77,7 @@ def is_drawn(name_or_path: str | os.PathLike[str]) -> bool:
     return builder is not None and "seed" in inspect.signature(builder).parameters
 
 
-def settings_of(name: str) -> tuple[Setting, ...]:
+def settings_of(name: str) -> tuple[DeclaredSetting, ...]:
     """Return the declared settings of a registered world."""
     return declared(_BUILDERS[name])
 

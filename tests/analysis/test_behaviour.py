@@ -20,7 +20,7 @@ from taichi_ants.analysis.behaviour import (
 from taichi_ants.engines.runs.traces import trace_policies
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES_LURE
+from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES_CUE
 from taichi_ants.task.states import state_from_index
 from taichi_ants.worlds import paper
 
@@ -41,13 +41,13 @@ def policy(choose, base=policies.trail_follower):
 
 def walk_on(state):
     """Without food past all food, along the trail, and round at its ends."""
-    if not state.carries and SEES_LURE not in state.view:
+    if not state.carries and SEES_CUE not in state.view:
         return LEFT
 
 
 def keep(state):
     """With food nearer to the queen where that can be, and round to the left where it cannot."""
-    if state.carries and SEES_LURE not in state.view:
+    if state.carries and SEES_CUE not in state.view:
         return LEFT
 
 
@@ -141,7 +141,7 @@ def made(n=16, name="foraging E T E", every=4, start=0, delivered=False):
     return SimpleNamespace(
         episodes=np.full(n, 5),
         steps=numbers,
-        percepts=np.full(n, parse_state(name)),
+        paper_states=np.full(n, parse_state(name)),
         actions=np.where((numbers - start) % every == 0, FORWARD, LEFT),
         rewards=np.full(n, -7),
         delivered=ends & delivered,
@@ -188,7 +188,7 @@ def test_the_borders(trace, expected):
 
 def test_food_in_only_a_part_of_the_second_half_is_another_thing():
     early, late = made(), made(name=SEEN)
-    late.percepts[:12] = early.percepts[:12]
+    late.paper_states[:12] = early.paper_states[:12]
     assert classify(late, 16)[0] == [OTHER]
 
 

@@ -434,7 +434,7 @@ LIFE = [
         5,
     ),
     *("--task.life.births", "--task.life.lifespan", 90, "--task.life.regrowth", 3),
-    *("--task.life.wander", 20, "--task.pheromone.evaporation", "exponential"),
+    *("--task.life.pile_move_interval", 20, "--task.pheromone.evaporation", "exponential"),
     *("--task.pheromone.half-life", 30, "--task.pheromone.diffusion", 0.1),
     *("--task.pheromone.deposit", "add", "--task.pheromone.level", 90),
     *("--task.pheromone.cap", 170, "--training.learner", "q_learning"),
@@ -468,7 +468,7 @@ def test_a_colony_as_the_library_makes_it(capsys, tmp_path, monkeypatch):
     pheromone = Pheromone(
         "exponential", half_life=30.0, diffusion=0.1, deposit="add", level=90, cap=170
     )
-    life = Life(births=True, lifespan=90, regrowth=3, wander=20)
+    life = Life(births=True, lifespan=90, regrowth=3, pile_move_interval=20)
     training = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0, 0.1)
     world = worlds.open_world(5, (20, 20, 20))
     colony = Colony(world, task(pheromone, life), training, 5, 40, 60)

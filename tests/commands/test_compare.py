@@ -334,7 +334,7 @@ def test_what_is_prepared_beside_can_be_done(draws):
     """Nobody is told if it fails there: then all is ready later."""
     settings = commands.parse_arguments(["--seeds", "1"])
     point = commands.build_study(settings).points[0]
-    results.rehearse(point, None, {"threads": None, "arch": None}, draws)
+    results.warm_up(point, None, {"threads": None, "arch": None}, draws)
 
 
 def test_who_asks_for_one_thread_gets_one_process(monkeypatch, tmp_path):

@@ -146,7 +146,7 @@ from taichi_ants.viewer import record_episode
 
 point = compare.build_study(compare.parse_arguments(["--seeds", "1"])).points[0]
 episode = played(point, np.zeros((point.task.n_states, N_ACTIONS), np.float32), 0)
-results.rehearse(point, None, {"threads": 1, "arch": None}, False)
+results.warm_up(point, None, {"threads": 1, "arch": None}, False)
 
 from taichi.lang.kernel_impl import Kernel
 materialize, late = Kernel.materialize, []

@@ -438,7 +438,7 @@ def test_a_sweep_begins_with_a_preset_of_the_task(sweep):
     )
     changes = {"rewards": {"deliver": 70}}
     found = [point.task for point in read_sweep(Path("a.toml")).study.points]
-    assert found == [paper().but(**changes), foraging().but(**changes)]
+    assert found == [paper().replace(**changes), foraging().replace(**changes)]
 
 
 FOLLOWING = """

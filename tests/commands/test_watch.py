@@ -18,7 +18,7 @@ from taichi_ants import AntsError, save_policy
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.live import server
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.server import Room
+from taichi_ants.live.server import SessionServer
 from taichi_ants.live.session import Session
 
 
@@ -81,14 +81,14 @@ def test_the_first_session_delivers_and_runs(
 ) -> None:
     rooms = []
 
-    class Recorded(Room):
+    class Recorded(SessionServer):
         def __init__(self, *given: object, **options: object) -> None:
             rooms.append(super().__init__(*given, **options) or self)  # type: ignore[arg-type]
 
         def run(self, *given: object) -> None:
             """Do not serve."""
 
-    monkeypatch.setattr(server, "Room", Recorded)
+    monkeypatch.setattr(server, "SessionServer", Recorded)
     assert call("watch", [], capsys)[0] == 0
     (room,) = rooms
     colony = room.session.colony
@@ -137,11 +137,11 @@ def test_without_the_library_it_says_what_to_install(monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(sys.modules, "websockets", None)
     session = Session(Choices({}).setup(load("watch").START))
     with pytest.raises(AntsError, match=r'pip install -e "\.\[watch\]" in your clone\.$'):
-        Room(session, Choices({}))
+        SessionServer(session, Choices({}))
 
 
 def test_a_port_that_is_taken_is_named() -> None:
     session = Session(Choices({}).setup(load("watch").START))
-    room = Room(session, Choices({}))
+    room = SessionServer(session, Choices({}))
     with pytest.raises(AntsError, match=f"port {room.port} .* choose another --port"):
-        Room(session, Choices({}), room.port)
+        SessionServer(session, Choices({}), room.port)

@@ -67,6 +67,6 @@ def test_the_row_of_ants_without_action_values_is_played_as_the_guide_says(tmp_p
     names = {"kind": "colony", "measures": ["deliveries"], "task": task}
     of_colony = {"episodes": 0, "ticks": 200, "rollouts": 2, "seeds": [5]}
     wanted = row_of({**names, **of_colony, "vary": {"ants": [9]}}, tmp_path)
-    rules = Task().but(choice={"rule": "deneubourg", "k": 5.0})
+    rules = Task().replace(choice={"rule": "deneubourg", "k": 5.0})
     colony = Colony(worlds.paper(), rules, None, 5 + 2**32, ants=9, sharing="frozen")
     assert colony.run(2, 200).deliveries.mean() * 1000 / 200 == wanted["deliveries"]

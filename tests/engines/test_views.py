@@ -56,7 +56,7 @@ def test_trails_and_distances_are_seen():
     trace = rollout(paper(), np.zeros((128, 5)), max_steps=200, task=Task("trails"))
     assert 5 < len(np.unique(trace.states)) <= 128
     nearer = (trace.states >> 1 & 1) + (trace.states >> 3 & 1) + (trace.states >> 5 & 1)
-    assert set(nearer[trace.percepts < 64].tolist()) == {0, 1, 2}  # without food too
+    assert set(nearer[trace.paper_states < 64].tolist()) == {0, 1, 2}  # without food too
 
 
 @pytest.mark.parametrize(("levels", "codes"), [((10, 30, 20), (3, 4, 4)), ((9, 30, 19), (2, 4, 3))])
@@ -76,7 +76,7 @@ def own_trail(view):
 
 
 def lesser_trail(view):
-    index = 2 * view.percept
+    index = 2 * view.paper_state
     if view.strongest > 20 and view.levels[1] < view.strongest:
         index += 1
     return index
@@ -102,11 +102,11 @@ def test_a_lambda_is_refused_at_once():
 
 
 def beyond_the_table(view):
-    return view.percept + view.carries
+    return view.paper_state + view.carries
 
 
 def below_the_table(view):
-    return view.percept - 1
+    return view.paper_state - 1
 
 
 def of_what_there_is_not(view):
@@ -126,7 +126,7 @@ def of_a_vector(view):
 
 
 def of_what_overflows(view):
-    return (view.percept * 1_000_000_000) % 128
+    return (view.paper_state * 1_000_000_000) % 128
 
 
 def of_the_end(view):
@@ -151,7 +151,10 @@ def with_a_return_in_each_branch(view):
     [
         (beyond_the_table, "encode fails (it returns 128, which must lie between 0 and 127"),
         (below_the_table, "encode fails (it returns -1, which must lie between 0 and 127"),
-        (of_what_there_is_not, "a view has no `smell`; choose one of carries, percept, codes, "),
+        (
+            of_what_there_is_not,
+            "a view has no `smell`; choose one of carries, paper_state, codes, ",
+        ),
         (of_a_cell_too_far, "there is no entry 4"),
         (of_the_end, "there is no entry -1"),
         (of_a_division_by_zero, "divide by zero"),
@@ -197,7 +200,7 @@ def of_home(view):
 def test_a_field_is_read_by_its_name(diffusion):
     """After each tick, the states are those that the levels of the snapshot give."""
     observations.register(Observation("homely", 16, of_home, reads=("home",)))
-    home = Field(laid="without_food", deposit="fading", diffusion=diffusion)
+    home = Field(deposited_when="without_food", deposit="fading", diffusion=diffusion)
     rules = {"fields": {"other": Field(), "home": home}, "evaporation_in_training": True}
     colony = Colony(random_world(5, 7), Task("homely", **rules), CONFIG, ants=6)
     colony.begin_episode()
@@ -226,8 +229,10 @@ def test_fields_to_read_have_names_of_their_own(reads):
 def test_a_field_cannot_have_the_name_of_another_part_of_a_view():
     with pytest.raises(AntsError, match=r"'level', but `own_level` of a view has another meaning;"):
         observations.register(Observation("homely", 16, of_home, reads=("level",)))
-    with pytest.raises(AntsError, match=r"'strangers'; it must contain names of fields, each once"):
-        observations.register(Observation("homely", 16, of_home, reads=("strangers",)))
+    with pytest.raises(
+        AntsError, match=r"'other_nest_ants'; it must contain names of fields, each once"
+    ):
+        observations.register(Observation("homely", 16, of_home, reads=("other_nest_ants",)))
 
 
 def test_a_field_that_the_task_lacks_cannot_be_read():

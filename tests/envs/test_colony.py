@@ -20,7 +20,7 @@ from taichi_ants.task.events import Event
 from taichi_ants.worlds import World, paper
 
 N_WORLDS = 3
-SUCCESSES = (Event.ENTERED_EMPTY, Event.ENTERED_LURE, Event.PICKED_UP, Event.DELIVERED)
+SUCCESSES = (Event.ENTERED_EMPTY, Event.ENTERED_CUE, Event.PICKED_UP, Event.DELIVERED)
 
 
 def several(drawn: RandomColony) -> ColonyWorlds:

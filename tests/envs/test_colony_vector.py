@@ -236,7 +236,7 @@ def test_what_users_register_and_wrap():
     }
     assert infos[0]["final_info"]["event"] in (
         Event.ENTERED_EMPTY,
-        Event.ENTERED_LURE,
+        Event.ENTERED_CUE,
         Event.BLOCKED,
         Event.FAILED,
     )
@@ -340,7 +340,7 @@ def test_worlds_with_several_nests_and_kinds_of_food():
     world = worlds.World(
         (8, 8, 8), queen=[(0, 7, 7), (7, 0, 0)], foods=[((3, 0, 0), 0), ((0, 3, 0), 1)]
     )
-    env = ants_of(1, task=GOES_ON.but(foods=kinds), world=world, max_steps=3000, start="spread")
+    env = ants_of(1, task=GOES_ON.replace(foods=kinds), world=world, max_steps=3000, start="spread")
     env.reset(seed=1)
     made = env.rollout("trail_follower", 3000, epsilon=0.1)
     paid = made.rewards[made.events == Event.PICKED_UP], made.rewards[made.events == 5]

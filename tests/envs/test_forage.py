@@ -204,7 +204,7 @@ def test_infos_have_the_same_numbers_after_each_reset_and_step():
         (Event.PICKED_UP, Reason.NONE),
         (Event.FAILED, Reason.CARRIES_FOOD_ALREADY),
         (Event.FAILED, Reason.NO_QUEEN_IN_VIEW),
-        (Event.ENTERED_LURE, Reason.NONE),
+        (Event.ENTERED_CUE, Reason.NONE),
         (Event.BLOCKED, Reason.QUEEN_AHEAD),
         (Event.DELIVERED, Reason.NONE),
     ]

@@ -47,7 +47,7 @@ def test_vector_environments_know_who_has_ended(make: Any, rolls: bool, mode: st
 
 
 def test_deliveries_of_interrupted_steps_count() -> None:
-    rules = foraging().but(life={"regrowth": 0}, delivery="truncates")
+    rules = foraging().replace(life={"regrowth": 0}, delivery="truncates")
     made = {"task": rules, "ants": 16, "max_steps": 500}
     ours, theirs = (HexColonyVectorEnv(16, **made) for _ in range(2))
     for env in (ours, theirs):

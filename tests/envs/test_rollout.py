@@ -24,12 +24,12 @@ MEADOWS = [worlds.open_world(seed, (8, 8, 8)) for seed in range(3)]
 TASKS: dict[str, tuple[Task, ObservationFormat]] = {
     "paper": (Task(), "index"),
     "adding": (Task(pheromone=Pheromone(deposit="add"), delivery="truncates"), "cells"),
-    "fading, slips": (task.foraging().but(noise=Noise(slip=0.2)), "one_hot"),
+    "fading, slips": (task.foraging().replace(noise=Noise(slip=0.2)), "one_hot"),
     "misread": (Task(observation="trail_levels", noise=Noise(0.1, 0.2)), "index"),
 }
 COLONY_TASKS = {
     "foraging": task.foraging(),
-    "truncates": task.foraging().but(delivery="truncates", life=Life(regrowth=0)),
+    "truncates": task.foraging().replace(delivery="truncates", life=Life(regrowth=0)),
     "noise": Task(delivery="truncates", noise=Noise(0.2, 0.1)),
 }
 

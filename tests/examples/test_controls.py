@@ -81,7 +81,7 @@ def test_a_home_trail_that_nobody_follows_does_not_matter(script):
     found = script("models/home_trail")
     models = {
         "compass": found["COMPASS"],
-        "laid": found["HOME_TRAIL"].but(homing_cue="compass"),
+        "deposited_when": found["HOME_TRAIL"].replace(homing_cue="compass"),
         "followed": found["HOME_TRAIL"],
     }
     found.update(MODELS=models, EPISODES=2, TICKS=200)
@@ -481,7 +481,7 @@ def test_names_of_equal_branches_do_not_matter():
     def counts(bridge):
         follow = TrainingConfig("q_learning", 1.0, 1.0, epsilon=0.05, epsilon_decay=1.0)
         options = {"sharing": "frozen", "q_values": trail_follower("ants"), "schedule": "by_world"}
-        rules = task.foraging().but(life={"regrowth": 0})
+        rules = task.foraging().replace(life={"regrowth": 0})
         colony = Colony(double_bridge(**bridge), rules, follow, [0, 1], 16, **options)
         return crossings(colony, bridge, 400)
 

@@ -26,8 +26,10 @@ MAY_BE_ZERO = ("discount", "epsilon", "min_epsilon", "min_learning_rate")
 def test_defaults():
     config = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
     assert (config.min_epsilon, config.planning_steps, config.hyperparameters) == (0.01, 0, ())
-    assert learners.settle(config) == config
-    config = learners.settle(TrainingConfig("sarsa_lambda", 0.1, 0.9, 0.3, 0.99, trace_length=4))
+    assert learners.with_hyperparameters(config) == config
+    config = learners.with_hyperparameters(
+        TrainingConfig("sarsa_lambda", 0.1, 0.9, 0.3, 0.99, trace_length=4)
+    )
     assert config.hyperparameters == (("trace_decay", 0.9), ("trace_length", 4))
 
 
@@ -106,7 +108,7 @@ def test_other_mistakes(changes, says):
 def test_hyperparameters_are_those_of_the_learner(learner, name, value, says):
     config = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99, hyperparameters={name: value})
     with pytest.raises(AntsError) as caught:
-        learners.settle(config)
+        learners.with_hyperparameters(config)
     assert says in str(caught.value)
 
 

@@ -22,9 +22,9 @@ from taichi_ants import (
 from taichi_ants.engines import plugin_check
 from taichi_ants.learners import (
     Hyperparameters,
-    Is,
     Learner,
     Memory,
+    Setting,
     register,
     registry,
     td_learner,
@@ -324,7 +324,7 @@ def test_td_errors_that_are_refused_at_once(td_error, says):
 
 @dataclass(frozen=True)
 class Momentum(Hyperparameters):
-    momentum: Annotated[float, Is("share of the last error", least=0, most=1)] = 0.5
+    momentum: Annotated[float, Setting("share of the last error", least=0, most=1)] = 0.5
 
 
 @ti.func
@@ -420,7 +420,7 @@ def test_memories_that_are_not_ones_own_are_refused(function, says):
 
 @dataclass(frozen=True)
 class Clashing(Hyperparameters):
-    discount: Annotated[float, Is(least=0, most=1)] = 0.5
+    discount: Annotated[float, Setting(least=0, most=1)] = 0.5
 
 
 @dataclass(frozen=True)
@@ -430,7 +430,7 @@ class OfText(Hyperparameters):
 
 @dataclass(frozen=True)
 class OutOfRange(Hyperparameters):
-    depth: Annotated[int, Is(least=1, most=2)] = 3
+    depth: Annotated[int, Setting(least=1, most=2)] = 3
 
 
 FAILS = "learner 'mine' cannot be used: "

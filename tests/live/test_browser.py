@@ -18,7 +18,7 @@ from taichi_ants.commands import watch
 from taichi_ants.learners.expected_sarsa import EXPECTED_SARSA
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.server import Room
+from taichi_ants.live.server import SessionServer
 from taichi_ants.live.session import Log, Session
 from taichi_ants.live.setup import MOST_ANTS, Setup
 from taichi_ants.task import Labour, foraging
@@ -264,7 +264,9 @@ def test_several_nests_are_shown_and_the_nearest_queen_moves(browser, shared):
 
 
 def test_a_field_is_shown_and_drawn(browser):
-    task = foraging().but(fields={"home": {"laid": "without_food", "level": 90}}, homing_cue="home")
+    task = foraging().replace(
+        fields={"home": {"deposited_when": "without_food", "level": 90}}, homing_cue="home"
+    )
     learner = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9)
     setup = Setup("paper", task, learner, 12, pheromone="home")
     with running(Choices({}), setup=setup) as room:
@@ -293,10 +295,10 @@ def test_a_field_is_shown_and_drawn(browser):
 
 
 def test_castes_and_kinds_of_food_are_shown_and_drawn(browser):
-    task = foraging().but(
+    task = foraging().replace(
         castes={"nurse": {"threshold": 5.0}, "scout": {"share": 0.5}},
         foods={"seed": {}, "sap": {"loads": 3}},
-        labour=Labour("thresholds", demand=1.0, relief=1, quit=0.1),
+        labour=Labour("thresholds", demand=1.0, relief=1, stop_probability=0.1),
     )
     learner = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.9)
     with running(Choices({}), setup=Setup("paper", task, learner, 12)) as room:
@@ -866,7 +868,7 @@ def test_a_page_keeps_what_it_has_when_the_server_is_killed(browser, shared, tmp
         assert one == other, moment
     assert kept.read("document.querySelector('.controls, .palette, #lost')") is None
     kept.close()
-    other = Room(Session(shared.choices.setup(CHOSEN)), shared.choices, port)
+    other = SessionServer(Session(shared.choices.setup(CHOSEN)), shared.choices, port)
     other.token = token
     thread = threading.Thread(target=other.run, daemon=True)
     thread.start()

@@ -156,7 +156,7 @@ def test_a_wall_across_a_road_of_ants_has_no_hole(what):
     cells = np.sort(before["cell"])[::2]
     interventions.put(cells, what)
     assert (colony.snapshot().ground[cells] == what).all()
-    for name in before.keys() - {"cell", "state", "percept"}:
+    for name in before.keys() - {"cell", "state", "paper_state"}:
         assert np.array_equal(colony.arrays[name], before[name]), name
     moved = before["cell"] != colony.arrays["cell"]
     assert np.array_equal(moved, np.isin(before["cell"], cells))

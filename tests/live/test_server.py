@@ -809,7 +809,7 @@ def test_frames_show_the_phases_of_episodes_in_turn(piece, length, steps):
     room = SimpleNamespace(
         _piece=piece, session=SimpleNamespace(setup=SimpleNamespace(ticks_per_episode=length))
     )
-    assert server.Room._leap(room) == steps
+    assert server.SessionServer._leap(room) == steps
 
 
 def test_pages_are_told_that_kernels_are_prepared(room):

@@ -45,11 +45,12 @@ LEARNS = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 0.9, learning_rate_decay=0.8)
 LIVELY = Task(
     pheromone=Pheromone("exponential", half_life=20, diffusion=0.2, deposit="add"),
     evaporation_in_training=True,
-    life=Life(births=True, lifespan=60, regrowth=2, wander=9),
+    life=Life(births=True, lifespan=60, regrowth=2, pile_move_interval=9),
 )
 SMALL = {"ranges": (9, 8, 7)}
-HOMING = tasks.foraging().but(
-    fields={"home": {"laid": "without_food", "evaporation": "exponential"}}, homing_cue="home"
+HOMING = tasks.foraging().replace(
+    fields={"home": {"deposited_when": "without_food", "evaporation": "exponential"}},
+    homing_cue="home",
 )
 TWO_NESTS = text_map.to_text(
     World((7, 7, 7), [(0, 6, 0), (6, 0, 3)], [(0, 0, 5), (1, 0, 5), (5, 5, 0)], [(0, 3, 0)])
@@ -605,16 +606,16 @@ def test_a_policy_of_several_nests_is_exported_if_they_share_it(tmp_path):
     assert np.array_equal(load_policy(tmp_path / "policy.npz").q_values, table)
 
 
-GROUPS = tasks.foraging().but(
+GROUPS = tasks.foraging().replace(
     castes={"nurse": {"threshold": 5.0}, "scout": {"share": 0.3, "epsilon": 0.4}, "guide": {}},
     foods={"seed": {"deliver": 90, "regrowth": 5}, "sap": {"loads": 3}},
-    labour=tasks.Labour("thresholds", demand=0.05, relief=1, quit=0.5),
+    labour=tasks.Labour("thresholds", demand=0.05, relief=1, stop_probability=0.5),
 )
 OF_GROUPS = Setup(
     text_map.to_text(World((7, 7, 7), (0, 6, 0), [(0, 0, 5), (1, 0, 5), (5, 5, 0)])).replace(
         "F", "G", 1
     ),
-    *(GROUPS.but(castes={"guide": {"policy": "trail_follower"}}), LEARNS),
+    *(GROUPS.replace(castes={"guide": {"policy": "trail_follower"}}), LEARNS),
     ants=20,
 )
 
@@ -623,7 +624,7 @@ def test_what_the_task_or_the_page_lacks_is_refused_with_what_to_do():
     with pytest.raises(AntsError, match=r"2 kinds of food, but the task 1; add the others to"):
         Session(replace(SETUPS["nests"], world="Q   G   F\n"))
     with pytest.raises(AntsError, match=r"castes.guide.policy` is '/etc/passwd', but the live pag"):
-        replace(OF_GROUPS, task=GROUPS.but(castes={"guide": {"policy": "/etc/passwd"}}))
+        replace(OF_GROUPS, task=GROUPS.replace(castes={"guide": {"policy": "/etc/passwd"}}))
     policy = Policy(np.zeros((GROUPS.n_states, 5), np.float32), "ants", {"task": GROUPS.as_dict()})
     with pytest.raises(AntsError, match=r"`task.foods` has seed, sap, which the form of the live"):
         Choices({"mine": policy})

@@ -88,7 +88,7 @@ def test_measures_equal_the_reference(schedule, threads, changes):
 
 
 def test_births_that_wait_equal_the_reference():
-    task = foraging().but(life={"births": True, "regrowth": 0})
+    task = foraging().replace(life={"births": True, "regrowth": 0})
     given = worlds.paper(), task, TrainingConfig.frozen(0.05)
     rules = {"ants": 6, "capacity": 12, "sharing": "frozen", "q_values": trail_follower("ants")}
     colony, plain = Colony(*given, 3, **rules), ReferenceColony(*given, 3, **rules)

@@ -64,7 +64,7 @@ def test_headings_wrap_around():
 
 def test_a_move_onto_a_trail_that_is_seen_pays_one():
     trails = [(L, 10), (M, 4)]  # M has less than half of L, so it looks E
-    assert Scene(trails=trails).act(LEFT) == (1, Event.ENTERED_LURE)
+    assert Scene(trails=trails).act(LEFT) == (1, Event.ENTERED_CUE)
     assert Scene(trails=trails).act(FORWARD) == (0, Event.ENTERED_EMPTY)
 
 
@@ -86,7 +86,7 @@ def test_a_move_out_of_the_world_only_turns():
 
 def test_with_food_a_move_nearer_pays_one_and_deposits_on_the_new_cell():
     scene = Scene(carries=True, queen=(4, 0, 0))  # sees S E E
-    assert scene.act(LEFT) == (1, Event.ENTERED_LURE)
+    assert scene.act(LEFT) == (1, Event.ENTERED_CUE)
     assert scene.ends == (L, 0, True)
     assert scene.world.trail.level(L) == 250
     assert scene.world.trail.level(A) == 0
@@ -164,7 +164,7 @@ def test_give_pays_ten_and_keeps_the_heading(queen, state):
     scene = Scene(carries=True, queen=queen)
     assert scene.act(GIVE) == (10, Event.DELIVERED)
     assert scene.ends == (A, 1, False)
-    assert scene.ant.percept == state  # the queen looks O again
+    assert scene.ant.paper_state == state  # the queen looks O again
     assert scene.world.trail.level(A) == 0
 
 
@@ -187,7 +187,7 @@ def test_give_fails(contents):
 def test_every_event_pays_what_the_task_says():
     pays = {"rewards": Rewards(empty=-5, failed=-7, shaping=20, pick_up=30, deliver=40)}
     assert Scene(**pays).act(FORWARD) == (-5, Event.ENTERED_EMPTY)
-    assert Scene(trails=[(M, 9)], **pays).act(FORWARD) == (20, Event.ENTERED_LURE)
+    assert Scene(trails=[(M, 9)], **pays).act(FORWARD) == (20, Event.ENTERED_CUE)
     assert Scene(obstacles=[M], **pays).act(FORWARD) == (-7, Event.BLOCKED)
     assert Scene(**pays).act(PICK_UP) == (-7, Event.FAILED)
     assert Scene(**pays).act(GIVE) == (-7, Event.FAILED)

@@ -29,7 +29,10 @@ def test_occasions_of_a_walk_to_food():
     """One step, a pick-up, a step back: the fields say where and when."""
     laid = ("with_food", "without_food", "always", "dead_end", "failed_pick_up", "never")
     colony = begun_with(
-        **{one: Field("none", deposit="fading", level=100, slope=10, laid=one) for one in laid}
+        **{
+            one: Field("none", deposit="fading", level=100, slope=10, deposited_when=one)
+            for one in laid
+        }
     )
     act(colony, FORWARD)
     assert cells_of(colony) == [(3, 3, 0)]
@@ -46,7 +49,7 @@ def test_occasions_of_a_walk_to_food():
 
 
 def test_time_without_food_counts_from_the_start_and_from_a_delivery():
-    fading = Field("none", deposit="fading", level=100, slope=10, laid="without_food")
+    fading = Field("none", deposit="fading", level=100, slope=10, deposited_when="without_food")
     colony = begun_with(home=fading)
     act(colony, PICK_UP)  # in vain
     act(colony, FORWARD)
@@ -62,7 +65,7 @@ def test_time_without_food_counts_from_the_start_and_from_a_delivery():
 
 
 def test_a_failed_pick_up_marks_the_cell_of_an_ant_without_food_only():
-    colony = begun_with(empty=Field(laid="failed_pick_up", evaporation="none"))
+    colony = begun_with(empty=Field(deposited_when="failed_pick_up", evaporation="none"))
     load(colony, 0)
     act(colony, PICK_UP)
     assert levels(colony, "empty") == {}
@@ -74,8 +77,8 @@ def test_a_failed_pick_up_marks_the_cell_of_an_ant_without_food_only():
 def test_a_dead_end_is_marked_by_what_the_ant_saw_before_it_turned():
     rocks = [(3, 3, 0), (2, 4, 0), (3, 4, 0), (2, 2, 0)]
     world = World((9, 9, 1), (8, 8, 0), foods=[(0, 8, 0)], obstacles=rocks, ants=[((2, 3, 0), 1)])
-    colony = begun_with(world, end=Field(laid="dead_end", evaporation="none"))
-    assert colony.ants[0].percept == 0b010101
+    colony = begun_with(world, end=Field(deposited_when="dead_end", evaporation="none"))
+    assert colony.ants[0].paper_state == 0b010101
     act(colony, LEFT)
     assert levels(colony, "end") == {(2, 3, 0): 250}
 
@@ -89,21 +92,21 @@ def test_an_ant_with_food_sees_the_homing_field_in_place_of_the_compass():
         home.lay((3, 3, 0), 90)
         home.lay((2, 2, 0), 60)  # left of the ant
         load(colony, 0)
-        assert colony.ants[0].percept == 64 + 16 * left + 4 * 2
+        assert colony.ants[0].paper_state == 64 + 16 * left + 4 * 2
 
 
 def test_an_ant_without_food_sees_the_outbound_field_in_place_of_the_trail():
     world = World((9, 9, 1), (8, 8, 0), [(4, 8, 0)], trails=[((3, 3, 0), 9)], ants=[((2, 3, 0), 0)])
     colony = begun(world, fields={"scout": Field("none")}, outbound_cue="scout")
-    assert colony.ants[0].percept == 0
+    assert colony.ants[0].paper_state == 0
     colony.world.fields["scout"].lay((3, 3, 0), 1)
     colony.observe(colony.ants[0])
-    assert colony.ants[0].percept == 4 * 2
+    assert colony.ants[0].paper_state == 4 * 2
 
 
 def test_fields_of_kernels_are_stored_and_shown_by_name(tmp_path):
     task = Task(
-        fields={"home": Field(laid="without_food"), "wide": Field(diffusion=0.5)},
+        fields={"home": Field(deposited_when="without_food"), "wide": Field(diffusion=0.5)},
         evaporation_in_training=True,
     )
     training = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)

@@ -129,9 +129,9 @@ def seed_of(*wanted):
     return next(seed for seed in itertools.count() if headings(seed, len(wanted)) == [*wanted])
 
 
-def wandering(foods, *wanted, wander=1, obstacles=(), ants=(ASIDE,), **options):
+def wandering(foods, *wanted, pile_move_interval=1, obstacles=(), ants=(ASIDE,), **options):
     place = World((7, 7, 7), (0, 0, 5), foods=foods, obstacles=obstacles, ants=ants)
-    return begun(place, seed=seed_of(*wanted), wander=wander, **options)
+    return begun(place, seed=seed_of(*wanted), pile_move_interval=pile_move_interval, **options)
 
 
 LINE = [(1, 0, 0), (2, 0, 0), (3, 0, 0)]  # along heading 0
@@ -148,14 +148,16 @@ def test_a_pile_moves_as_one(heading):
     ]
 
 
-@pytest.mark.parametrize("wander", [1, 2, 3])
-def test_it_moves_every_so_many_ticks(wander):
-    colony = wandering([(0, 0, 0)], 0, 0, wander=wander)
+@pytest.mark.parametrize("pile_move_interval", [1, 2, 3])
+def test_it_moves_every_so_many_ticks(pile_move_interval):
+    colony = wandering([(0, 0, 0)], 0, 0, pile_move_interval=pile_move_interval)
     places = []
-    for _ in range(2 * wander):
+    for _ in range(2 * pile_move_interval):
         act(colony, GIVE)
         places += foods_of(colony)
-    assert places == [(0, 0, 0)] * (wander - 1) + [(1, 0, 0)] * wander + [(2, 0, 0)]
+    assert places == [(0, 0, 0)] * (pile_move_interval - 1) + [(1, 0, 0)] * pile_move_interval + [
+        (2, 0, 0)
+    ]
     assert n_draws(colony.queen_stream.state, stream_state(seed_of(0, 0), STREAM_QUEEN, 0)) == 2
 
 
@@ -198,7 +200,7 @@ def test_food_sources_whose_food_is_missing_go_along():
     # The ant takes the food at (1, 0, 0) of a pile of two and goes away. The pile moves along 0:
     # the place (1, 0, 0) moves onto (2, 0, 0), which the other food has left.
     foods = [(1, 0, 0), (2, 0, 0)]
-    colony = wandering(foods, 0, ants=[((0, 0, 0), 0)], wander=2, regrowth=3)
+    colony = wandering(foods, 0, ants=[((0, 0, 0), 0)], pile_move_interval=2, regrowth=3)
     act(colony, PICK_UP)
     act(colony, GIVE)
     assert [source.cell for source in colony.food_sources.food_sources] == [(2, 0, 0), (3, 0, 0)]
@@ -245,9 +247,9 @@ def test_a_waiting_food_source_walks_over_ants_and_food_but_not_over_rocks():
 
 
 def test_food_taken_after_it_wandered_grows_back_where_it_was_taken():
-    colony = wandering([(0, 0, 0)], 0, ants=[((2, 0, 0), 3)], wander=100, regrowth=1)
+    colony = wandering([(0, 0, 0)], 0, ants=[((2, 0, 0), 3)], pile_move_interval=100, regrowth=1)
     # As after an earlier walk of the pile, from (0, 0, 0) to (1, 0, 0).
-    colony.food_sources.wander(
+    colony.food_sources.move_piles(
         colony.world, RandomStream(stream_state(seed_of(0), STREAM_QUEEN, 0))
     )
     turn(colony, 3)
@@ -259,7 +261,7 @@ def test_food_taken_after_it_wandered_grows_back_where_it_was_taken():
 
 def test_trails_do_not_wander():
     place = World((7, 7, 7), (0, 0, 5), foods=[(1, 0, 0)], trails=[((1, 0, 0), 9)], ants=[ASIDE])
-    colony = begun(place, seed=seed_of(0), wander=1)
+    colony = begun(place, seed=seed_of(0), pile_move_interval=1)
     act(colony, GIVE)
     assert foods_of(colony) == {(2, 0, 0)}
     assert [cell for cell in colony.world.ground if colony.world.trail.level(cell)] == [(1, 0, 0)]

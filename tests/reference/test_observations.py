@@ -28,7 +28,7 @@ trail = 8
   #   t
     Q
 """
-# The percept: T F E, 2, 3, 0.
+# The paper's state: T F E, 2, 3, 0.
 PERCEPT = 16 * 2 + 4 * 3
 
 
@@ -44,12 +44,12 @@ def digits(base, *codes):
     return int("".join(map(str, codes)), base)
 
 
-def test_the_papers_row_is_the_percept():
+def test_the_papers_row_is_the_paper_state():
     assert state_of(AROUND, "paper") == PERCEPT
     for seed in range(30):
         colony = ReferenceColony(random_world(seed), None, training(epsilon=1.0), seed)
         for [step] in colony.run_episode(40):
-            assert colony.ants[0].state == colony.ants[0].percept == step.next_state
+            assert colony.ants[0].state == colony.ants[0].paper_state == step.next_state
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_another_ant_is_told_from_a_rock_whatever_it_carries(carries, other_carr
     load(colony, *([0] if other_carries else []), *([1] if carries else []))
     looking = colony.ants[1]
     assert looking.state == digits(5, int(carries), 1, 4, 1)
-    assert looking.percept == 64 * carries + 16 + 4 + 1
+    assert looking.paper_state == 64 * carries + 16 + 4 + 1
 
 
 P, OTHER, AHEAD = 4, 5, 6  # ants: other load on a better cell, on any other; same load on a better
@@ -219,7 +219,7 @@ def test_without_food_a_better_cell_has_a_stronger_trail_than_the_ants_own(level
     load(colony, 1)
     colony.observe(colony.ants[0])
     assert colony.ants[0].state == digits(7, 0, 0, code, 0)
-    assert colony.ants[0].percept == 4  # what it can do goes by the paper's state
+    assert colony.ants[0].paper_state == 4  # what it can do goes by the paper's state
 
 
 def test_an_ant_that_has_just_died_is_not_seen():
@@ -231,9 +231,10 @@ def test_an_ant_that_has_just_died_is_not_seen():
 
 
 @pytest.mark.parametrize("name", OBSERVATIONS)
-def test_ants_choose_and_learn_by_the_row_and_act_by_the_percept(name):
+def test_ants_choose_and_learn_by_the_row_and_act_by_the_paper_state(name):
     # Left is a trail. Greedy, the ant goes there by a table with one best value, in the row that
-    # it looks at; the move pays as the percept says, +1; and what it learns stands in that row.
+    # it looks at; the move pays as the paper's state says, +1; and what it learns stands in that
+    # row.
     n_states = observations.get(name).n_states
     q_values = np.zeros((n_states, 5), np.float32)
     q_values[state_of(AROUND, name), LEFT] = 4

@@ -17,15 +17,15 @@ from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.world import World
 
-E, O, LURE, GOAL = range(4)  # noqa: E741
+E, O, CUE, GOAL = range(4)  # noqa: E741
 
 
 def reachable_states() -> set[int]:
-    views = set(itertools.product((E, O, LURE, GOAL), repeat=3))
+    views = set(itertools.product((E, O, CUE, GOAL), repeat=3))
     without_food = {(0, *view) for view in views}
-    lures_both_sides = {(LURE, middle, LURE) for middle in (E, O, LURE)}
+    lures_both_sides = {(CUE, middle, CUE) for middle in (E, O, CUE)}
     no_queen = {view for view in views if GOAL not in view} - lures_both_sides
-    one_queen = {view for view in views if view.count(GOAL) == 1 and LURE not in view}
+    one_queen = {view for view in views if view.count(GOAL) == 1 and CUE not in view}
     assert (len(without_food), len(no_queen), len(one_queen)) == (64, 24, 12)
     with_food = {(1, *view) for view in no_queen | one_queen}
     return {

@@ -96,7 +96,7 @@ def test_what_has_no_interval_says_so() -> None:
 def test_the_page_is_the_same_from_the_files() -> None:
     measured = build(seeds=3, world_kinds=("paper", "slow"))
     for measures in measured.values():
-        measures["bound"][:] = measures["of_bound"][:] = float("nan")
+        measures["bound"][:] = measures["bound_share"][:] = float("nan")
     found = Results.of(measured)
     seeds = [
         {k: None if v != v else v for k, v in row.items()}

@@ -60,10 +60,10 @@ def random_task(rng):
     task = Task()
     if rng.random() < 0.5:
         laid = str(rng.choice(["without_food", "always", "never"]))
-        home = {"laid": laid, "deposit": "fading", "slope": int(rng.integers(1, 9))}
-        task = task.but(fields={"home": home}, homing_cue="home")
+        home = {"deposited_when": laid, "deposit": "fading", "slope": int(rng.integers(1, 9))}
+        task = task.replace(fields={"home": home}, homing_cue="home")
     if rng.random() < 0.3:
-        task = task.but(foods={"seed": Food(loads=3)})
+        task = task.replace(foods={"seed": Food(loads=3)})
     scalars = [one for one in all_of(Task) if not one.is_group and one.default is not MISSING]
     scalars = [one for one in scalars if one.kind in (bool, int, float, str) and not one.is_text]
     scalars = [one for one in scalars if len(one.allowed_words) != 1]
@@ -73,7 +73,7 @@ def random_task(rng):
         for part in reversed(setting.path.split(".")[1:-1]):
             change = {part: change}
         try:
-            task = task.but(**change)
+            task = task.replace(**change)
         except AntsError:
             continue
     return task
@@ -119,12 +119,16 @@ def test_the_headings_are_those_of_the_protocol():
 
 def test_parameters_have_the_unit_and_the_meaning_of_their_declaration():
     fades = {"evaporation": "exponential", "half_life": 7.5}
-    task = foraging().but(pheromone=fades, fields={"home": {}}, homing_cue="home")
+    task = foraging().replace(pheromone=fades, fields={"home": {}}, homing_cue="home")
     rows = {name: (unit, words) for name, _, unit, words in ROW.findall(of_task(task))}
     known = {one.path: one for one in (*all_of(Task), *declared(TrainingConfig))}
     known |= {f"task.fields.home.{one.name}": one for one in declared(Field)}
     shared = rows.keys() & known.keys()
-    assert {"task.pheromone.half_life", "task.fields.home.laid", "training.epsilon"} <= shared
+    assert {
+        "task.pheromone.half_life",
+        "task.fields.home.deposited_when",
+        "training.epsilon",
+    } <= shared
     for name in shared:
         assert rows[name] == (known[name].rule.unit, known[name].rule.help)
     assert rows["task.pheromone.half_life"][0] == rows["ticks"][0] == "ticks"
@@ -146,7 +150,7 @@ ranges = [12, 12, 12]
 preset = "foraging"
 outbound_cue = "a"
 [task.fields.a]
-laid = "with_food"
+deposited_when = "with_food"
 [task.castes.alpha]
 outbound_cue = "trail"
 nest = 0
@@ -179,15 +183,17 @@ def test_a_study_without_learning_has_no_parameters_of_learning():
 
 
 def test_the_trail_has_no_view_if_nobody_follows_it():
-    task = Task(fields={"a": {}}).but(outbound_cue="a")
+    task = Task(fields={"a": {}}).replace(outbound_cue="a")
     assert "task.pheromone.view" not in values_in(of_task(task))
     assert values_in(of_task(task))["task.fields.a.view"] == "half"
-    follows = task.but(castes={"one": {"outbound_cue": "trail"}})
+    follows = task.replace(castes={"one": {"outbound_cue": "trail"}})
     assert values_in(of_task(follows))["task.pheromone.view"] == "half"
 
 
 def test_carriers_follow_has_its_value():
-    task = Task().but(choice={"rule": "deneubourg", "carriers_follow": "home"}, fields={"home": {}})
+    task = Task().replace(
+        choice={"rule": "deneubourg", "carriers_follow": "home"}, fields={"home": {}}
+    )
     found = values_in(of_task(task))
     assert found["task.choice.carriers_follow"] == "home"
     assert (found["task.choice.k"], found["task.choice.exponent"]) == ("20", "2")
@@ -195,7 +201,7 @@ def test_carriers_follow_has_its_value():
 
 
 def test_points_that_differ_have_all_values_of_those_that_use_a_setting():
-    tasks = [Task(), Task().but(pheromone={"deposit": "fading", "slope": 3})]
+    tasks = [Task(), Task().replace(pheromone={"deposit": "fading", "slope": 3})]
     points = [ColonyPoint(worlds.paper(), task, SARSA, ants=n) for task in tasks for n in (2, 9)]
     found = values_in(text_of(*points))
     assert (found["ants"], found["task.pheromone.slope"]) == ("2, 9", "3")

@@ -44,7 +44,9 @@ def test_every_tick_with_rules_of_users(model):
     delivered = 0
     for seed in range(6):
         drawn = random_colony(seed, **arguments)
-        task = drawn.task.but(**changes, **({} if arguments.get("changes") else {"life": Life()}))
+        task = drawn.task.replace(
+            **changes, **({} if arguments.get("changes") else {"life": Life()})
+        )
         needs = task.choice.needs_table
         drawn = replace(drawn, task=task, training=drawn.training if needs else None)
         q_values = drawn.q_values if needs else None

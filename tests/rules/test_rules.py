@@ -22,7 +22,7 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.engines import own_rules as own_rules_of_kernels
-from taichi_ants.interventions import TaskNumbers
+from taichi_ants.interventions import SetTask
 from taichi_ants.reference import own_observations
 from taichi_ants.rules import exp, log, pick, power, registry
 from taichi_ants.rules.inputs import KINDS
@@ -41,13 +41,15 @@ def test_a_task_names_rules_and_their_parameters():
     task = Task(choice="weber", pheromone=Pheromone("power_law", deposit="weaker"))
     assert list(task.rules) == ["weber", "weaker", "power_law"]
     assert task.rules["weber"].k == 20.0
-    other = task.but(rules={"weber": {"k": 3}})
+    other = task.replace(rules={"weber": {"k": 3}})
     assert (other.rules["weber"].k, other.rules["weber"].exponent) == (3.0, 1.5)
     assert other != task
     assert Task.from_dict(other.as_dict()) == other == pickle.loads(pickle.dumps(other))
-    greedy = other.but(choice="greedy")  # parameters of a rule that is no longer used are dropped
+    greedy = other.replace(
+        choice="greedy"
+    )  # parameters of a rule that is no longer used are dropped
     assert list(greedy.rules) == ["weaker", "power_law"]
-    assert greedy.but(choice="weber").rules["weber"].k == 20.0
+    assert greedy.replace(choice="weber").rules["weber"].k == 20.0
     assert task.pheromone.dense
     assert not task.choice.needs_table
     assert Choice("restless").needs_table
@@ -129,7 +131,7 @@ def homeward(nearer, codes, carries, random):
 def test_a_cell_with_an_ant_is_as_near_as_without_it(traffic, clean):
     rules.register("choice")(homeward)
     world = worlds.open_world(1, ranges=(7, 7, 7))
-    task = Task(choice="homeward", traffic=traffic).but(life={"regrowth": 0})
+    task = Task(choice="homeward", traffic=traffic).replace(life={"regrowth": 0})
     colony = Colony(world, task, None, 0, 50, sharing="frozen")
     colony.begin_episode()
     far, occupied = colony.grid.distances((0, 0, 0)), 0  # from the queen, by cell
@@ -161,7 +163,7 @@ def straight(is_open, codes, carries, random):
 def test_a_cell_with_an_ant_is_open_by_traffic_with_and_without_a_compass(traffic, cue, clean):
     rules.register("choice")(straight)
     world = worlds.open_world(1, ranges=(7, 7, 7))
-    task = Task(choice="straight", traffic=traffic, homing_cue=cue).but(life={"regrowth": 0})
+    task = Task(choice="straight", traffic=traffic, homing_cue=cue).replace(life={"regrowth": 0})
     colony, seen = Colony(world, task, None, 0, 50, sharing="frozen"), {False: 0, True: 0}
     colony.begin_episode()
     for _ in range(60):
@@ -178,7 +180,7 @@ def test_a_cell_with_an_ant_is_open_by_traffic_with_and_without_a_compass(traffi
 def test_nothing_is_nearer_without_a_compass(clean):
     rules.register("choice")(homeward)
     world = worlds.open_world(1, ranges=(7, 7, 7))
-    task = Task(choice="homeward", homing_cue="trail").but(life={"regrowth": 0})
+    task = Task(choice="homeward", homing_cue="trail").replace(life={"regrowth": 0})
     colony, moves = Colony(world, task, None, 0, 50, sharing="frozen"), 0
     colony.begin_episode()
     for _ in range(60):
@@ -414,7 +416,7 @@ def test_names_are_checked(clean):
         ({"kind": "deposit", "name": "set"}, "is the name of a built-in rule"),
         ({"kind": "deposit", "name": "a b"}, "must be a word"),
         ({"kind": "deposit", "name": "weber"}, "is the name of a rule of the kind 'choice'"),
-        ({"kind": "deposit", "twin": shaped_twin}, "it must have the same arguments"),
+        ({"kind": "deposit", "reference": shaped_twin}, "it must have the same arguments"),
     ):
         with pytest.raises(AntsError) as caught:
             rules.register(**arguments)(same)
@@ -467,10 +469,10 @@ def test_parameters_change_without_other_kernels_and_in_an_episode(clean):
     task = Task(choice="weber", pheromone=Pheromone(deposit="weaker"))
     world = worlds.open_world(1, ranges=(8, 8, 8))
     colony = Colony(world, task, None, 0, 8, sharing="frozen")
-    other = task.but(rules={"weaker": {"amount": 7}})
+    other = task.replace(rules={"weaker": {"amount": 7}})
     assert task.compiled(learning=False) == other.compiled(learning=False)
     colony.begin_episode()
-    TaskNumbers((("rules.weaker.amount", 7.0),)).apply(Interventions(colony))
+    SetTask((("rules.weaker.amount", 7.0),)).apply(Interventions(colony))
     assert colony.task == other
     plain = Colony(world, other, None, 0, 8, sharing="frozen")
     plain.begin_episode()
@@ -496,9 +498,9 @@ def wrong_twin(level):
 
 
 def test_a_rule_that_differs_from_its_twin_is_refused(clean):
-    rules.register("evaporation", twin=wrong_twin)(same)
+    rules.register("evaporation", reference=wrong_twin)(same)
     check = check_rule("same", inputs=50)
-    assert "but its twin" in check.difference
+    assert "but its Python function" in check.difference
     assert str(check).startswith("same: 50 drawn inputs and 0 ticks")
     task = Task(pheromone=Pheromone("same"), evaporation_in_training=True)
     with pytest.raises(AntsError, match="rule 'same' cannot be used: its kernel returns"):
@@ -516,11 +518,11 @@ def differs_in_places(level):
 
 
 def test_twins_are_asked_for_all_levels_that_occur_and_named_if_they_fail(clean):
-    rules.register("evaporation", twin=fails_at_large)(same)
-    says = "its twin fails (KeyError: 'a twin') for level="
+    rules.register("evaporation", reference=fails_at_large)(same)
+    says = "its Python function fails (KeyError: 'a twin') for level="
     assert check_rule("same").difference.startswith(says)
-    registry._RULES["same"] = replace(rules.get("same"), twin=differs_in_places)
-    assert "but its twin 0.0" in check_rule("same").difference
+    registry._RULES["same"] = replace(rules.get("same"), reference=differs_in_places)
+    assert "but its Python function 0.0" in check_rule("same").difference
 
 
 def test_rules_that_read_labour_or_fields_need_them(clean):
@@ -528,7 +530,7 @@ def test_rules_that_read_labour_or_fields_need_them(clean):
     with pytest.raises(AntsError, match=message):
         Task(choice="hungry")
     castes, labour = {"one": {"threshold": 1.0}}, "thresholds"
-    assert Task().but(choice="hungry", castes=castes, labour=labour).choice.own_rule
+    assert Task().replace(choice="hungry", castes=castes, labour=labour).choice.own_rule
     with pytest.raises(AntsError, match=r"^the rule 'alarm' reads the field 'B'; add `task\.fiel"):
         Task(pheromone=Pheromone(deposit="alarm"))
     with pytest.raises(AntsError, match=r"'levels_B', which is not an input .* level_FIELD, or"):
@@ -540,11 +542,11 @@ def reads_ahead(level, levels_B):  # noqa: N803
 
 
 def homely(view):
-    index = 2 * view.percept
+    index = 2 * view.paper_state
     if view.own_B >= 1:
         index += 1
     if view.trail[0] > view.own_level:
-        index = view.strangers[2] + 2 * view.ants[0]
+        index = view.other_nest_ants[2] + 2 * view.ants[0]
     return index
 
 

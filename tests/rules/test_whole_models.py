@@ -19,7 +19,7 @@ from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Colony
 from taichi_ants.engines.colony.timetable import Timetable
-from taichi_ants.protocol import Event
+from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.reference.protocol import Protocol
 
@@ -76,7 +76,7 @@ MODELS = {
         {"learner": "q_learning", "sharing": "frozen", "dense": True, "fields": "aB"},
         (2, 1, False),
         (2, True, None),
-        {"choice": "hungry", "fields": {"a": {**ALARM, "laid": "dead_end"}}},
+        {"choice": "hungry", "fields": {"a": {**ALARM, "deposited_when": "dead_end"}}},
     ),
     "own tables": (
         {
@@ -100,18 +100,18 @@ MODELS = {
 SLOW = ("deneubourg", "labour of users")
 
 
-def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[Event]] | None:
+def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]] | None:
     """Return a drawn colony of a model and its protocol; None if its world has too few cells."""
     arguments, (nests, kinds, loads), castes, changes = MODELS[name]
     drawn = random_colony(seed, 60, largest_range=8, noise=NOISE, changes=True, **arguments)
     if not drawn.task.food_changes or drawn.population["ants"] < 20:
         return None  # other kernels, or few steps
     life = drawn.task.life
-    drawn = replace(drawn, task=drawn.task.but(life={"lifespan": life.lifespan and 25}))
+    drawn = replace(drawn, task=drawn.task.replace(life={"lifespan": life.lifespan and 25}))
     drawn = with_nests(drawn, seed, nests, kinds, loads)
     if castes[1]:  # your rules can read thresholds; `drawn_castes` draws others
         changes = {"labour": "thresholds", "castes": {"one": {"threshold": 1.0}}, **changes}
-    drawn = replace(drawn, task=drawn.task.but(**changes))
+    drawn = replace(drawn, task=drawn.task.replace(**changes))
     if not drawn.task.choice.needs_table:
         drawn = replace(drawn, training=None, q_values=None)
     made = drawn_castes(drawn, seed, *castes)
@@ -135,7 +135,7 @@ def assert_ants_equal(colony: Colony, plain: ReferenceColony) -> None:
     for column, of_ant in (
         (colony.headings, [ant.heading for ant in ants]),
         (colony.events, [ant.event for ant in ants]),
-        (colony.percepts, [ant.percept for ant in ants]),
+        (colony.paper_states, [ant.paper_state for ant in ants]),
         (colony.states, [ant.state for ant in ants]),
         (colony.actions, [ant.action for ant in ants]),
         (colony.idle, [ant.idle for ant in ants]),
@@ -144,7 +144,9 @@ def assert_ants_equal(colony: Colony, plain: ReferenceColony) -> None:
         assert column[0, slots].tolist() == of_ant
 
 
-def steps_compared(drawn: RandomColony, protocol: list[Event], schedule: str, seen: Counter) -> int:
+def steps_compared(
+    drawn: RandomColony, protocol: list[ProtocolEvent], schedule: str, seen: Counter
+) -> int:
     """Compare the episodes of a colony tick by tick, and return the number of ant-steps.
 
     An episode ends early if its world does not allow an intervention.

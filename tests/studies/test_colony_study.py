@@ -91,8 +91,8 @@ def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
     values |= {greedy(p): {"deliveries": np.array([800.0, 800.0])} for p in conditions.values()}
     found = measured(conditions, values, SEEDS)
     assert found[one]["greedy"].tolist() == [800, 800]
-    assert found[one]["of_bound"] == pytest.approx(700 / np.array(expected))
-    assert np.isnan(found[elsewhere]["of_bound"]).all()
+    assert found[one]["bound_share"] == pytest.approx(700 / np.array(expected))
+    assert np.isnan(found[elsewhere]["bound_share"]).all()
 
 
 def test_an_unknown_kind_of_world_is_named() -> None:

@@ -130,7 +130,7 @@ def test_the_summary_counts_in_words() -> None:
 
 @pytest.mark.parametrize("capacity", [None, 5])
 def test_the_summary_tells_why_births_wait(capacity: int | None) -> None:
-    task = Task().but(life={"births": True})
+    task = Task().replace(life={"births": True})
     colony = Colony(worlds.paper(), task, TRAINING, [0, 1], ants=2, capacity=capacity)
     colony.begin_episode()
     assert "wait" not in summary(colony, 1, 1.0)
@@ -144,7 +144,7 @@ def test_the_summary_tells_why_births_wait(capacity: int | None) -> None:
 
 
 def test_births_wait_for_a_free_cell_as_measures_count_them() -> None:
-    task = foraging().but(life={"births": True, "regrowth": 0})
+    task = foraging().replace(life={"births": True, "regrowth": 0})
     rule = TrainingConfig.frozen()
     policy = {"sharing": "frozen", "q_values": trail_follower("ants")}
     colony = Colony(worlds.paper(), task, rule, ants=6, **policy)

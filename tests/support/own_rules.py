@@ -6,7 +6,7 @@ from typing import Annotated
 
 from taichi_ants import rules
 from taichi_ants.rules import exp, log, pick, power
-from taichi_ants.settings import Is
+from taichi_ants.settings import Setting
 from taichi_ants.task.events import Event
 
 HIGHEST = 1000
@@ -14,7 +14,9 @@ HIGHEST = 1000
 
 @rules.register("evaporation")
 def power_law(
-    level, tick, exponent: Annotated[float, Is("exponent of the loss", least=1, most=1.5)] = 1.1
+    level,
+    tick,
+    exponent: Annotated[float, Setting("exponent of the loss", least=1, most=1.5)] = 1.1,
 ):
     """Return the level after a loss that grows faster than the level."""
     return max(level - 0.001 * power(level, exponent) - (tick % 2), 0) if level > 1 else 0
@@ -26,14 +28,14 @@ def weaker(
     carried,
     carries,
     event,
-    percept,
+    paper_state,
     trait,
     tick,
-    amount: Annotated[float, Is("level of a new deposit", least=0, most=300)] = 100.0,
+    amount: Annotated[float, Setting("level of a new deposit", least=0, most=300)] = 100.0,
 ):
     """Return a level that depends on all inputs."""
     found = level
-    if event == Event.PICKED_UP or (percept % 4 == 2 and not carries):
+    if event == Event.PICKED_UP or (paper_state % 4 == 2 and not carries):
         found = max(level, 3 * amount)
     elif 0 < tick < 5:
         pass
@@ -68,8 +70,8 @@ def weber(
     level,
     carries,
     random,
-    k: Annotated[float, Is("attraction of a cell without a trail", least=1, most=30)] = 20.0,
-    exponent: Annotated[float, Is("exponent of the attraction", least=0, most=5)] = 1.5,
+    k: Annotated[float, Setting("attraction of a cell without a trail", least=1, most=30)] = 20.0,
+    exponent: Annotated[float, Setting("exponent of the attraction", least=0, most=5)] = 1.5,
 ):
     """Return an action without action values."""
     weights = [power(k + abs(levels[i] - level / 2), exponent) for i in range(3)]
@@ -90,10 +92,10 @@ def restless(
     random_2,
     level_trail,
     levels_trail,
-    percept,
+    paper_state,
     trait,
     tick,
-    boost: Annotated[int, Is("addition to a value", least=0, most=9)] = 1,
+    boost: Annotated[int, Setting("addition to a value", least=0, most=9)] = 1,
 ):
     """Return an action by action values and levels."""
     best = 0
@@ -106,7 +108,7 @@ def restless(
             top = value
             best = a
     if random < epsilon + 0.2 * trait:
-        best = (random_2 * 5 + tick + percept) // 1 % 5
+        best = (random_2 * 5 + tick + paper_state) // 1 % 5
     return best
 
 
@@ -115,13 +117,13 @@ def shaped(
     reward,
     event,
     carries,
-    percept,
-    next_percept,
+    paper_state,
+    next_paper_state,
     levels,
     level,
     trait,
     tick,
-    scale: Annotated[float, Is("reward for a rising level", least=0, most=9)] = 2.0,
+    scale: Annotated[float, Setting("reward for a rising level", least=0, most=9)] = 2.0,
 ):
     """Return a reward that depends on all inputs."""
     more = 0
@@ -129,7 +131,7 @@ def shaped(
         more = scale
     if event == Event.DELIVERED:
         more += 5 + tick % 3
-    if percept == next_percept:
+    if paper_state == next_paper_state:
         more -= 1 + (trait < 0.3)
     return min(max((reward + more) // 1, -1000), 1000)
 

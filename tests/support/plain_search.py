@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.episodes import Outcome
+from taichi_ants.analysis.bounds.episodes import ExpectedEpisode
 from taichi_ants.task import Rewards
 from taichi_ants.worlds.world import World
 
@@ -49,12 +49,12 @@ class PlainWorld:
         if not self._is_empty(target, foods):
             return [((cell, heading, taken), self.paid.failed)]
         if taken:
-            lured = self._distance(target) < self._distance(cell)
+            shows_cue = self._distance(target) < self._distance(cell)
         else:
             levels = [self.trails.get(c, 0) for c in seen if self._is_empty(c, foods)]
             level = self.trails.get(target, 0)
-            lured = level >= 1 and level >= max(levels) / 2
-        return [((target, heading, taken), self.paid.shaping if lured else self.paid.empty)]
+            shows_cue = level >= 1 and level >= max(levels) / 2
+        return [((target, heading, taken), self.paid.shaping if shows_cue else self.paid.empty)]
 
     def _is_empty(self, cell: tuple, foods: set) -> bool:
         exists = all(value < size for value, size in zip(cell, self.ranges, strict=True))
@@ -95,12 +95,12 @@ def search_all_sequences(plain: PlainWorld, max_steps: int) -> tuple:
     return min(delivered, key=lambda episode: (episode[1], -episode[0]))
 
 
-def search_shortest(plain: PlainWorld) -> Outcome | None:
+def search_shortest(plain: PlainWorld) -> ExpectedEpisode | None:
     """Return the outcome of the shortest delivery with the best return, by breadth-first search."""
     layer, seen, steps = {plain.start: 0}, set(), 0
     while layer:
         if DELIVERED in layer:
-            return Outcome(layer[DELIVERED], steps, 1)
+            return ExpectedEpisode(layer[DELIVERED], steps, 1)
         seen |= set(layer)
         following: dict = {}
         for state, so_far in layer.items():
@@ -113,7 +113,9 @@ def search_shortest(plain: PlainWorld) -> Outcome | None:
     return None
 
 
-def search_optimal(plain: PlainWorld, discount: float, max_steps: int) -> tuple[float, Outcome]:
+def search_optimal(
+    plain: PlainWorld, discount: float, max_steps: int
+) -> tuple[float, ExpectedEpisode]:
     """Return the optimal value by value iteration, and the expected outcome of that policy."""
     states = plain.all_states()
 
@@ -134,4 +136,4 @@ def search_optimal(plain: PlainWorld, discount: float, max_steps: int) -> tuple[
         ]
         return np.mean(branches, axis=0)
 
-    return values[plain.start], Outcome(*follow(plain.start, max_steps))
+    return values[plain.start], ExpectedEpisode(*follow(plain.start, max_steps))

@@ -110,5 +110,5 @@ def _labour(rng: np.random.Generator) -> Labour:
         demand=float(rng.choice([0.1, 0.7, 3.0])),
         relief=float(rng.choice([0.0, 0.3, 5.0])),
         exponent=float(rng.choice([0.0, 1.0, 1.7, 2.0])),
-        quit=float(rng.choice([0.05, 0.4, 1.0])),
+        stop_probability=float(rng.choice([0.05, 0.4, 1.0])),
     )

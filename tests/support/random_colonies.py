@@ -70,7 +70,7 @@ def random_colony(
     given = sharing == "frozen" or rng.random() < 0.6
     chooses = random_choice(seed, choice)
     if fields and choice == "deneubourg" and cues[1] == "compass":
-        chooses = chooses.but(carriers_follow=fields[-1])
+        chooses = chooses.replace(carriers_follow=fields[-1])
     if not chooses.needs_table:
         training, given = None, False
     return RandomColony(
@@ -119,7 +119,9 @@ def with_nests(drawn: RandomColony, seed: int, nests: int, kinds: int, loads: bo
         for k in range(kinds)
     }
     several = kinds > 1 or loads
-    life = replace(life, regrowth=None, wander=None if several else life.wander)
+    life = replace(
+        life, regrowth=None, pile_move_interval=None if several else life.pile_move_interval
+    )
     world = replace(
         world,
         other_queens=queens,
@@ -154,17 +156,17 @@ def _rules(
     pheromone = _pheromone(rng, dense)
     lifespan = int(rng.integers(1, 30)) if rng.random() < 0.5 else None
     regrowth = int(rng.choice([0, 0, 1, 2, 7])) if rng.random() < 0.7 else None
-    wander = int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None
+    pile_move_interval = int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None
     if changes and not births and lifespan is None:
         lifespan = 9
-    if changes and regrowth is None and wander is None:
-        wander = 3
+    if changes and regrowth is None and pile_move_interval is None:
+        pile_move_interval = 3
     ends = ants == 1 and not births and bool(rng.random() < 0.5)
     start = str(rng.choice(STARTS))
     task = Task(
         pheromone=pheromone,
         evaporation_in_training=True,
-        life=Life(births, lifespan, regrowth, wander),
+        life=Life(births, lifespan, regrowth, pile_move_interval),
     )
     return {"ants": ants, "capacity": capacity, "ends_at_delivery": ends, "start": start}, task
 
@@ -198,7 +200,7 @@ def _field(seed: int, name: str, view: str) -> Field:
     laid = laid if rng.random() < 0.9 else "never"
     if name in "cC":  # so that two cues have different views
         view = "strongest" if view == "half" else "half"
-    return Field(**{**rules, "view": view, "laid": str(laid)})
+    return Field(**{**rules, "view": view, "deposited_when": str(laid)})
 
 
 def _training(rng: np.random.Generator, learner: str | None) -> tuple[TrainingConfig, str]:

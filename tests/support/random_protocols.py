@@ -8,7 +8,7 @@ import numpy as np
 
 from taichi_ants import AntsError, World
 from taichi_ants.learners.policies import FOLLOWED
-from taichi_ants.protocol import EVENTS, Event
+from taichi_ants.protocol import EVENTS, ProtocolEvent
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
 
@@ -27,9 +27,9 @@ def random_protocol(
     ticks: int,
     worlds: int,
     learns: bool,
-) -> list[Event]:
+) -> list[ProtocolEvent]:
     """Return random events that are valid by themselves; a world may still not allow them."""
-    events: list[Event] = []
+    events: list[ProtocolEvent] = []
     follows = not learns and task.observation in FOLLOWED
     kinds = [*KINDS, *(["learning_rate"] if learns else []), *(["policy"] if follows else [])]
     while len(events) < 4:
@@ -125,7 +125,7 @@ def _change(rng: np.random.Generator, task: Task) -> dict[str, Any]:
     if task.choice.temperature:
         able.append(("choice.temperature", float(rng.uniform(0.1, 5))))
     for name, one in task.fields.items():
-        able.append((f"fields.{name}.laid", str(rng.choice(["always", "without_food"]))))
+        able.append((f"fields.{name}.deposited_when", str(rng.choice(["always", "without_food"]))))
         if one.deposit != "none":
             able.append((f"fields.{name}.level", int(rng.integers(1, 100))))
         if one.half_life:
@@ -139,6 +139,6 @@ def _change(rng: np.random.Generator, task: Task) -> dict[str, Any]:
             able.append((f"castes.{name}.threshold.value", float(rng.uniform(3, 9))))
     if task.labour.divides:
         able.append(("labour.demand", float(rng.uniform(0, 4))))
-    if life.wander:
-        able += [("life.wander", int(rng.integers(1, 9))), ("life.regrowth", 2)]
+    if life.pile_move_interval:
+        able += [("life.pile_move_interval", int(rng.integers(1, 9))), ("life.regrowth", 2)]
     return dict([able[int(rng.integers(len(able)))]])

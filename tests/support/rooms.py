@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.server import Room
+from taichi_ants.live.server import SessionServer
 from taichi_ants.live.session import Session
 from taichi_ants.live.setup import Setup
 
@@ -41,11 +41,11 @@ CHOSEN: dict[str, Any] = {
 @contextmanager
 def running(
     choices: Choices, chosen: dict[str, Any] | None = None, setup: Setup | None = None
-) -> Iterator[Room]:
+) -> Iterator[SessionServer]:
     """Yield a server whose session runs in another thread."""
     session = Session(setup or choices.setup(chosen or CHOSEN))  # starts Taichi, in this thread
     session.advance()
-    room = Room(session, choices)
+    room = SessionServer(session, choices)
     thread = threading.Thread(target=room.run, daemon=True)
     thread.start()
     yield room
@@ -57,7 +57,7 @@ def running(
 class Guest:
     """A client that sends requests and receives messages as a page does."""
 
-    def __init__(self, room: Room, **given: Any) -> None:
+    def __init__(self, room: SessionServer, **given: Any) -> None:
         self.room = room
         address = room.url.replace("http", "ws").replace("/?", "/socket?")
         usual = {"origin": f"http://127.0.0.1:{room.port}", "max_size": None, "proxy": None}

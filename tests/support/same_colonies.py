@@ -20,7 +20,7 @@ def assert_equal(colony: Colony, plain: ReferenceColony, world: int = 0) -> None
     theirs = [plain.ants[slot] for slot in slots.tolist()]
     mine = {name: arrays[name][of_world][slots].tolist() for name in colony.columns()}
     assert grid.cells(colony.cells[world, slots]).tolist() == [list(ant.cell) for ant in theirs]
-    for name in ("heading", "carries", "number", "percept", "action", "event"):
+    for name in ("heading", "carries", "number", "paper_state", "action", "event"):
         assert mine[name] == [getattr(ant, name) for ant in theirs], name
     if colony.ants_change:
         assert mine["age"] == [ant.age for ant in theirs]
@@ -70,7 +70,7 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert outcome.regrown[0, world] == record.regrown
     stores = colony.arrays["nests"][NestRow.STORE].reshape(-1, colony.n_nests)[world]
     assert stores.tolist() == plain.stores
-    apart = outcome.deliveries_apart[0, world]
+    apart = outcome.deliveries_by_nest_and_kind[0, world]
     assert {(int(n), int(k)): int(apart[n, k]) for n, k in np.argwhere(apart)} == record.apart
     by_caste = dict(enumerate(outcome.caste_deliveries[0, world].tolist()))
     assert {caste: n for caste, n in by_caste.items() if n} == record.by_caste

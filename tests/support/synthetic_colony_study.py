@@ -53,7 +53,7 @@ def build(
                         "deliveries": deliveries,
                         "greedy": 1.5 * deliveries,
                         "bound": np.full(seeds, 25.0 * ants),
-                        "of_bound": deliveries / (25.0 * ants),
+                        "bound_share": deliveries / (25.0 * ants),
                         "per_ant": deliveries / ants,
                         "first_delivery": np.full(seeds, float(first(ants))),
                         "no_delivery_rate": np.zeros(seeds),

@@ -85,7 +85,7 @@ def test_ants_with_food_follow_another_pheromone(followed, levels):
     world = World((10, 10, 2), queen, [forward], trails=trails, ants=[((5, 5, 0), 0)])
     rules = Task(
         pheromone=Pheromone(evaporation="none"),
-        fields={"calm": Field(laid="never")},
+        fields={"calm": Field(deposited_when="never")},
         choice=Choice("deneubourg", k=20, exponent=2, carriers_follow=followed),
     )
     colony = Colony(world, rules, None, range(N), sharing="frozen")
@@ -114,7 +114,7 @@ def test_ants_with_food_and_without_a_compass_weigh_all_open_cells(homing, outbo
     world = World((10, 10, 2), queen, [forward], trails=trails, ants=[((5, 5, 0), 0)])
     rules = Task(
         pheromone=Pheromone(evaporation="none"),
-        fields={"calm": Field(laid="never")},
+        fields={"calm": Field(deposited_when="never")},
         choice=Choice("deneubourg", k=20, exponent=2),
         outbound_cue=outbound,
         homing_cue=homing,
@@ -172,8 +172,8 @@ def test_misread_cells():
     rules = Task(noise=Noise(misread=0.3))
     colony = Colony(lone_ant(), rules, PLAIN, range(N), sharing="frozen", q_values=GREEDY_VALUES)
     colony.begin_episode()
-    states, percepts = colony.states[:, 0], colony.percepts[:, 0]
-    assert (percepts == 0).all()
+    states, paper_states = colony.states[:, 0], colony.paper_states[:, 0]
+    assert (paper_states == 0).all()
     codes = np.stack([states >> 4 & 3, states >> 2 & 3, states & 3])
     for seen in codes:
         assert_counts(seen, [0.7, 0.1, 0.1, 0.1])
@@ -196,13 +196,13 @@ def test_worlds_that_begin_again_do_not_misread_twice():
     colony = Colony(worlds.paper(), rules, PLAIN, (1, 2), 9)
     colony.begin_episode()
     seen, streams = colony.states[1].copy(), colony.streams[1].copy()
-    colony.begin_some(np.array([True, False]))
+    colony.reset_worlds(np.array([True, False]))
     assert (colony.states[1] == seen).all()
     assert (colony.streams[1] == streams).all()
 
 
 def test_files_and_pickles_keep_rules_of_choice(tmp_path):
-    rules = task.foraging().but(
+    rules = task.foraging().replace(
         observation="paper", choice={"rule": "deneubourg", "k": 7.5}, noise={"slip": 0.1}
     )
     colony = Colony(worlds.paper(), rules, None, (1, 2), 20, sharing="frozen")

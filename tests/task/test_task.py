@@ -29,7 +29,7 @@ def test_the_defaults_are_the_rules_of_the_world():
         "half",
     )
     assert dataclasses.astuple(task.rewards) == (0, -1, 1, 3, 10)
-    assert task.life == Life(births=False, lifespan=None, regrowth=None, wander=None)
+    assert task.life == Life(births=False, lifespan=None, regrowth=None, pile_move_interval=None)
     assert dataclasses.astuple(task.traffic) == (False, False, False, False)
     assert not task.turns_at_queen
     assert (task.observation, task.n_states, task.delivery) == ("paper", 128, "terminates")
@@ -104,7 +104,7 @@ def test_each_row_has_a_name_of_its_own(name):
 
 
 def test_the_limits_are_allowed():
-    Life(births=np.bool_(True), lifespan=1, regrowth=np.int64(0), wander=1)
+    Life(births=np.bool_(True), lifespan=1, regrowth=np.int64(0), pile_move_interval=1)
     Pheromone("exponential", 1e-300, 1, "add", 1, 1_000_000)
 
 

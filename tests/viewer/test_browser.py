@@ -601,8 +601,8 @@ def test_nests_have_their_colours_and_their_tables(browser, folder):
 def test_castes_and_kinds_of_food_have_names_colours_and_tables(browser, folder):
     castes = {"nurse": Caste(threshold=Threshold("fixed", value=5)), "scout": Caste(share=0.5)}
     foods = {"seed": Food(deliver=90, regrowth=2), "sap": Food(deliver=40, regrowth=2)}
-    labour = Labour("thresholds", demand=0.05, relief=1, quit=0.5)
-    task = foraging().but(castes=castes, foods=foods, labour=labour, life={"regrowth": None})
+    labour = Labour("thresholds", demand=0.05, relief=1, stop_probability=0.5)
+    task = foraging().replace(castes=castes, foods=foods, labour=labour, life={"regrowth": None})
     world = World((8, 8, 8), (6, 0, 0), [(5, 0, 1), (3, 1, 0), (4, 1, 0)], food_kinds=[0, 1, 1])
     many = Colony(world, task, TrainingConfig("q_learning", 0.2, 0.9, 0.3, 1.0), 3, ants=16)
     many.begin_episode()

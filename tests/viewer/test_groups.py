@@ -21,10 +21,10 @@ CASTES = {
     "guide": Caste(policy="trail_follower"),
 }
 FOODS = {"seed": Food(deliver=90, regrowth=5), "sap": Food(deliver=40, loads=3), "egg": Food()}
-MANY = foraging().but(
+MANY = foraging().replace(
     castes=CASTES,
     foods=FOODS,
-    labour=Labour("thresholds", demand=1.0, relief=1, quit=0.1),
+    labour=Labour("thresholds", demand=1.0, relief=1, stop_probability=0.1),
     life={"regrowth": None},
 )
 WORLD = World(
@@ -131,7 +131,7 @@ def lively(reward, tick):
 @pytest.mark.slow
 def test_frames_have_your_own_rewards():
     rules.register("reward")(lively)
-    task = foraging().but(reward="lively", life={"regrowth": 0})
+    task = foraging().replace(reward="lively", life={"regrowth": 0})
     colony = Colony(worlds.open_world(3, (9, 9, 9)), task, CONFIG, 1, ants=20)
     colony.begin_episode()
     recorder = Recorder(colony)

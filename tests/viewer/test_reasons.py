@@ -32,7 +32,12 @@ def learning(learner: str, epsilon: float = 0.0) -> TrainingConfig:
 COLONIES = {
     "Q-learning": (Task(life=LASTING), "q_learning", "shared", None),
     "SARSA, terminates": (Task(life=LASTING), "sarsa", "shared", None),
-    "SARSA, truncates": (foraging().but(delivery="truncates", life=LASTING), "sarsa", "shared", 0),
+    "SARSA, truncates": (
+        foraging().replace(delivery="truncates", life=LASTING),
+        "sarsa",
+        "shared",
+        0,
+    ),
     "SARSA(λ) alone": (Task(life=LASTING), "sarsa_lambda", "independent", None),
     "a hand-written policy": (Task(), "sarsa", "frozen", trail_follower()),
     "a random policy": (Task(), "sarsa", "frozen", random_policy()),
@@ -143,7 +148,7 @@ def test_a_slip_changes_the_entry_of_the_chosen_action(browser, tmp_path):
 
 
 SHORT = Pheromone("exponential", half_life=4)
-HOME = {"home": Field(laid="without_food", deposit="add", level=100, cap=1000)}
+HOME = {"home": Field(deposited_when="without_food", deposit="add", level=100, cap=1000)}
 # The task, the pheromone that the page shows, and its view for ants without and with food; None if
 # they follow something else.
 SEEN = [
@@ -170,7 +175,7 @@ MEANINGS = """() => viewer.history.frames.flatMap((frame, moment) => {
 
 @pytest.mark.parametrize(("task", "shown", "without", "with_food"), SEEN)
 def test_what_hides_a_trail_is_told(browser, tmp_path, task, shown, without, with_food):
-    task = task.but(life=LASTING)
+    task = task.replace(life=LASTING)
     world, many = worlds.open_world(3, (9, 9, 9)), {"ants": 30, "sharing": "frozen"}
     colony = Colony(world, task, learning("sarsa", 0.3), 1, q_values=trail_follower(), **many)
     colony.begin_episode()

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds, Outcome
+from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
 from taichi_ants.errors import AntsError, count
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Task
@@ -59,7 +59,9 @@ def policy_rows(
     rows = []
     for name, policy in (("random policy", random_policy()), ("trail follower", trail_follower())):
         found = evaluate(world, np.repeat(policy[None], len(seeds), axis=0), **how)
-        outcome = Outcome(*map(float, map(np.mean, (found.returns, found.steps, found.deliveries))))
+        outcome = ExpectedEpisode(
+            *map(float, map(np.mean, (found.returns, found.steps, found.deliveries)))
+        )
         rows.append(Baseline(name, None, *outcome, note))
     return rows
 

@@ -38,7 +38,7 @@ _RELATIVE_TOLERANCE = 1e-12
 _ABSOLUTE_TOLERANCE = 1e-14
 
 
-class Outcome(NamedTuple):
+class ExpectedEpisode(NamedTuple):
     """The expected undiscounted return, steps and deliveries (0 or 1) of an episode."""
 
     episode_return: float
@@ -89,8 +89,8 @@ class EpisodeBounds:
         self._rewards[:, -1] = 0.0
         # Without food.
         trail = in_view(around.trail)
-        lured = (trail >= 1) & (2 * trail >= trail.max(axis=0))
-        moved = np.where(lured, paid.shaping, paid.empty)
+        shows_cue = (trail >= 1) & (2 * trail >= trail.max(axis=0))
+        moved = np.where(shows_cue, paid.shaping, paid.empty)
         follows[:3, :half] = around.moves(around.empty)
         self._rewards[:3, :half] = np.where(in_view(around.empty), moved, paid.failed)
         seen = in_view(food).sum(axis=0)
@@ -117,7 +117,7 @@ class EpisodeBounds:
         columns = np.concatenate([follows[certain], taken])
         self._chances = coo_array((shares, (rows, columns)), shape=(N_ACTIONS * n, n)).tocsr()
 
-    def shortest(self) -> Outcome | None:
+    def shortest(self) -> ExpectedEpisode | None:
         """Return the outcome of the shortest delivery, None if there is no way.
 
         Of several shortest ones, it is the one with the largest return. Random choices among
@@ -134,9 +134,9 @@ class EpisodeBounds:
         if np.isinf(cost):
             return None
         steps = round(cost / _STEP)
-        return Outcome(float(steps * _STEP - cost), float(steps), 1.0)
+        return ExpectedEpisode(float(steps * _STEP - cost), float(steps), 1.0)
 
-    def optimal(self, discount: float, max_steps: int) -> tuple[float, Outcome]:
+    def optimal(self, discount: float, max_steps: int) -> tuple[float, ExpectedEpisode]:
         """Return the largest discounted return without a step limit, and its policy's outcome.
 
         The policy is followed for at most `max_steps` steps. Of several optimal actions, it takes
@@ -175,7 +175,7 @@ class EpisodeBounds:
         states = np.arange(len(policy))
         return self._rewards[policy, states], self._chances[policy * len(policy) + states]
 
-    def _follow(self, policy: np.ndarray, max_steps: int) -> Outcome:
+    def _follow(self, policy: np.ndarray, max_steps: int) -> ExpectedEpisode:
         rewards, moved = self._of(policy)
         moved = moved.T.tocsr()
         at = np.zeros(len(policy))  # the probability of each state
@@ -185,4 +185,4 @@ class EpisodeBounds:
             total += float(rewards @ at)
             steps += 1.0 - float(at[-1])
             at = moved @ at
-        return Outcome(total, steps, float(at[-1]))
+        return ExpectedEpisode(total, steps, float(at[-1]))

@@ -28,7 +28,9 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.world import World
 
-SUPPORTS = COLONY - CASTES - FOODS - {"nests", "life.births", "life.lifespan", "life.wander"}
+SUPPORTS = (
+    COLONY - CASTES - FOODS - {"nests", "life.births", "life.lifespan", "life.pile_move_interval"}
+)
 
 
 @dataclass(frozen=True)

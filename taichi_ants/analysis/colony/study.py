@@ -98,7 +98,7 @@ OF_STUDY: dict[str, str] = {
     **MEASURES,
     "greedy": "deliveries per 1000 ticks without exploration",
     "bound": "most deliveries per 1000 ticks that are possible in the world of the seed",
-    "of_bound": "deliveries as a share of that bound",
+    "bound_share": "deliveries as a share of that bound",
 }
 # Measures of each seed, float64 (seeds,), by their names in `OF_STUDY`.
 Measured = Mapping[Condition, Mapping[str, np.ndarray]]

@@ -113,7 +113,7 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
         for design, by_size in by_design.items():
             delivered = (figure(by_size[n].delivered if n in by_size else None) for n in sizes)
             *_, largest = by_size.values()
-            share, bound = (largest.estimates[name].mean for name in ("of_bound", "bound"))
+            share, bound = (largest.estimates[name].mean for name in ("bound_share", "bound"))
             cells.append([design.words, *delivered, percent(share), figure(bound)])
         if cells:
             headers = ("ants", *map(str, sizes), "share of\nbound", "mean\nbound")
@@ -159,7 +159,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
         if row is None:
             return MISSING
         with_, without = (number(row.estimates[n].mean, digits) for n in ("deliveries", "greedy"))
-        return f"{with_} ({without}), {percent(row.estimates['of_bound'].mean)}"
+        return f"{with_} ({without}), {percent(row.estimates['bound_share'].mean)}"
 
     alone = [Design(rules, study.ALONE) for rules in (study.PAPER, study.ABC)]
     designs = [alone[0], *map(Design, study.RULES), alone[1]]

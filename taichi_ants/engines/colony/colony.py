@@ -18,7 +18,7 @@ from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown
 from taichi_ants.measures.measure import Measure
 from taichi_ants.measures.series import Recorder
-from taichi_ants.protocol import Event
+from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
@@ -96,7 +96,7 @@ class Colony(ColonyState):
         self._stepper.launch(self, "begin")
         self.ready[which] = True
 
-    def begin_some(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
+    def reset_worlds(self, which: np.ndarray, seeds: Sequence[int] | None = None) -> None:
         """Start the next episode of some worlds, bool (W,), while the others continue.
 
         For these worlds it does the same as `end_episode` and `begin_episode`, but does not change
@@ -199,7 +199,7 @@ class Colony(ColonyState):
         *,
         measures: str | Measure | Sequence[str | Measure] = (),
         every: int | None = None,
-        protocol: Event | Sequence[Event] = (),
+        protocol: ProtocolEvent | Sequence[ProtocolEvent] = (),
     ) -> ColonyEpisodes:
         """Return the results of whole episodes with a fixed number of ticks.
 

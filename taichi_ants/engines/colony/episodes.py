@@ -18,11 +18,11 @@ class ColonyEpisodes(Record, Tidy):
     `first_delivery` is -1 if there was none; `blocked` counts failed moves, `carried` the ticks
     with food of all delivered loads, `living` ants at the end. `waiting_births` is the food that is
     not an ant yet at the end, because no cell next to its queen is free or `capacity` ants live.
-    `deliveries_apart` has deliveries by nest and kind of food, (episodes, worlds, nests, kinds),
-    and `caste_deliveries` by caste, (episodes, worlds, castes), with one column for all ants if
-    there are no castes. Returns, moves, blocked and carried are int64, all others int32. `seeds`
-    has the seed of each world. `series` has the values of the measures that you asked `Colony.run`
-    for, else None.
+    `deliveries_by_nest_and_kind` has deliveries by nest and kind of food, (episodes, worlds, nests,
+    kinds), and `caste_deliveries` by caste, (episodes, worlds, castes), with one column for all
+    ants if there are no castes. Returns, moves, blocked and carried are int64, all others int32.
+    `seeds` has the seed of each world. `series` has the values of the measures that you asked
+    `Colony.run` for, else None.
     """
 
     returns: np.ndarray
@@ -37,7 +37,7 @@ class ColonyEpisodes(Record, Tidy):
     deaths: np.ndarray
     regrown: np.ndarray
     living: np.ndarray
-    deliveries_apart: np.ndarray
+    deliveries_by_nest_and_kind: np.ndarray
     caste_deliveries: np.ndarray
     seeds: tuple[int, ...] = ()
     series: Series | None = field(default=None, repr=False)
@@ -45,12 +45,12 @@ class ColonyEpisodes(Record, Tidy):
     @property
     def nest_deliveries(self) -> np.ndarray:
         """Deliveries by nest, (episodes, worlds, nests)."""
-        return self.deliveries_apart.sum(axis=3, dtype=np.int32)
+        return self.deliveries_by_nest_and_kind.sum(axis=3, dtype=np.int32)
 
     @property
     def food_deliveries(self) -> np.ndarray:
         """Deliveries by kind of food, (episodes, worlds, kinds)."""
-        return self.deliveries_apart.sum(axis=2, dtype=np.int32)
+        return self.deliveries_by_nest_and_kind.sum(axis=2, dtype=np.int32)
 
     def counts(self) -> dict[str, np.ndarray]:
         """Return the arrays of all counts of worlds by name."""

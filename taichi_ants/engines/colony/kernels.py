@@ -160,8 +160,8 @@ class Variant:
         self.n_numbers = observation.n_states * ROW  # of a table: state-action pairs, and unused
         self.n_pairs = self.n_numbers * self.n_groups  # of all tables that ants of a world share
         self.is_papers = observation.name == "paper"
-        # The percept is the state index, unless ants misread cells.
-        self.sees_percept = self.is_papers and not self.misreads
+        # The paper's state is the state index, unless ants misread cells.
+        self.sees_paper_state = self.is_papers and not self.misreads
         # Whether the cell of an ant must show that the ant carries food.
         under_carriers = any(features.views[cue] == "strongest_under_carriers" for cue in cues)
         self.sees_ants = not self.is_papers or under_carriers
@@ -172,16 +172,16 @@ class Variant:
             reads_dense = tuple(features.dense[number] for number in self.reads)
             self.view_type = views.view_type(observation, sees_dense, reads_dense)
 
-    def field(self, c: Any, number: int) -> trail.Pheromone:
+    def field(self, c: Any, number: int) -> trail.PheromoneArrays:
         """Return the arrays and numbers of a pheromone; 0 is the trail."""
         own = self.own_deposits[number], self.own_evaporations[number]
         return trail.pheromone_of(c, number, *self.pheromones[number], *own)
 
-    def dense_fields(self, c: Any) -> list[trail.Pheromone]:
+    def dense_fields(self, c: Any) -> list[trail.PheromoneArrays]:
         """Return the arrays and numbers of the dense pheromones."""
         return [self.field(c, k) for k, (dense, _) in enumerate(self.pheromones) if dense]
 
-    def further_fields(self, c: Any) -> list[trail.Pheromone]:
+    def further_fields(self, c: Any) -> list[trail.PheromoneArrays]:
         """Return the arrays and numbers of the pheromones other than the trail."""
         return [self.field(c, number) for number in range(1, len(self.pheromones))]
 
@@ -201,7 +201,7 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
     if v.dense:
         yield Phase(CELLS, trail.evaporate)
         yield Phase(CELLS, trail.diffuse)
-        yield Phase(CELLS, trail.settle)
+        yield Phase(CELLS, trail.apply_diffusion)
     if v.ants_change or v.food_changes or v.reads_stimulus:
         yield Phase(WORLD, life.count)
     if v.ants_change:
@@ -209,7 +209,7 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
         yield Phase(ANTS, life.grow_old)
     if v.food_changes:
         yield Phase(WORLD, life.regrow)
-        yield Phase(WORLD, life.wander)
+        yield Phase(WORLD, life.move_piles)
     yield Phase(ANTS, learning.observe_and_learn)
     yield Phase(WORLD, life.count)
     if v.together:

@@ -5,7 +5,7 @@ max(0, stimulus - relief * deliveries) + demand. Ants respond to the stimulus at
 tick. At a stimulus of 0, no idle ant starts foraging. Otherwise r = threshold / stimulus, and an
 idle ant starts if the high word of its draw is below floor(2^32 / (1 + r^exponent)). All numbers
 are f64, and r^exponent is `numbers.power`, or 0 if r is 0. A forager stops if the high word of its
-draw is below floor(2^32 * quit).
+draw is below floor(2^32 * stop_probability).
 
 The threshold of an ant is f32. It comes from the ant's own stream of (seed, STREAM_TRAIT, number),
 whose draws have the words `high` and `low`. Everything is computed in f64 and rounded at the end:

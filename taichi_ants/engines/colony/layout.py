@@ -13,7 +13,7 @@ INTEGER_COLUMNS = (
     "carried",  # ticks since the pick-up of its food, or, if a field needs it, without food
     "number",  # -1 in a slot that was never used in this episode
     "want",  # the cell to enter or to take food from, else its own; later its previous cell
-    "state",  # the state index, unless it is the percept (it is not if ants misread cells)
+    "state",  # the state index, unless it is the paper's state (it is not if ants misread cells)
     "age",  # in ticks, if ants are born or die
     "reward",  # of the last action, if rewards are by your own rule
 )
@@ -21,7 +21,7 @@ BYTE_COLUMNS = (
     "heading",
     "carries",
     "stage",  # a `Stage`
-    "percept",  # the paper's state, which decides about actions and rewards
+    "paper_state",  # the paper's state, which decides about actions and rewards
     "event",  # the result of the last action, an `Event`
     "action",  # the last action, -1 before the first one; or the next one, if actions are given
     "executed",  # the last action as executed, if actions slip; else it is `action`

@@ -23,16 +23,16 @@ _ONE = 4294967296.0  # fixed-point numbers have 32 binary places
 
 @ti.func
 def see_anew(c: ti.template(), v: ti.template(), w, ant, tick):
-    """Update the percept and the state index of an ant."""
-    percept, state = steps.observe(c, v, w, ant, tick)
-    note_seen(c, v, ant, percept, state)
+    """Update the paper's state and the state index of an ant."""
+    paper_state, state = steps.observe(c, v, w, ant, tick)
+    note_seen(c, v, ant, paper_state, state)
 
 
 @ti.func
-def note_seen(c: ti.template(), v: ti.template(), ant, percept, state):
-    """Store the percept and the state index of an ant."""
-    columns.put(c.percept, ant, percept)
-    if ti.static(not v.sees_percept):
+def note_seen(c: ti.template(), v: ti.template(), ant, paper_state, state):
+    """Store the paper's state and the state index of an ant."""
+    columns.put(c.paper_state, ant, paper_state)
+    if ti.static(not v.sees_paper_state):
         c.state[ant] = state
 
 
@@ -74,19 +74,19 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         acts = acts & (columns.trait(c.idle, ant) == 0)
         if acts:
             stops = labour.stops(c, v, w, ant)
-    percept, state = steps.observe(c, v, w, ant, tick + 1)
+    paper_state, state = steps.observe(c, v, w, ant, tick + 1)
     next_action = -1
     if ti.static(v.has_own_reward):
         c.reward[ant] = 0
         if acts:
-            c.reward[ant] = steps.own_reward(c, v, w, ant, percept, tick)
+            c.reward[ant] = steps.own_reward(c, v, w, ant, paper_state, tick)
             steps.tally(c, Tally.RETURNS, chunk, c.reward[ant])
     if acts & learns(c, v, ant):
         if ti.static(v.draws_next_action):
             if terminates(columns.trait(c.event, ant), c.delivery_terminates) == 0:
                 c.streams[ant] = advance(c.streams[ant])
                 next_action = steps.draw_action(
-                    c, v, w, ant, state, percept, tick + 1, c.streams[ant]
+                    c, v, w, ant, state, paper_state, tick + 1, c.streams[ant]
                 )
         if ti.static(v.alone):
             learn_alone(c, v, ant, state, next_action, tick, stops)
@@ -94,7 +94,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             share_error(c, v, w, chunk, ant, state, next_action)
     if lives:
         c.wants[marked] = 0
-    note_seen(c, v, ant, percept, state)
+    note_seen(c, v, ant, paper_state, state)
     if ti.static(v.has_labour):
         next_action = ti.select(stops, -1, next_action)
         rest(c, v, ant, acts, stops)

@@ -71,7 +71,7 @@ def count_by_nest(c: ti.template(), v: ti.template(), w):
             for chunk in range(w * c.n_chunks, (w + 1) * c.n_chunks):
                 n += c.delivered[chunk * NESTS_BY_KINDS + i]
                 c.delivered[chunk * NESTS_BY_KINDS + i] = 0
-            c.deliveries_apart[column * v.n_kinds + kind] += n
+            c.deliveries_by_nest_and_kind[column * v.n_kinds + kind] += n
             of_nest += n
         c.nests[NestRow.STORE, column] += of_nest * c.births
         if ti.static(v.has_labour):  # once, since it rounds
@@ -223,10 +223,10 @@ def regrow(c: ti.template(), v: ti.template(), w, tick):
 
 
 @ti.func
-def wander(c: ti.template(), v: ti.template(), w, tick):
-    """Move every pile, every `c.wander` ticks."""
-    if c.wander > 0:
-        if (tick + 1) % c.wander == 0:
+def move_piles(c: ti.template(), v: ti.template(), w, tick):
+    """Move every pile, every `c.pile_move_interval` ticks."""
+    if c.pile_move_interval > 0:
+        if (tick + 1) % c.pile_move_interval == 0:
             for pile in range(c.worlds[WorldRow.PILES, w]):
                 move_pile(c, w, pile)
 

@@ -41,25 +41,33 @@ def choice(rule: OwnRule | None) -> Callable[..., Any] | None:
         return None
 
     def choose(
-        c: Any, v: Any, cues: Any, w: Any, ant: Any, state: Any, percept: Any, tick: Any, bits: Any
+        c: Any,
+        v: Any,
+        cues: Any,
+        w: Any,
+        ant: Any,
+        state: Any,
+        paper_state: Any,
+        tick: Any,
+        bits: Any,
     ) -> Any:
-        seen = state if v.is_papers else percept
+        seen = state if v.is_papers else paper_state
         carries = trait(c.carries, ant)
         make = {
             "values": lambda: _values(c, v, w, ant, state),
-            "codes": lambda: _ahead(c, v, cues, w, ant, seen, percept, _CODE),
-            "is_open": lambda: _ahead(c, v, cues, w, ant, seen, percept, _IS_OPEN),
-            "nearer": lambda: _ahead(c, v, cues, w, ant, seen, percept, _NEARER) * carries,
-            "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, percept, tick),
+            "codes": lambda: _ahead(c, v, cues, w, ant, seen, paper_state, _CODE),
+            "is_open": lambda: _ahead(c, v, cues, w, ant, seen, paper_state, _IS_OPEN),
+            "nearer": lambda: _ahead(c, v, cues, w, ant, seen, paper_state, _NEARER) * carries,
+            "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, paper_state, tick),
             "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick),
             "carries": lambda: carries,
-            "percept": lambda: seen,
+            "paper_state": lambda: seen,
             "epsilon": lambda: _share(explore_below_of(c, v, w, ant)),
             "random": lambda: _share(low_word(bits)),
             "random_2": lambda: _share(high_word(bits)),
             **_of_ants(c, v, w, ant, tick),
         }
-        return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, percept, tick))
+        return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, paper_state, tick))
 
     return for_kernels(choose)
 
@@ -71,14 +79,14 @@ def deposit(rule: OwnRule | None) -> Callable[..., Any] | None:
 
     def lay(
         c: Any, v: Any, w: Any, ant: Any, level: Any, place: Any, carried: Any, carries: Any,
-        event: Any, percept: Any, tick: Any,
+        event: Any, paper_state: Any, tick: Any,
     ) -> Any:  # fmt: skip
         make = {
             "level": lambda: level,
             "carried": lambda: carried,
             "carries": lambda: carries,
             "event": lambda: event,
-            "percept": lambda: percept,
+            "paper_state": lambda: paper_state,
             **_of_ants(c, v, w, ant, tick),
         }
         inputs = {
@@ -95,14 +103,14 @@ def reward(rule: OwnRule | None) -> Callable[..., Any] | None:
     if rule is None:
         return None
 
-    def pay(c: Any, v: Any, cues: Any, w: Any, ant: Any, next_percept: Any, tick: Any) -> Any:
-        carries, seen = trait(c.carries, ant), next_percept
+    def pay(c: Any, v: Any, cues: Any, w: Any, ant: Any, next_paper_state: Any, tick: Any) -> Any:
+        carries, seen = trait(c.carries, ant), next_paper_state
         make = {
             "reward": lambda: event_reward(c, v, ant),
             "event": lambda: trait(c.event, ant),
             "carries": lambda: carries,
-            "percept": lambda: trait(c.percept, ant),
-            "next_percept": lambda: next_percept,
+            "paper_state": lambda: trait(c.paper_state, ant),
+            "next_paper_state": lambda: next_paper_state,
             "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, seen, tick + 1),
             "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick + 1),
             **_of_ants(c, v, w, ant, tick),
@@ -121,7 +129,7 @@ def _made(
     w: Any,
     ant: Any,
     seen: Any,
-    percept: Any,
+    paper_state: Any,
     tick: Any,
 ) -> dict[str, Any]:
     """Return the inputs that a rule reads, by name; those that are not in `make` read a field."""
@@ -132,7 +140,7 @@ def _made(
         else:
             if name.startswith(LEVELS):
                 number = v.field_numbers[field_of(name)]
-                inputs[name] = _levels(c, v, cues, w, ant, number, seen, percept, tick)
+                inputs[name] = _levels(c, v, cues, w, ant, number, seen, paper_state, tick)
             else:
                 inputs[name] = _level(c, v, name, _place(c, w, ant), tick)
     return inputs
@@ -185,13 +193,13 @@ def _place(c: ti.template(), w, ant):
 
 @ti.func
 def _ahead(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, seen, percept,
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, seen, paper_state,
     which: ti.template()
 ):  # fmt: skip
     """Return one of the results of `cell_ahead` for the cells ahead, i32 (3,)."""
     found = ti.Vector([0, 0, 0])
     for i in ti.static(range(AHEAD)):
-        code, _, opens, nears = cell_ahead(c, v, cues, w, ant, seen, percept, i)
+        code, _, opens, nears = cell_ahead(c, v, cues, w, ant, seen, paper_state, i)
         if ti.static(which == _CODE):
             found[i] = code
         elif ti.static(which == _IS_OPEN):
@@ -204,7 +212,7 @@ def _ahead(
 @ti.func
 def _levels(
     c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, number: ti.template(), seen,
-    percept, tick
+    paper_state, tick
 ):  # fmt: skip
     """Return the levels ahead of a pheromone, or of the ant's cue for number -1, f64 (3,).
 
@@ -215,7 +223,7 @@ def _levels(
     for i in ti.static(range(AHEAD)):
         place = _place(c, w, ant) + step_towards(c.compass, heading, i)
         shows = (c.ground[place] & 15 == EMPTY) | (c.ground[place] >> 4 != 0)
-        shows = shows & (code_in_view(seen, i) == code_in_view(percept, i))
+        shows = shows & (code_in_view(seen, i) == code_in_view(paper_state, i))
         level = ti.f64(0.0)
         if ti.static(number < 0):
             level = ti.cast(cue_level(c, v, cues, carries, place, tick), ti.f64)

@@ -264,7 +264,7 @@ class ColonyState:
     # the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1; and the
     # state of its random stream, uint64. If actions slip, `actions` are those that ants chose.
     numbers, cells, headings = column("number"), column("cell"), column("heading")
-    percepts, actions, events = column("percept"), column("action"), column("event")
+    paper_states, actions, events = column("paper_state"), column("action"), column("event")
     next_actions, streams = column("next_action"), column("streams")
     _stages, _loads, _states = column("stage"), column("carries"), column("state")
 
@@ -281,7 +281,7 @@ class ColonyState:
     @property
     def states(self) -> np.ndarray:
         """The state index of the last ant in each slot, int32 (W, capacity)."""
-        return (self._states if "state" in self.arrays else self.percepts).astype(np.int32)
+        return (self._states if "state" in self.arrays else self.paper_states).astype(np.int32)
 
     @property
     def executed(self) -> np.ndarray:
@@ -415,12 +415,12 @@ class ColonyState:
         if self.n_nests * self.n_kinds == 1:
             apart = self.deliveries.astype(np.int32)
         else:
-            apart = self.arrays["deliveries_apart"]
+            apart = self.arrays["deliveries_by_nest_and_kind"]
         apart = apart.reshape(-1, self.n_nests, self.n_kinds)
         by_caste = self.arrays.get("caste_deliveries", self.deliveries.astype(np.int32))
         every = {
             **self._counts(),
-            "deliveries_apart": apart,
+            "deliveries_by_nest_and_kind": apart,
             "caste_deliveries": by_caste.reshape(len(self.seeds), -1),
         }
         counts: dict[str, Any] = {name: one[None].copy() for name, one in every.items()}
@@ -706,7 +706,7 @@ class ColonyState:
         return {
             "kind_of": kinds.reshape(-1) if self.n_kinds > 1 else np.zeros(1, np.uint8),
             "loads": here.reshape(-1) if self.task.has_loads else np.zeros(1, np.int32),
-            "deliveries_apart": np.zeros(apart, np.int32),
+            "deliveries_by_nest_and_kind": np.zeros(apart, np.int32),
         }
 
     def _castes_at_start(self, nests: np.ndarray) -> np.ndarray:
@@ -737,7 +737,7 @@ class ColonyState:
         noise = self.task.noise
         unused = set() if noise.slip else {"executed"}
         if self.task.sees.name == "paper" and not noise.misread:
-            unused.add("state")  # the percept is the state
+            unused.add("state")  # the paper's state is the state
         if not self.ants_change:
             unused.add("age")
         if not self.draws_ahead:
@@ -1076,10 +1076,10 @@ def _caste_numbers(task: Task, discount: float) -> np.ndarray:
             discount if one.discount is None else one.discount,
             *(usual[i] if own[i] is None else own[i] for i in range(3)),
             one.policy is None,
-            sum(1 << pheromones.index(name) for name in set(one.laid(pheromones))),
+            sum(1 << pheromones.index(name) for name in set(one.pheromones_laid(pheromones))),
             cues.index(task.cues_of(one)),
             -1 if lifespan is None else lifespan,
-            (labour.quit or 0.0) * one.threshold.exists,
+            (labour.stop_probability or 0.0) * one.threshold.exists,
             *one.threshold.numbers,
         )
     return numbers

@@ -48,7 +48,7 @@ from taichi_ants.engines.colony.trail import (
     level_that_counts,
     occasions_of,
 )
-from taichi_ants.engines.views import judge
+from taichi_ants.engines.views import fill_codes
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.learners.memory import values_of
 from taichi_ants.task.constants import (
@@ -63,7 +63,7 @@ from taichi_ants.task.constants import (
     QUEEN,
     RIGHT,
     ROW,
-    SEES_LURE,
+    SEES_CUE,
 )
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import OCCASIONS
@@ -93,54 +93,56 @@ from taichi_ants.task.rules.random_bits import advance, bits_of, draw_below
 @ti.func
 def state_index_of(c: ti.template(), v: ti.template(), ant):
     """Return the state index of an ant."""
-    state = trait(c.percept, ant)
-    if ti.static(not v.sees_percept):
+    state = trait(c.paper_state, ant)
+    if ti.static(not v.sees_paper_state):
         state = c.state[ant]
     return state
 
 
 @ti.func
 def observe(c: ti.template(), v: ti.template(), w, ant, tick):
-    """Return the percept and the state index of an ant, which may misread cells."""
-    percept, state = 0, 0
+    """Return the paper's state and the state index of an ant, which may misread cells."""
+    paper_state, state = 0, 0
     if ti.static(len(v.cues) == 1):
-        percept, state = observe_by(c, v, ti.static(v.cues[0]), w, ant, tick)
+        paper_state, state = observe_by(c, v, ti.static(v.cues[0]), w, ant, tick)
     else:
         for i in ti.static(range(len(v.cues))):
             if of_caste(c, ant, CasteRow.CUES) == i:
-                percept, state = observe_by(c, v, ti.static(v.cues[i]), w, ant, tick)
-    return percept, state
+                paper_state, state = observe_by(c, v, ti.static(v.cues[i]), w, ant, tick)
+    return paper_state, state
 
 
 @ti.func
 def observe_by(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
-    """Return the percept and the state index of an ant that follows some cues."""
-    percept, state = 0, 0
+    """Return the paper's state and the state index of an ant that follows some cues."""
+    paper_state, state = 0, 0
     if ti.static(v.is_papers):
-        percept = see(c, v, cues, w, ant, tick)
-        state = percept
+        paper_state = see(c, v, cues, w, ant, tick)
+        state = paper_state
         if ti.static(v.misreads):
-            state, c.streams[ant] = noise.misread_percept(percept, c.streams[ant], c.misread_below)
+            state, c.streams[ant] = noise.misread_paper_state(
+                paper_state, c.streams[ant], c.misread_below
+            )
     elif trait(c.carries, ant) == 1:  # compiled twice, each time without what the other load needs
-        percept, state = observe_with(c, v, cues, w, ant, 1, tick)
+        paper_state, state = observe_with(c, v, cues, w, ant, 1, tick)
     else:
-        percept, state = observe_with(c, v, cues, w, ant, 0, tick)
-    return percept, state
+        paper_state, state = observe_with(c, v, cues, w, ant, 0, tick)
+    return paper_state, state
 
 
 @ti.func
 def observe_with(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, carries, tick):
-    """Return the percept and the state index of an ant with food (`carries` is 1) or without."""
+    """Return the paper's state and the state index of an ant with or without food (`carries`)."""
     view = view_around(c, v, cues, w, ant, carries, tick)
-    percept = view.percept  # the true one
+    paper_state = view.paper_state  # the true one
     if ti.static(v.misreads):
         c.streams[ant] = noise.misread_view(view, v.observation, c.streams[ant], c.misread_below)
-    return percept, v.encode(view)
+    return paper_state, v.encode(view)
 
 
 @ti.func
 def see(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
-    """Return the percept, without values that only other observations need."""
+    """Return the paper's state, without values that only other observations need."""
     heading, here = trait(c.heading, ant), w * c.size + c.cell[ant]
     left = here + step_towards(c.compass, heading, LEFT)
     forward = here + step_towards(c.compass, heading, FORWARD)
@@ -148,14 +150,16 @@ def see(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
     queen = own_queen(c, v, w, ant)
     ground_left, ground_forward = looks_of(c, v, left, queen), looks_of(c, v, forward, queen)
     ground_right = looks_of(c, v, right, queen)
-    percept = 0
+    paper_state = 0
     if trait(c.carries, ant) == 1:
         if ti.static(cues.has_compass):
             nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
-            percept = vision.percept_carrying(ground_left, ground_forward, ground_right, nearer)
+            paper_state = vision.paper_state_carrying(
+                ground_left, ground_forward, ground_right, nearer
+            )
         else:
             homing = ti.static(v.field(c, cues.homing))
-            percept = vision.percept_homing(
+            paper_state = vision.paper_state_homing(
                 homing.half,
                 ground_left,
                 ground_forward,
@@ -167,7 +171,7 @@ def see(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
             )
     else:
         outbound = ti.static(v.field(c, cues.outbound))
-        percept = vision.percept_foraging(
+        paper_state = vision.paper_state_foraging(
             cues.half,
             ground_left,
             ground_forward,
@@ -177,7 +181,7 @@ def see(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
             level_in_view(c, outbound, right, tick),
             strongest_of(c, outbound, left, forward, right, tick),
         )
-    return percept
+    return paper_state
 
 
 @ti.func
@@ -238,7 +242,7 @@ def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant,
         if ti.static(v.n_nests > 1):
             ours = held & ANT_STANDS == ANT_STANDS - nest_of(c, v, ant)
             view.ants[k] = ti.select(ours, 1 + (held >> 3), 0)
-            view.strangers[k] = ti.cast((held != 0) & (not ours), ti.i32)
+            view.other_nest_ants[k] = ti.cast((held != 0) & (not ours), ti.i32)
         if ti.static(cues.has_compass):
             view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
         else:
@@ -247,7 +251,7 @@ def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant,
         read_fields(c, v, view, k, place, standable, tick)
     read_own_levels(c, v, view, here, tick)
     view.strongest = strongest_cue(c, v, cues, carries, here, heading, tick)
-    judge(cues.half, cues.homing_view, view, v.observation)
+    fill_codes(cues.half, cues.homing_view, view, v.observation)
     return view
 
 
@@ -327,17 +331,19 @@ def owner_of(c: ti.template(), v: ti.template(), w, ant):
 
 
 @ti.func
-def draw_action(c: ti.template(), v: ti.template(), w, ant, state, percept, tick, random_state):
+def draw_action(c: ti.template(), v: ti.template(), w, ant, state, paper_state, tick, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
     action, bits = 0, bits_of(random_state)
     if ti.static(v.has_own_choice or v.choice == "deneubourg"):
         if ti.static(len(v.cues) == 1):
-            action = draw_by_cues(c, v, ti.static(v.cues[0]), w, ant, state, percept, tick, bits)
+            action = draw_by_cues(
+                c, v, ti.static(v.cues[0]), w, ant, state, paper_state, tick, bits
+            )
         else:
             for i in ti.static(range(len(v.cues))):
                 if of_caste(c, ant, CasteRow.CUES) == i:
                     cues = ti.static(v.cues[i])
-                    action = draw_by_cues(c, v, cues, w, ant, state, percept, tick, bits)
+                    action = draw_by_cues(c, v, cues, w, ant, state, paper_state, tick, bits)
     else:
         table = table_of(c, v, owner_of(c, v, w, ant))
         explore_below = explore_below_of(c, v, w, ant)
@@ -363,48 +369,48 @@ def best_actions_of(c: ti.template(), v: ti.template(), table, state):
 
 @ti.func
 def draw_by_cues(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, percept, tick, bits
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, paper_state, tick, bits
 ):  # fmt: skip
     """Return the ant's action by your own rule, or by the rule "deneubourg"."""
     action = 0
     if ti.static(v.has_own_choice):
-        action = v.own_choice(c, v, cues, w, ant, state, percept, tick, bits)
+        action = v.own_choice(c, v, cues, w, ant, state, paper_state, tick, bits)
     else:
         action = draw_cell(c, v, cues, w, ant, state, bits)
     return action
 
 
 @ti.func
-def own_reward(c: ti.template(), v: ti.template(), w, ant, percept, tick):
-    """Return the reward of an ant by your own rule, i32; `percept` is the new one."""
+def own_reward(c: ti.template(), v: ti.template(), w, ant, paper_state, tick):
+    """Return the reward of an ant by your own rule, i32; `paper_state` is the new one."""
     reward = 0
     if ti.static(len(v.cues) == 1):
-        reward = v.own_reward(c, v, ti.static(v.cues[0]), w, ant, percept, tick)
+        reward = v.own_reward(c, v, ti.static(v.cues[0]), w, ant, paper_state, tick)
     else:
         for i in ti.static(range(len(v.cues))):
             if of_caste(c, ant, CasteRow.CUES) == i:
-                reward = v.own_reward(c, v, ti.static(v.cues[i]), w, ant, percept, tick)
+                reward = v.own_reward(c, v, ti.static(v.cues[i]), w, ant, paper_state, tick)
     return reward
 
 
 @ti.func
 def cell_ahead(
-    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, percept,
+    c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, state, paper_state,
     i: ti.template()
 ):  # fmt: skip
     """Return how an ant sees the cell left (0), forward (1) or right (2) of it, i32 each.
 
-    `state` is the paper's state as the ant sees it, `percept` the true one. A cell with an ant is
-    open if the traffic rules ever let an ant with this load enter it.
+    `state` is the paper's state as the ant sees it, `paper_state` the true one. A cell with an ant
+    is open if the traffic rules ever let an ant with this load enter it.
 
     Returns:
         Its code; 1 if the ant does not misread it; 1 if it is open; 1 if it is nearer to the queen.
     """
     heading, carries = trait(c.heading, ant), trait(c.carries, ant)
     code = vision.code_in_view(state, i)
-    is_true = code == vision.code_in_view(percept, i)
+    is_true = code == vision.code_in_view(paper_state, i)
     opens = ti.cast(is_open(code), ti.i32)
-    nears = ti.cast(code == SEES_LURE, ti.i32) & ti.static(int(cues.has_compass))
+    nears = ti.cast(code == SEES_CUE, ti.i32) & ti.static(int(cues.has_compass))
     place = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
     if is_true & (c.ground[place] >> 4 != 0):  # an ant stands there
         nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
@@ -445,7 +451,11 @@ def draw_cell(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, s
     `state` is the paper's state as the ant sees it. A cell that it misreads looks as if it had no
     trail, and is nearer to the queen if it looks S. With a field as homing cue, no cell is nearer.
     """
-    percept, heading, carries = trait(c.percept, ant), trait(c.heading, ant), trait(c.carries, ant)
+    paper_state, heading, carries = (
+        trait(c.paper_state, ant),
+        trait(c.heading, ant),
+        trait(c.carries, ant),
+    )
     here = w * c.size + c.cell[ant]
     tick = c.worlds[WorldRow.TICKS, w]
     codes, opens, nears = ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0]), ti.Vector([0, 0, 0])
@@ -453,7 +463,9 @@ def draw_cell(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, s
     k = choice_number(c, v, ant, ti.static(CasteRow.K))
     exponent = choice_number(c, v, ant, ti.static(CasteRow.EXPONENT))
     for i in ti.static((LEFT, FORWARD, RIGHT)):
-        codes[i], is_true, opens[i], nears[i] = cell_ahead(c, v, cues, w, ant, state, percept, i)
+        codes[i], is_true, opens[i], nears[i] = cell_ahead(
+            c, v, cues, w, ant, state, paper_state, i
+        )
         place = here + step_towards(c.compass, heading, i)
         level = cue_level(c, v, cues, carries, place, tick)
         weights[i] = attraction(ti.select(is_true == 1, level, 0), k, exponent)
@@ -477,7 +489,7 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
     There are few branches, because the processor cannot predict the actions of ants.
     """
-    action, percept = -1, trait(c.percept, ant)
+    action, paper_state = -1, trait(c.paper_state, ant)
     cell, carries = c.cell[ant], trait(c.carries, ant)
     random_state = c.streams[ant]
     if ti.static(v.is_given_actions):
@@ -492,7 +504,7 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if action < 0:
         random_state = advance(random_state)
         state = state_index_of(c, v, ant)
-        action = draw_action(c, v, w, ant, state, percept, tick, random_state)
+        action = draw_action(c, v, w, ant, state, paper_state, tick, random_state)
     chosen = action
     if ti.static(v.slips):
         if idle == 0:
@@ -500,13 +512,13 @@ def want(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     heading = turned_by(c.compass, trait(c.heading, ant), action)
     step = step_towards(c.compass, heading, FORWARD)
     # Arithmetic, because the compiler makes branches of selections between values in memory.
-    enters = 1 - (vision.code_in_view(percept, action) & 1)
+    enters = 1 - (vision.code_in_view(paper_state, action) & 1)
     if ti.static(v.traffic.shared):
         enters |= ti.cast(holds_nestmate(c, v, ant, w * c.size + cell + step), ti.i32)
     enters &= MOVES >> action
     wanted = cell + enters * step
     mark = v.idle + enters * (conflicts.ENTER + heading - v.idle)
-    foods = vision.goals_in_view(percept) * (1 - carries)  # no branch by `carries`
+    foods = vision.goals_in_view(paper_state) * (1 - carries)  # no branch by `carries`
     if (foods != 0) & (action == PICK_UP):
         position = lowest_bit_number(foods)
         if foods & (foods - 1) != 0:  # several food items in view
@@ -535,11 +547,11 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     depend on the deposits of this tick.
     """
     base, cell, wanted = w * c.size, c.cell[ant], c.want[ant]
-    if ti.static(v.traffic.grant):  # then a pushed ant may need the event, too
+    if ti.static(v.traffic.reward_pushed):  # then a pushed ant may need the event, too
         put(c.event, ant, event_of(c, v, w, ant, tick))
     if wanted != cell:
         if conflicts.prevails(c, v.traffic, base, cell, wanted, tick):
-            if ti.static(not v.traffic.grant):
+            if ti.static(not v.traffic.reward_pushed):
                 put(c.event, ant, event_of(c, v, w, ant, tick))
             c.wants[base + cell] = c.wants[base + cell] | ti.u8(conflicts.WINS)
         else:
@@ -554,9 +566,9 @@ def step_ahead(c: ti.template(), ant):
 
 @ti.func
 def event_of(c: ti.template(), v: ti.template(), w, ant, tick):
-    """Return the event of a successful move; a cell with an ant is a lure if it is better."""
-    action, percept = executed_by(c, v, ant), trait(c.percept, ant)
-    event = move_event(vision.code_in_view(percept, action))
+    """Return the event of a successful move; a cell with an ant shows a cue if it is better."""
+    action, paper_state = executed_by(c, v, ant), trait(c.paper_state, ant)
+    event = move_event(vision.code_in_view(paper_state, action))
     here = w * c.size + c.cell[ant]
     ahead = here + step_ahead(c, ant)
     if conflicts.had_ant(c, ahead):  # rare, so that few trails are read
@@ -567,7 +579,7 @@ def event_of(c: ti.template(), v: ti.template(), w, ant, tick):
             for i in ti.static(range(len(v.cues))):
                 if of_caste(c, ant, CasteRow.CUES) == i:
                     better = is_better(c, v, ti.static(v.cues[i]), w, ant, ahead, here, tick)
-        event = ti.select(better, Event.ENTERED_LURE, Event.ENTERED_EMPTY)
+        event = ti.select(better, Event.ENTERED_CUE, Event.ENTERED_EMPTY)
     return event
 
 
@@ -597,7 +609,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Do the action of an ant: move or pick up if it has won, or deliver; and deposit."""
     base = w * c.size
     trail = ti.static(v.field(c, 0))
-    action, percept = executed_by(c, v, ant), trait(c.percept, ant)
+    action, paper_state = executed_by(c, v, ant), trait(c.paper_state, ant)
     cell, wanted = c.cell[ant], c.want[ant]
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
     moves = MOVES >> action & 1
@@ -605,7 +617,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     event = Event.FAILED + moves * ti.static(Event.BLOCKED - Event.FAILED)
     if ti.static(v.traffic.shared):
         ahead = cell + step_ahead(c, ant)
-        goes, filled, event, entered = conflicts.settle(
+        goes, filled, event, entered = conflicts.resolve_move(
             *(c, v.traffic, base, cell, wanted, ahead, carries, moves == 1, trait(c.event, ant))
         )
         enters = ti.cast(entered, ti.i32)
@@ -615,7 +627,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         # Arithmetic, because the compiler would make branches, which nothing can predict here.
         enters, takes = ti.cast(won, ti.i32) & moves, won & (moves == 0)
         goes = cell + enters * (wanted - cell)
-        event += enters * (vision.code_in_view(percept, action) + Event.ENTERED_EMPTY - event)
+        event += enters * (vision.code_in_view(paper_state, action) + Event.ENTERED_EMPTY - event)
     if not filled:
         c.ground[base + cell] = EMPTY
     c.want[ant] = cell  # the cell with the ant's mark
@@ -626,8 +638,8 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             if ti.static(not v.lays_apart):
                 if lays(c, v, ant, 0):
                     place = base + goes
-                    deposit(c, v, trail, w, ant, place, tick, carried, carries, event, percept)
-        elif can_give(action, percept):
+                    deposit(c, v, trail, w, ant, place, tick, carried, carries, event, paper_state)
+        elif can_give(action, paper_state):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
             put(c.carries, ant, 0)
@@ -642,22 +654,22 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         take_load(c, v, ant, base + wanted, tick)
         if ti.static(not v.lays_apart):
             if lays(c, v, ant, 0):
-                deposit(c, v, trail, w, ant, base + wanted, tick, 0, carries, event, percept)
-                deposit(c, v, trail, w, ant, base + cell, tick, 0, carries, event, percept)
+                deposit(c, v, trail, w, ant, base + wanted, tick, 0, carries, event, paper_state)
+                deposit(c, v, trail, w, ant, base + cell, tick, 0, carries, event, paper_state)
         put(c.heading, ant, turn_round(heading))
     if ti.static(len(v.pheromones) > 1):
         age = ti.select(carries == had_food, age, 0)
-        occasions = occasions_of(had_food, percept, action, event, goes != cell)
+        occasions = occasions_of(had_food, paper_state, action, event, goes != cell)
         if ti.static(v.has_labour):
             occasions *= 1 - trait(c.idle, ant)
         fields = ti.static([] if v.lays_apart else v.further_fields(c))
         for i in ti.static(range(len(fields))):
             if lays(c, v, ant, i + 1):
                 field = ti.static(fields[i])
-                laid = field.laid & occasions  # a single one, see `Field.laid`
+                laid = field.deposited_when & occasions  # a single one, see `Field.deposited_when`
                 lay(
                     *(c, v, field, w, ant, laid, cell, goes, wanted, tick, age),
-                    *(carries, event, percept),
+                    *(carries, event, paper_state),
                 )
         if c.counts_without_food == 1:
             c.carried[ant] = age + 1
@@ -682,24 +694,24 @@ def lays_field(number: int) -> Callable[..., None]:
     @ti.func
     def lay_apart(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         cell, goes, carries = c.want[ant], c.cell[ant], trait(c.carries, ant)
-        event, percept, had_food = trait(c.event, ant), trait(c.percept, ant), carries
+        event, paper_state, had_food = trait(c.event, ant), trait(c.paper_state, ant), carries
         if event == Event.PICKED_UP:
             had_food = 0
         if event == Event.DELIVERED:
             had_food = 1
         age = ti.select(carries == had_food, c.carried[ant] - 1, 0)
-        occasions = occasions_of(had_food, percept, executed_by(c, v, ant), event, goes != cell)
+        occasions = occasions_of(had_food, paper_state, executed_by(c, v, ant), event, goes != cell)
         if ti.static(v.has_labour):
             occasions *= 1 - trait(c.idle, ant)
         food = cell + c.compass[conflicts.heading_taken(c, w * c.size + cell) + 1]
         field = ti.static(v.field(c, number))
         laid = occasions & ti.static(int(OCCASIONS["with_food"]))
         if ti.static(number > 0):
-            laid = occasions & field.laid
+            laid = occasions & field.deposited_when
         if lays(c, v, ant, number):
             lay(
                 *(c, v, field, w, ant, laid, cell, goes, food, tick, age),
-                *(carries, event, percept),
+                *(carries, event, paper_state),
             )
 
     return lay_apart

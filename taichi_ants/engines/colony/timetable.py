@@ -10,8 +10,8 @@ import numpy as np
 from taichi_ants import measures
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
-from taichi_ants.interventions import Policy
-from taichi_ants.protocol import Event, When, check_room, checked_protocol
+from taichi_ants.interventions import SetPolicy
+from taichi_ants.protocol import ProtocolEvent, When, check_room, checked_protocol
 
 if TYPE_CHECKING:
     from taichi_ants.engines.colony.colony import Colony
@@ -30,7 +30,7 @@ class Timetable:
 
     def __init__(self, colony: Colony, protocol: Any, length: int) -> None:
         self._colony, self._events, self._length = colony, checked_protocol(protocol), length
-        self._at: dict[int, list[tuple[int, Event]]] = {}  # by tick: indices and events
+        self._at: dict[int, list[tuple[int, ProtocolEvent]]] = {}  # by tick: indices and events
         for number, event in enumerate(self._events):
             for tick in event.times(length):
                 self._at.setdefault(tick, []).append((number, event))
@@ -63,7 +63,7 @@ class Timetable:
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
         self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
-        replaces = any(isinstance(x, Policy) for one in self._events for x in one.interventions)
+        replaces = any(isinstance(x, SetPolicy) for one in self._events for x in one.interventions)
         self._q = colony.arrays["q"].copy() if replaces else None
 
     def __exit__(self, *_: object) -> None:
@@ -88,7 +88,7 @@ class Timetable:
             stop = next((tick for tick in self._stops if tick > colony.ticks), end)
             yield from stepper.pieces(colony, min(stop, end) - colony.ticks)
 
-    def _happen(self, number: int, event: Event) -> None:
+    def _happen(self, number: int, event: ProtocolEvent) -> None:
         """Let an event happen in the worlds that are running, if its condition holds there."""
         colony = self._colony
         worlds = colony.running.copy()

@@ -24,7 +24,7 @@ _NUMBERS = (
 )
 
 
-class Pheromone(NamedTuple):
+class PheromoneArrays(NamedTuple):
     """A pheromone in kernels: whether it is dense, its view, its arrays, `Pheromone.numbers`."""
 
     dense: bool
@@ -40,7 +40,7 @@ class Pheromone(NamedTuple):
     evaporates: Any
     decay: Any
     share: Any
-    laid: Any  # the occasions of deposits; None for the trail
+    deposited_when: Any  # the occasions of deposits; None for the trail
     own_deposit: Any  # your rules, or None
     own_evaporation: Any
 
@@ -62,17 +62,17 @@ def pheromone_of(
     view: str,
     own_deposit: Callable[..., Any] | None,
     own_evaporation: OwnRule | None,
-) -> Pheromone:
+) -> PheromoneArrays:
     """Return a pheromone with the arrays and numbers of an argument pack."""
     end = f"_{number}" if number else ""
-    return Pheromone(
+    return PheromoneArrays(
         dense,
         view == "half",
         view == "strongest_under_carriers",
         getattr(c, array_of(number, dense)),
         getattr(c, f"spare{end}") if dense else None,
         *(getattr(c, name + end) for name in _NUMBERS),
-        laid=getattr(c, f"laid{end}") if number else None,
+        deposited_when=getattr(c, f"deposited_when{end}") if number else None,
         own_deposit=own_deposit,
         own_evaporation=own_evaporation and own_evaporation.bound(c),
     )
@@ -107,15 +107,17 @@ def level_that_counts(c: ti.template(), field: ti.template(), place, tick):
 @ti.func
 def deposit(
     c: ti.template(), v: ti.template(), field: ti.template(), w, ant, place, tick, carried, carries,
-    event, percept
+    event, paper_state
 ):  # fmt: skip
     """Deposit, by the rule of a pheromone, what an ant lays after some ticks with its load.
 
-    `carries` and `event` are those after the ant's action, `percept` is that before it.
+    `carries` and `event` are those after the ant's action, `paper_state` is that before it.
     """
     if ti.static(field.has_own_deposit):
         level = level_of(field, place, tick)
-        laid = field.own_deposit(c, v, w, ant, level, place, carried, carries, event, percept, tick)
+        laid = field.own_deposit(
+            c, v, w, ant, level, place, carried, carries, event, paper_state, tick
+        )
         if ti.static(field.dense):
             field.levels[place] = ti.cast(laid, ti.f32)
         else:
@@ -129,8 +131,8 @@ def deposit(
 
 
 @ti.func
-def occasions_of(had_food, percept, action, event, has_moved):
-    """Return the occasions of an ant in a tick, by its load and percept before it acted."""
+def occasions_of(had_food, paper_state, action, event, has_moved):
+    """Return the occasions of an ant in a tick, by its load and paper state before it acted."""
     found = 0
     if has_moved:
         found = ti.select(had_food == 1, Occasion.MOVED_WITH_FOOD, Occasion.MOVED_WITHOUT_FOOD)
@@ -139,7 +141,7 @@ def occasions_of(had_food, percept, action, event, has_moved):
     if event == Event.DELIVERED:
         found |= Occasion.DELIVERED
     if had_food == 0:
-        if percept == vision.DEAD_END:
+        if paper_state == vision.DEAD_END:
             found |= Occasion.DEAD_END
         if (action == PICK_UP) & (event == Event.FAILED):
             found |= Occasion.FAILED_PICK_UP
@@ -149,16 +151,16 @@ def occasions_of(had_food, percept, action, event, has_moved):
 @ti.func
 def lay(
     c: ti.template(), v: ti.template(), field: ti.template(), w, ant, laid, cell, goes, food, tick,
-    carried, carries, event, percept
+    carried, carries, event, paper_state
 ):  # fmt: skip
     """Deposit on the cell that an ant leaves or enters, or on its food's, on an occasion `laid`."""
     base = w * c.size
     if laid != 0:
         place = base + ti.select(laid == Occasion.DEAD_END, cell, goes)
-        deposit(c, v, field, w, ant, place, tick, carried, carries, event, percept)
+        deposit(c, v, field, w, ant, place, tick, carried, carries, event, paper_state)
         if laid == Occasion.PICKED_UP:
             food_place = base + food
-            deposit(c, v, field, w, ant, food_place, tick, carried, carries, event, percept)
+            deposit(c, v, field, w, ant, food_place, tick, carried, carries, event, paper_state)
 
 
 @ti.func
@@ -184,7 +186,7 @@ def diffuse(c: ti.template(), v: ti.template(), place, tick):
 
 
 @ti.func
-def settle(c: ti.template(), v: ti.template(), place, tick):
+def apply_diffusion(c: ti.template(), v: ti.template(), place, tick):
     """Set the levels of a cell to the results of `diffuse`."""
     for field in ti.static(v.dense_fields(c)):
         if field.share > 0.0:

@@ -24,9 +24,9 @@ _NO_POLICY = np.zeros(1, np.int64), np.zeros(1, np.uint64), 0.0
 _OF_ANTS: dict[type, tuple[str, ...]] = {
     np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
     + ("final_states", "deliveries", "final_deliveries"),
-    np.uint8: ("commands", "actions", "executed", "headings", "carries", "changed", "percepts")
+    np.uint8: ("commands", "actions", "executed", "headings", "carries", "changed", "paper_states")
     + ("events",)
-    + ("terminations", "truncations", "reasons", "final_percepts"),
+    + ("terminations", "truncations", "reasons", "final_paper_states"),
     np.uint64: ("random_states",),
     np.float64: ("rewards_of",),
 }
@@ -41,11 +41,13 @@ class BatchedEnvironments:
     once. Trails evaporate if `falls`.
 
     Attributes:
-        arrays: Arrays by name, with one row per ant. States: percepts uint8, states int32. Results
+        arrays: Arrays by name, with one row per ant. States: paper states uint8, states int32.
+            Results
             of the last action: rewards_of float64, terminations and truncations uint8, events uint8
             (`Event`), reasons uint8 (`Reason`), executed uint8 if actions slip. Last states of an
-            episode that `step` has restarted: final_states int32, final_percepts uint8. Deliveries
-            of the episode, and of one that `step` has restarted: deliveries, final_deliveries.
+            episode that `step` has restarted: final_states int32, final_paper_states uint8.
+            Deliveries of the episode, and of one that `step` has restarted: deliveries,
+            final_deliveries.
     """
 
     def __init__(

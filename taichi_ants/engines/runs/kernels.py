@@ -30,7 +30,7 @@ from taichi_ants.engines.runs.step import (
     Ant,
     act,
     ground_of,
-    percept_of,
+    paper_state_of,
     restore,
     state_seen,
 )
@@ -116,21 +116,23 @@ def run_kernel(
 
     @ti.func
     def observe(a: ti.template(), base, ant, clock):
-        """Return the percept and the state of an ant, and the stream after possible draws."""
-        percept, state = percept_of(half, a, base, ant, clock), 0
+        """Return the paper's state and the state of an ant, and the stream after possible draws."""
+        paper_state, state = paper_state_of(half, a, base, ant, clock), 0
         after = ant.random_state
         if ti.static(failures.misreads):
-            state, after = state_of(a, base, ant, clock, percept)
+            state, after = state_of(a, base, ant, clock, paper_state)
         else:
-            state = state_of(a, base, ant, clock, percept)
-        return percept, state, after
+            state = state_of(a, base, ant, clock, paper_state)
+        return paper_state, state, after
 
     @ti.func
-    def record(a: ti.template(), n, episode, step, before, percept, taken, executed, after, seen):
+    def record(
+        a: ti.template(), n, episode, step, before, paper_state, taken, executed, after, seen
+    ):
         """Record the integers of a step."""
         a.trace[n, 0], a.trace[n, 1] = episode, step
         a.trace[n, 2], a.trace[n, 3] = before.cell, before.heading
-        a.trace[n, 4], a.trace[n, 5] = percept, taken.state
+        a.trace[n, 4], a.trace[n, 5] = paper_state, taken.state
         a.trace[n, 6], a.trace[n, 7] = taken.action, a.rewards[after.event]
         a.trace[n, 8], a.trace[n, 9] = seen, taken.next_state
         a.trace[n, 10], a.trace[n, 11] = taken.terminated, after.event
@@ -167,7 +169,7 @@ def run_kernel(
                 explore_below = ti.cast(exploration * 4294967296.0, ti.u64)
                 step, clock, total, next_action = 0, 0, 0, -1
                 next_chance = ti.f64(0.0)  # probability of a next action drawn before learning
-                percept, state, ant.random_state = observe(a, base, ant, clock)
+                paper_state, state, ant.random_state = observe(a, base, ant, clock)
                 if ti.static(on_policy):
                     next_action, ant.random_state, next_chance = decide(
                         a, at.table, ant, state, explore_below
@@ -184,7 +186,7 @@ def run_kernel(
                     if ti.static(failures.slips):
                         executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
                     before = ant
-                    ant = act(deposit, True, a, base, ant, percept, executed, clock)
+                    ant = act(deposit, True, a, base, ant, paper_state, executed, clock)
                     clock += a.evaporates
                     reward = a.rewards[ant.event]
                     total += reward
@@ -217,12 +219,12 @@ def run_kernel(
                                     a.trace_tables[n_recorded * table + k] = a.q[at.table + k]
                     if ti.static(traced):
                         record(
-                            *(a, n_recorded, episode, step, before, percept, taken, executed),
+                            *(a, n_recorded, episode, step, before, paper_state, taken, executed),
                             ant,
                             seen,
                         )
                         n_recorded += 1
-                    percept, state = seen, next_state
+                    paper_state, state = seen, next_state
                     step += 1
                 rng = ant.random_state
                 a.outcomes[RETURNS, i, episode], a.outcomes[STEPS, i, episode] = total, step
@@ -288,15 +290,15 @@ def step_kernel(
 
     @ti.func
     def observe(a: ti.template(), i, base, ant, clock):
-        """Store the percept and state of an ant; the cells of its world start at `base`."""
-        percept = percept_of(half, a, base, ant, clock)
-        a.percepts[i] = ti.cast(percept, ti.u8)
+        """Store the paper's state and state of an ant; the cells of its world start at `base`."""
+        paper_state = paper_state_of(half, a, base, ant, clock)
+        a.paper_states[i] = ti.cast(paper_state, ti.u8)
         if ti.static(failures.misreads):
             seeing = ant
             seeing.random_state = a.random_states[i]
-            a.states[i], a.random_states[i] = state_of(a, base, seeing, clock, percept)
+            a.states[i], a.random_states[i] = state_of(a, base, seeing, clock, paper_state)
         else:
-            a.states[i] = state_of(a, base, ant, clock, percept)
+            a.states[i] = state_of(a, base, ant, clock, paper_state)
 
     @ti.func
     def begin(a: ti.template(), i, own, origin):
@@ -325,8 +327,8 @@ def step_kernel(
         # the processor's cache.
         changed = ti.cast(a.changed[i], ti.i32)
         base = ti.select((changed == 1) | (action == PICK_UP), own, origin)
-        clock, percept = a.steps[i] * a.evaporates, ti.cast(a.percepts[i], ti.i32)
-        after = act(deposit, False, a, base, before, percept, action, clock)
+        clock, paper_state = a.steps[i] * a.evaporates, ti.cast(a.paper_states[i], ti.i32)
+        after = act(deposit, False, a, base, before, paper_state, action, clock)
         a.events[i] = ti.cast(after.event, ti.u8)
         a.reasons[i] = ti.cast(reason_of(a, base, before, after, action), ti.u8)
         if after.event == Event.PICKED_UP:
@@ -355,7 +357,7 @@ def step_kernel(
                 if a.commands[i] == Command.STEP:
                     ended = do(a, i, own, origin, ti.cast(a.actions[i], ti.i32))
                     if ended & a.same_step == 1:
-                        a.final_states[i], a.final_percepts[i] = a.states[i], a.percepts[i]
+                        a.final_states[i], a.final_paper_states[i] = a.states[i], a.paper_states[i]
                         a.final_deliveries[i] = a.deliveries[i]
                         begin(a, i, own, origin)
                 elif a.commands[i] == Command.BEGIN:

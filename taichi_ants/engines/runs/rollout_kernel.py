@@ -14,7 +14,7 @@ import taichi as ti
 
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.kernels import Failures
-from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, percept_of, restore, state_seen
+from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, paper_state_of, restore, state_seen
 from taichi_ants.task.constants import PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.task.observations import Observation
@@ -57,13 +57,13 @@ def rollout_kernel(
 
     @ti.func
     def observe(a: ti.template(), base, ant, clock):
-        """Return the percept and the state of an ant, and the stream after possible draws."""
-        percept, state, after = percept_of(half, a, base, ant, clock), 0, ant.random_state
+        """Return the paper's state and the state of an ant, and the stream after possible draws."""
+        paper_state, state, after = paper_state_of(half, a, base, ant, clock), 0, ant.random_state
         if ti.static(failures.misreads):
-            state, after = state_of(a, base, ant, clock, percept)
+            state, after = state_of(a, base, ant, clock, paper_state)
         else:
-            state = state_of(a, base, ant, clock, percept)
-        return percept, state, after
+            state = state_of(a, base, ant, clock, paper_state)
+        return paper_state, state, after
 
     @ti.func
     def take_steps(a: ti.template(), i, first, n_steps, place):
@@ -73,7 +73,7 @@ def rollout_kernel(
         ant.carries, ant.random_state = ti.cast(a.carries[i], ti.i32), a.random_states[i]
         if ti.static(deposit == FADING):
             ant.carried = a.carried[i]
-        percept, state = ti.cast(a.percepts[i], ti.i32), a.states[i]
+        paper_state, state = ti.cast(a.paper_states[i], ti.i32), a.states[i]
         # Until an ant changes its world, it reads cells that all ants share.
         steps, base = a.steps[i], ti.select(a.changed[i] == 1, own, origin)
         deliveries = a.deliveries[i]
@@ -93,14 +93,14 @@ def rollout_kernel(
                 if ti.static(failures.slips):
                     executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
                 into = ti.select(executed == PICK_UP, own, base)
-                ant = act(deposit, False, a, into, ant, percept, executed, steps * a.evaporates)
+                ant = act(deposit, False, a, into, ant, paper_state, executed, steps * a.evaporates)
                 event = ant.event
                 if event == Event.PICKED_UP:  # the store keeps this a branch, which is faster
                     a.changed[i] = ti.cast(1, ti.u8)
                     base = own
                 steps += 1
                 deliveries += ti.cast(event == Event.DELIVERED, ti.i32)
-                percept, state, ant.random_state = observe(a, base, ant, steps * a.evaporates)
+                paper_state, state, ant.random_state = observe(a, base, ant, steps * a.evaporates)
                 last = ti.cast(steps == a.max_steps, ti.i32)
                 terminated, truncated = step_end(
                     event, a.delivery_terminates, a.delivery_truncates, last
@@ -119,7 +119,7 @@ def rollout_kernel(
                 ant = Ant(origin=origin, cell=a.start_cells[i], heading=a.start_headings[i])
                 ant.random_state = stream
                 steps, deliveries, base, command = 0, 0, origin, Command.STEP
-                percept, state, ant.random_state = observe(a, origin, ant, 0)
+                paper_state, state, ant.random_state = observe(a, origin, ant, 0)
                 seen = state
             result = event | terminated * TERMINATED | truncated * TRUNCATED | action << 8
             code = ti.cast(seen, ti.i64) | ti.cast(result, ti.i64) << _RESULT
@@ -128,7 +128,7 @@ def rollout_kernel(
         a.carries[i], a.random_states[i] = ti.cast(ant.carries, ti.u8), ant.random_state
         if ti.static(deposit == FADING):
             a.carried[i] = ant.carried
-        a.percepts[i], a.states[i] = ti.cast(percept, ti.u8), state
+        a.paper_states[i], a.states[i] = ti.cast(paper_state, ti.u8), state
         a.steps[i], a.deliveries[i], a.commands[i] = steps, deliveries, ti.cast(command, ti.u8)
         ended = ti.cast(command != Command.STEP, ti.u8)  # for `LoneAnts.over`
         a.terminations[i], a.truncations[i] = ended, ended

@@ -7,7 +7,7 @@ from typing import Any
 import taichi as ti
 from taichi.math import popcnt
 
-from taichi_ants.engines.views import encode_function, judge, view_type
+from taichi_ants.engines.views import encode_function, fill_codes, view_type
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task.constants import FORWARD, LEFT, PICK_UP, RIGHT
 from taichi_ants.task.events import Event
@@ -67,21 +67,21 @@ def ground_of(packed):
 
 
 @ti.func
-def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
-    """Return the percept of the ant at `clock`; the cells of its run start at `base`."""
+def paper_state_of(half: ti.template(), a: ti.template(), base, ant, clock):
+    """Return the paper's state of the ant at `clock`; the cells of its run start at `base`."""
     here = base + ant.cell
     left = a.cells[here + step_towards(a.compass, ant.heading, LEFT)]
     forward = a.cells[here + step_towards(a.compass, ant.heading, FORWARD)]
     right = a.cells[here + step_towards(a.compass, ant.heading, RIGHT)]
-    percept = 0
+    paper_state = 0
     if ant.carries == 1:
         nearer = vision.nearer_from(a.closer[ant.origin + ant.cell], ant.heading)
-        percept = vision.percept_carrying(
+        paper_state = vision.paper_state_carrying(
             ground_of(left), ground_of(forward), ground_of(right), nearer
         )
     else:
         trail_left, trail_forward, trail_right = left - clock, forward - clock, right - clock
-        percept = vision.percept_foraging(
+        paper_state = vision.paper_state_foraging(
             half,
             ground_of(left),
             ground_of(forward),
@@ -91,18 +91,18 @@ def percept_of(half: ti.template(), a: ti.template(), base, ant, clock):
             trail_right,
             ti.max(trail_left, ti.max(trail_forward, trail_right)),
         )
-    return percept
+    return paper_state
 
 
 @cache
 def state_seen(observation: Observation, half: bool, misreads: bool = False) -> Callable[..., Any]:
-    """Return a `ti.func` (a, base, ant, clock, percept) that returns the ant's state index.
+    """Return a `ti.func` (a, base, ant, clock, paper_state) that returns the ant's state index.
 
     With `misreads`, it may misread cells, and returns the state index and the random stream after
     the draws; see `rules.noise`.
     """
     if observation.name == "paper":  # no view is needed
-        return _percept_misread if misreads else _percept_itself
+        return _paper_state_misread if misreads else _paper_state_itself
     in_view = observation.cells
     left, forward, right = observation.ahead
     view_of, encode = view_type(observation, False), encode_function(observation)
@@ -120,15 +120,15 @@ def state_seen(observation: Observation, half: bool, misreads: bool = False) -> 
             view.codes[k] = ground_of(cell)
         ahead = ti.max(view.levels[left], view.levels[forward])
         view.strongest = ti.max(ahead, view.levels[right])
-        judge(half, "", view, observation)
+        fill_codes(half, "", view, observation)
         return view
 
     @ti.func
-    def see_state(a: ti.template(), base, ant, clock, percept):
+    def see_state(a: ti.template(), base, ant, clock, paper_state):
         return encode(see(a, base, ant, clock))
 
     @ti.func
-    def misread_state(a: ti.template(), base, ant, clock, percept):
+    def misread_state(a: ti.template(), base, ant, clock, paper_state):
         view = see(a, base, ant, clock)
         after = noise.misread_view(view, observation, ant.random_state, a.misread_below)
         return encode(view), after
@@ -137,13 +137,13 @@ def state_seen(observation: Observation, half: bool, misreads: bool = False) -> 
 
 
 @ti.func
-def _percept_itself(a: ti.template(), base, ant, clock, percept):
-    return percept
+def _paper_state_itself(a: ti.template(), base, ant, clock, paper_state):
+    return paper_state
 
 
 @ti.func
-def _percept_misread(a: ti.template(), base, ant, clock, percept):
-    return noise.misread_percept(percept, ant.random_state, a.misread_below)
+def _paper_state_misread(a: ti.template(), base, ant, clock, paper_state):
+    return noise.misread_paper_state(paper_state, ant.random_state, a.misread_below)
 
 
 @ti.func
@@ -153,7 +153,7 @@ def act(
     a: ti.template(),
     base,
     ant,
-    percept,
+    paper_state,
     action,
     clock,
 ):
@@ -163,7 +163,7 @@ def act(
     """
     after = ant
     after.event = Event.FAILED
-    code = vision.code_in_view(percept, action)
+    code = vision.code_in_view(paper_state, action)
     if ti.static(predictable):
         if action <= RIGHT:
             after.heading = turn(a.compass, ant.heading, action)
@@ -173,7 +173,7 @@ def act(
                 if ant.carries == 1:
                     lay_behind(deposit, a, base, after.cell, clock, ant.carried)
         else:
-            after = pick_up_or_give(deposit, a, base, ant, percept, action, clock)
+            after = pick_up_or_give(deposit, a, base, ant, paper_state, action, clock)
     else:
         moves = MOVES >> action & 1
         enters = moves & ti.cast(is_open(code), ti.i32)
@@ -182,8 +182,8 @@ def act(
         after.cell += enters * step_towards(a.compass, after.heading, FORWARD)
         if enters & ant.carries == 1:
             lay_behind(deposit, a, base, after.cell, clock, ant.carried)
-        if (moves == 0) & vision.sees_goal(percept):
-            after = pick_up_or_give(deposit, a, base, ant, percept, action, clock)
+        if (moves == 0) & vision.sees_goal(paper_state):
+            after = pick_up_or_give(deposit, a, base, ant, paper_state, action, clock)
     if ti.static(deposit == FADING):
         after.carried = (ant.carried + 1) * after.carries
     return after
@@ -197,9 +197,11 @@ def lay_behind(deposit: ti.template(), a: ti.template(), base, cell, clock, carr
 
 
 @ti.func
-def pick_up_or_give(deposit: ti.template(), a: ti.template(), base, ant, percept, action, clock):
+def pick_up_or_give(
+    deposit: ti.template(), a: ti.template(), base, ant, paper_state, action, clock
+):
     """Return the ant after an action that is not a move, with the event; see `act`."""
-    after, goals = ant, vision.goals_in_view(percept)
+    after, goals = ant, vision.goals_in_view(paper_state)
     after.event = Event.FAILED
     if goals != 0 and action == PICK_UP and ant.carries == 0:
         position = lowest_bit_number(goals)
@@ -213,7 +215,7 @@ def pick_up_or_give(deposit: ti.template(), a: ti.template(), base, ant, percept
         after.heading = turn_round(ant.heading)
         after.carries = 1
         after.event = Event.PICKED_UP
-    elif ant.carries == 1 and can_give(action, percept):
+    elif ant.carries == 1 and can_give(action, paper_state):
         after.carries = 0
         after.heading = heading_after_delivery(ant.heading, a.turns_at_queen)
         after.event = Event.DELIVERED

@@ -29,7 +29,7 @@ MAX_TABLE_ROWS = 12_800_000  # of 32 bytes each; a trace keeps the table after e
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
+class RolloutArguments:
     """The arguments of `rollout` or `trace_training` that reproduce a trace.
 
     `q_values`, float (n_states, 5), is the table that the ant followed with `epsilon`; None if the
@@ -55,11 +55,11 @@ class Trace(Record):
         steps: Number of the step in its episode, from 0.
         cells: int32 (n, 3), cube coordinates in normal form.
         headings: Heading of the ant, 0 to 5.
-        percepts, states: Percept, see `taichi_ants.task.states`; state index, which is the percept
-            with the paper's observation.
+        paper_states, states: The paper's state, see `taichi_ants.task.states`; state index, which
+            is the same with the paper's observation.
         actions, rewards, events: Action, 0 to 4; its reward; its result, see `Event`.
         executed: Action as executed, which differs from the chosen one only if actions slip.
-        next_percepts, next_states: Percept and state index after the step.
+        next_paper_states, next_states: The paper's state and state index after the step.
         terminated: bool (n,), whether the learner treated the next state as terminal.
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), the TD error of the step; None without learning.
@@ -71,11 +71,11 @@ class Trace(Record):
     steps: np.ndarray
     cells: np.ndarray
     headings: np.ndarray
-    percepts: np.ndarray
+    paper_states: np.ndarray
     states: np.ndarray
     actions: np.ndarray
     rewards: np.ndarray
-    next_percepts: np.ndarray
+    next_paper_states: np.ndarray
     next_states: np.ndarray
     terminated: np.ndarray
     events: np.ndarray
@@ -83,7 +83,7 @@ class Trace(Record):
     td_errors: np.ndarray | None = None
     tables: np.ndarray | None = None
     executed: np.ndarray | None = None
-    made: Made | None = field(default=None, compare=False, repr=False)
+    made: RolloutArguments | None = field(default=None, compare=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -115,7 +115,9 @@ def rollout(
     numbers = np.array([checked_whole("number", number, least=0)])
     epsilon = arguments.checked_share("epsilon", epsilon)
     trace = _trace(world, task, Runs.following(table[None], seeds, numbers, epsilon), max_steps)
-    made = Made(world, task, int(seeds[0]), max_steps, int(numbers[0]), table.copy(), epsilon)
+    made = RolloutArguments(
+        world, task, int(seeds[0]), max_steps, int(numbers[0]), table.copy(), epsilon
+    )
     return replace(trace, made=made)
 
 
@@ -166,7 +168,9 @@ def trace_training(
     state = RunState.fresh(several, seeds.tolist(), task.n_states).part([0])
     runs = Runs.learning(several, seeds.tolist(), state)
     trace = _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
-    return replace(trace, made=Made(world, task, int(seeds[0]), max_steps, config=several[0]))
+    return replace(
+        trace, made=RolloutArguments(world, task, int(seeds[0]), max_steps, config=several[0])
+    )
 
 
 def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int = 1) -> Trace:

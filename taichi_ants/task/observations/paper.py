@@ -6,7 +6,7 @@ from taichi_ants.task.states import state_name
 
 def encode(view):
     """Return the paper's state index."""
-    return view.percept
+    return view.paper_state
 
 
 PAPER = Observation(

@@ -1,7 +1,7 @@
 """The registry of observations.
 
 An observation determines the state index of an ant. Actions and rewards do not depend on it, but
-on the percept, the paper's state. To add an observation to the package, write a file in this folder
+on the paper's state. To add an observation to the package, write a file in this folder
 and add it to `__init__.py`. To add your own observation, call `register` from a plugin file.
 """
 
@@ -25,13 +25,22 @@ from taichi_ants.errors import (
     unusable,
     whole,
 )
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_LURE
+from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_CUE
 
 # Tables of this many rows have 5 * 2**20 values; kernels index several tables with 32 bits.
 MAX_STATES = 1 << 20
 AHEAD = (-1, 0, 1)
 _VIEW = (
-    *("carries", "percept", "codes", "levels", "ants", "strangers", "nearer", "strongest"),
+    *(
+        "carries",
+        "paper_state",
+        "codes",
+        "levels",
+        "ants",
+        "other_nest_ants",
+        "nearer",
+        "strongest",
+    ),
     "own_level",
 )
 _TAKEN = (*_VIEW, "entries", "keys", "items")  # methods of a view in kernels
@@ -45,11 +54,11 @@ class Observation:
     The view of an ant has these whole numbers, except that levels are floats if trails evaporate
     exponentially or spread. Those marked (k) have an entry for each cell in `cells`.
 
-    - `carries`: 1 with food, else 0; `percept`: the paper's state, 0 to 127.
+    - `carries`: 1 with food, else 0; `paper_state`: the paper's state, 0 to 127.
     - `codes` (k): 0 E, 1 O, 2 T or S, 3 F or Q, relative to the strongest trail ahead.
     - `levels` (k): The trail level if the cell is empty or has an ant on it, else 0.
     - `ants` (k): 0 for no ant, 1 for an ant without food, 2 for an ant with food.
-    - `strangers` (k): 1 if an ant of another nest is on the cell, where `ants` is 0.
+    - `other_nest_ants` (k): 1 if an ant of another nest is on the cell, where `ants` is 0.
     - `nearer` (k): 1 if the cell is nearer to the queen than the ant's own.
     - `strongest`: The level of the strongest trail ahead; `own_level`: the ant's own cell.
     - `NAME` (k), for each NAME in `reads`: The level of this field, like `levels`; `own_NAME`: that
@@ -231,19 +240,19 @@ def _drawn_views(observation: Observation) -> Iterator[_View]:
         visible = trail * (ground[n] == EMPTY)
         strongest = visible[ahead].max()
         if carries[n]:
-            lure, codes = (ground[n] == EMPTY) & (nearer[n] == 1), ground[n] >> 2
+            shows_cue, codes = (ground[n] == EMPTY) & (nearer[n] == 1), ground[n] >> 2
         else:
-            lure, codes = 2 * visible >= max(strongest, 2), ground[n] & 3
-        codes[lure] = SEES_LURE
+            shows_cue, codes = 2 * visible >= max(strongest, 2), ground[n] & 3
+        codes[shows_cue] = SEES_CUE
         left, forward, right = codes[ahead]
         yield _View(
             carries=carries[n],
-            percept=carries[n] << 6 | left << 4 | forward << 2 | right,
+            paper_state=carries[n] << 6 | left << 4 | forward << 2 | right,
             codes=_Vector(codes),
             levels=_Vector(levels),
             strongest=strongest,
             ants=_Vector(ants[n]),
-            strangers=_Vector((ants[n] == 0) & (ground[n] == OBSTACLE) & (trails[n] > 1)),
+            other_nest_ants=_Vector((ants[n] == 0) & (ground[n] == OBSTACLE) & (trails[n] > 1)),
             nearer=_Vector(nearer[n]),
             own_level=trail[0],
             **{name: _Vector(np.roll(levels, 1 + r)) for r, name in enumerate(observation.reads)},

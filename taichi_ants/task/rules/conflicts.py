@@ -152,7 +152,7 @@ def gives_way(c: ti.template(), traffic: ti.template(), base, cell):
 
 
 @ti.func
-def settle(
+def resolve_move(
     c: ti.template(), traffic: ti.template(), base, cell, wanted, ahead, carries, moves, entered
 ):
     """Return the result of a tick for an ant.
@@ -187,7 +187,7 @@ def settle(
                 if follower >= 0:
                     if c.wants[base + follower] & HAS_FOOD != 0:
                         goes, filled, event = follower, True, Event.PUSHED
-                        if ti.static(traffic.grant):
+                        if ti.static(traffic.reward_pushed):
                             if moves & (ahead == follower):
                                 enters, event = True, entered
     return goes, filled, event, enters

@@ -13,9 +13,9 @@ from taichi_ants.task.rules.vision import goals_in_view
 
 
 @ti.func
-def can_give(action, percept):
+def can_give(action, paper_state):
     """Return whether an ant with food delivers it: its action is GIVE, and it sees the queen."""
-    return (action == GIVE) & (goals_in_view(percept) != 0)
+    return (action == GIVE) & (goals_in_view(paper_state) != 0)
 
 
 @ti.func

@@ -34,12 +34,12 @@ def misread_code(code, random_state, misread_below):
 
 
 @ti.func
-def misread_percept(percept, random_state, misread_below):
-    """Return the percept with misread codes, and the stream after its three draws."""
-    left, after = misread_code(code_in_view(percept, 0), random_state, misread_below)
-    forward, later = misread_code(code_in_view(percept, 1), after, misread_below)
-    right, last = misread_code(code_in_view(percept, 2), later, misread_below)
-    return state_index(percept >> 6, left, forward, right), last
+def misread_paper_state(paper_state, random_state, misread_below):
+    """Return the paper's state with misread codes, and the stream after its three draws."""
+    left, after = misread_code(code_in_view(paper_state, 0), random_state, misread_below)
+    forward, later = misread_code(code_in_view(paper_state, 1), after, misread_below)
+    right, last = misread_code(code_in_view(paper_state, 2), later, misread_below)
+    return state_index(paper_state >> 6, left, forward, right), last
 
 
 def entry_of(view: Any, name: str) -> Any:
@@ -56,19 +56,19 @@ def misread_view(view: ti.template(), observation: ti.template(), random_state, 
     """Misread the cells of a view, and return the stream after a draw for each.
 
     A misread cell has another code, no ant, no trail, no further field, and is not nearer to the
-    queen. The percept of the view consists of the codes seen. The strongest level ahead does not
-    change.
+    queen. The paper's state of the view consists of the codes seen. The strongest level ahead does
+    not change.
     """
     after = random_state
     for k in ti.static(range(len(observation.cells))):
         code, after = misread_code(view.codes[k], after, misread_below)
         if code != view.codes[k]:
             view.codes[k], view.levels[k], view.nearer[k] = code, 0, 0
-            view.ants[k], view.strangers[k] = 0, 0
+            view.ants[k], view.other_nest_ants[k] = 0, 0
             for i in ti.static(range(len(observation.reads))):
                 entry_of(view, observation.reads[i])[k] = 0
     left, forward, right = ti.static(observation.ahead)
-    view.percept = state_index(
+    view.paper_state = state_index(
         view.carries, view.codes[left], view.codes[forward], view.codes[right]
     )
     return after

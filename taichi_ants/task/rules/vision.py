@@ -1,9 +1,9 @@
-"""The percept of an ant: its load and the codes of the three cells ahead, as an index 0 to 127."""
+"""The paper's state of an ant, 0 to 127: its load and the codes of the three cells ahead."""
 
 import taichi as ti
 
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import EMPTY, SEES_LURE, SEES_OBSTACLE
+from taichi_ants.task.constants import EMPTY, SEES_CUE, SEES_OBSTACLE
 
 DEAD_END = SEES_OBSTACLE << 4 | SEES_OBSTACLE << 2 | SEES_OBSTACLE  # of an ant without food
 
@@ -12,15 +12,15 @@ DEAD_END = SEES_OBSTACLE << 4 | SEES_OBSTACLE << 2 | SEES_OBSTACLE  # of an ant 
 def see_by_level(half: ti.template(), code, level, strongest):
     """Return the code of a cell for an ant that follows a pheromone; `code` is 0 if it is empty.
 
-    An empty cell is a lure if its `level` is at least 1 and at least the `strongest` in view, or
+    An empty cell shows a cue if its `level` is at least 1 and at least the `strongest` in view, or
     half of it if `half`. The level of cells that are not empty is 0 or less.
     """
-    lure = 0
+    shows_cue = 0
     if ti.static(half):
-        lure = ti.cast(2 * level >= ti.max(strongest, 2), ti.i32)
+        shows_cue = ti.cast(2 * level >= ti.max(strongest, 2), ti.i32)
     else:
-        lure = ti.cast(level >= ti.max(strongest, 1), ti.i32)
-    return code | lure * SEES_LURE
+        shows_cue = ti.cast(level >= ti.max(strongest, 1), ti.i32)
+    return code | shows_cue * SEES_CUE
 
 
 @ti.func
@@ -32,14 +32,14 @@ def see_foraging(half: ti.template(), ground, level, strongest):
 @ti.func
 def see_carrying(ground, nearer):
     """Return the code of a cell for an ant with food; `nearer` is 1 if nearer to the queen."""
-    return ground >> 2 | (ti.cast(ground == EMPTY, ti.i32) & nearer) * SEES_LURE
+    return ground >> 2 | (ti.cast(ground == EMPTY, ti.i32) & nearer) * SEES_CUE
 
 
 @ti.func
-def percept_foraging(
+def paper_state_foraging(
     half: ti.template(), left, forward, right, trail_left, trail_forward, trail_right, strongest
 ):
-    """Return the percept of an ant without food, by the contents and levels of three cells."""
+    """Return the paper's state of an ant without food, by contents and levels of three cells."""
     return state_index(
         0,
         see_foraging(half, left, trail_left, strongest),
@@ -49,10 +49,10 @@ def percept_foraging(
 
 
 @ti.func
-def percept_homing(
+def paper_state_homing(
     half: ti.template(), left, forward, right, trail_left, trail_forward, trail_right, strongest
 ):
-    """Return the percept of an ant with food that follows a pheromone, see `percept_foraging`."""
+    """Return the paper's state of an ant with food that follows a pheromone."""
     return state_index(
         1,
         see_by_level(half, left >> 2, trail_left, strongest),
@@ -62,8 +62,8 @@ def percept_homing(
 
 
 @ti.func
-def percept_carrying(left, forward, right, nearer):
-    """Return the percept of an ant with food; `nearer` is the result of `nearer_from`."""
+def paper_state_carrying(left, forward, right, nearer):
+    """Return the paper's state of an ant with food; `nearer` is the result of `nearer_from`."""
     return state_index(
         1,
         see_carrying(left, nearer >> (N_HEADINGS - 1) & 1),

@@ -10,7 +10,7 @@ from plain_runs import rollout
 from plain_search import PlainWorld, search_all_sequences, search_optimal, search_shortest
 
 from taichi_ants.analysis.bounds import episodes
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds, Outcome
+from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import random_policy, trail_follower
@@ -19,7 +19,7 @@ from taichi_ants.worlds import paper
 from taichi_ants.worlds.world import World
 
 
-def assert_outcome(outcome: Outcome, expected: Outcome) -> None:
+def assert_outcome(outcome: ExpectedEpisode, expected: ExpectedEpisode) -> None:
     assert outcome == pytest.approx(expected)
 
 
@@ -73,7 +73,7 @@ def test_the_shortest_delivery_is_that_of_all_sequences_of_actions() -> None:
     # Queen, ant, trail, food in a row; the ant faces away from the queen.
     world = World((4, 1, 1), (0, 0, 0), [(3, 0, 0)], trails=[((2, 0, 0), 1)], ants=[((1, 0, 0), 0)])
     shortest = search_all_sequences(PlainWorld(world), 6)
-    assert bounds_of(world).shortest() == Outcome(*shortest) == Outcome(15, 4, 1)
+    assert bounds_of(world).shortest() == ExpectedEpisode(*shortest) == ExpectedEpisode(15, 4, 1)
 
 
 # The world of the paper. On the line of the cells (i, 0, 0) the queen is at i = -9, the ant at
@@ -81,7 +81,7 @@ def test_the_shortest_delivery_is_that_of_all_sequences_of_actions() -> None:
 # food, 16 cells away at least, pick up (1), come back to a neighbour of the queen, 16 cells again,
 # and give (1): 34 steps. On the line that works, as a pick-up turns the ant round. Each move earns
 # at most 1, and on the line it does: 16 + 3 + 16 + 10 = 45.
-PAPERS_SHORTEST = Outcome(45, 34, 1)
+PAPERS_SHORTEST = ExpectedEpisode(45, 34, 1)
 
 
 def test_the_shortest_delivery_in_the_world_of_the_paper() -> None:
@@ -100,7 +100,7 @@ def test_a_large_discount_factor_makes_the_ant_walk_the_trail_forever() -> None:
     # nothing, the fifth comes back to the trail two cells before the turn, and 14 more lead to the
     # other end. So 19 steps earn 15: 600 = 16 + 30 * 19 + 14 steps earn 16 + 30 * 15 + 10.
     value, outcome = bounds_of(paper()).optimal(0.99, 600)
-    assert outcome == Outcome(476, 600, 0)
+    assert outcome == ExpectedEpisode(476, 600, 0)
     turn_and_way = 0.99**4 * (1 - 0.99**15) / (1 - 0.99) / (1 - 0.99**19)
     first_way = (1 - 0.99**16) / (1 - 0.99)
     assert value == pytest.approx(first_way + 0.99**16 * turn_and_way)
@@ -150,9 +150,9 @@ def test_a_pick_up_of_one_of_two_foods_is_luck_for_the_shortest_chance_for_the_b
         obstacles=[(0, 1, 0), (1, 1, 0), (3, 0, 0), (3, 1, 0)],
         ants=[((2, 0, 0), 3)],
     )
-    assert bounds_of(world).shortest() == Outcome(12, 5, 1)
+    assert bounds_of(world).shortest() == ExpectedEpisode(12, 5, 1)
     value, outcome = bounds_of(world).optimal(0.5, 6)
-    assert outcome == Outcome((12 + 0) / 2, (5 + 6) / 2, 0.5)
+    assert outcome == ExpectedEpisode((12 + 0) / 2, (5 + 6) / 2, 0.5)
     food_1 = -1 - 0.5 + 0.25 * 1 + 0.125 * 10
     cycle = (-1 - 0.5) / (1 - 0.125)
     food_2 = -1 + 0.25 * cycle
@@ -196,7 +196,7 @@ def test_a_food_behind_another_is_never_reached() -> None:
     alone = World((4, 1, 1), (0, 0, 0), [(2, 0, 0)], [(3, 0, 0)], ants=[((1, 0, 0), 0)])
     value, outcome = bounds_of(world).optimal(0.9, 10)
     assert (pytest.approx(value), outcome) == bounds_of(alone).optimal(0.9, 10)
-    assert bounds_of(world).shortest() == bounds_of(alone).shortest() == Outcome(13, 2, 1)
+    assert bounds_of(world).shortest() == bounds_of(alone).shortest() == ExpectedEpisode(13, 2, 1)
 
 
 @pytest.mark.parametrize("foods", [[], [(5, 0, 0)]])
@@ -211,8 +211,8 @@ def test_a_world_without_a_delivery_has_no_shortest_one(foods: list) -> None:
 def test_equal_actions_are_decided_by_the_lowest_number() -> None:
     # Three cells in a row: the ant in the middle between queen and rock can only fail, for ever.
     world = World((3, 1, 1), (0, 0, 0), obstacles=[(2, 0, 0)], ants=[((1, 0, 0), 0)])
-    assert bounds_of(world).optimal(0.0, 7) == (-1, Outcome(-7, 7, 0))
-    assert bounds_of(world).optimal(0.9, 7) == (pytest.approx(-10), Outcome(-7, 7, 0))
+    assert bounds_of(world).optimal(0.0, 7) == (-1, ExpectedEpisode(-7, 7, 0))
+    assert bounds_of(world).optimal(0.9, 7) == (pytest.approx(-10), ExpectedEpisode(-7, 7, 0))
 
 
 def test_an_ant_that_is_not_listed_starts_by_the_seed_zero() -> None:

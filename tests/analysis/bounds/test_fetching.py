@@ -15,7 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from taichi_ants import Task, worlds
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds, Outcome
+from taichi_ants.analysis.bounds.episodes import EpisodeBounds, ExpectedEpisode
 from taichi_ants.analysis.bounds.surroundings import in_view, look_around
 from taichi_ants.worlds import World
 
@@ -53,7 +53,7 @@ def test_the_best_policy_delivers_at_every_discount(name: str, steps: int) -> No
     world = worlds.build(name)
     bounds = EpisodeBounds(world, FETCHING)
     assert delivering_pays(world)
-    assert bounds.shortest() == Outcome(13, steps, 1)
+    assert bounds.shortest() == ExpectedEpisode(13, steps, 1)
     for discount in (0.9, 0.95, 0.99, 0.999) if name == "paper" else (0.9, 0.999):
         assert bounds.optimal(discount, 600)[1] == pytest.approx((13, steps, 1))
 

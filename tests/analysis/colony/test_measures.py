@@ -144,7 +144,7 @@ def test_each_world_has_a_bound_of_its_own() -> None:
     study = build(noise=0, seeds=10, sizes=(8,))
     for measures in study.values():
         measures["bound"] = np.linspace(100, 300, 10)
-        measures["of_bound"] = measures["deliveries"] / measures["bound"]
+        measures["bound_share"] = measures["deliveries"] / measures["bound"]
     table = glance(condition_rows(study))
     name, cell = table.rows[-1]
     assert (name, cell) == ("Mean bound, right of way [range]", "200 [100, 300]")

@@ -202,7 +202,7 @@ NESTS = [
     ("dyna_q", "shared", "queues", False, "following", "strongest_under_carriers", 3, 2, True),
     ("sarsa", "shared", "ants", True, "right_of_way", "strongest", 2, 3, False),
     ("sarsa_lambda", "independent", "ants_seen", False, "blocking", "half", 4, 1, True),
-    ("q_learning", "frozen", "strangers", False, "right_of_way", "half", 2, 2, True),
+    ("q_learning", "frozen", "other_nest_ants", False, "right_of_way", "half", 2, 2, True),
 ]
 QUICK_NESTS = [
     pytest.param(one, marks={0: [pytest.mark.long], 1: [], 4: []}.get(k, [pytest.mark.slow]))
@@ -214,7 +214,7 @@ def with_strangers(view):
     """The load, and for each cell ahead 0, 1 for an ant of the nest, or 2 for one of another."""
     index = view.carries
     for k in range(3):
-        code = 2 * view.strangers[k]
+        code = 2 * view.other_nest_ants[k]
         if view.ants[k] != 0:
             code = 1
         index = 3 * index + code
@@ -231,16 +231,16 @@ def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers)
             seed,
             sharing=sharing,
             learner=learner,
-            observation="paper" if observation == "strangers" else observation,
+            observation="paper" if observation == "other_nest_ants" else observation,
             dense=dense,
             traffic=traffic,
             view=view,
             changes=True,
         )
         drawn = with_nests(drawn, seed, nests, kinds, loads)
-        if observation == "strangers":
+        if observation == "other_nest_ants":
             table = np.random.default_rng(seed).random((54, 5)).astype(np.float32)
-            drawn = replace(drawn, task=replace(drawn.task, observation="strangers"))
+            drawn = replace(drawn, task=replace(drawn.task, observation="other_nest_ants"))
             drawn = replace(drawn, q_values=table)
         if drawn.world.n_nests != nests:
             continue  # kernels are compiled for a number of nests
@@ -415,8 +415,8 @@ def crowd(view):
 def seen_strangers(monkeypatch):
     """The observation, registered for one test."""
     monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
-    monkeypatch.setitem(OBSERVATIONS, "strangers", strangers_seen)
-    return observations.register(Observation("strangers", 54, with_strangers))
+    monkeypatch.setitem(OBSERVATIONS, "other_nest_ants", strangers_seen)
+    return observations.register(Observation("other_nest_ants", 54, with_strangers))
 
 
 def strangers_seen(world, ant):

@@ -17,7 +17,7 @@ from taichi_ants.task.events import Event
 
 TRAINING = TrainingConfig("q_learning", 0.5, 0.9, 0.1, 1.0)
 WORLD = worlds.open_world(seed=3, ranges=(50, 50, 50))
-LABOUR = Labour("thresholds", demand=6.0, relief=0.0, quit=0.0)
+LABOUR = Labour("thresholds", demand=6.0, relief=0.0, stop_probability=0.0)
 IDLE = {"castes": {"worker": {"threshold": 1e6}}, "labour": LABOUR}
 
 
@@ -127,7 +127,9 @@ def test_idle_ants_do_nothing():
 
 def test_ants_that_stop_foraging_are_without_food_next_to_their_queen():
     castes = {"worker": {"threshold": Threshold("lognormal", 5, 1)}}
-    rules = task.foraging().but(castes=castes, labour=Labour("thresholds", 1, 1, quit=0.5))
+    rules = task.foraging().replace(
+        castes=castes, labour=Labour("thresholds", 1, 1, stop_probability=0.5)
+    )
     colony, stopped = follows(rules, ants=60), 0
     near = WORLD.distances() == 1
     for _ in range(200):
@@ -198,13 +200,13 @@ def test_numbers_of_castes_change_in_an_episode():
     castes = {"a": {"share": 0.5, "threshold": 3.0}, "b": {"threshold": 9.0}}
     colony = follows(Task(castes=castes, labour=LABOUR), ants=5)
     interventions = Interventions(colony)
-    interventions.set_task(colony.task.but(castes={"a": {"lifespan": None, "epsilon": 1.0}}))
+    interventions.set_task(colony.task.replace(castes={"a": {"lifespan": None, "epsilon": 1.0}}))
     assert colony.arrays["castes"][0].tolist() == [1.0, -1.0]
-    interventions.set_task(colony.task.but(labour={"demand": 2.0}))
+    interventions.set_task(colony.task.replace(labour={"demand": 2.0}))
     assert colony.arrays["labour"][0] == 2.0
     for fixed in ({"share": 0.25}, {"policy": "random"}, {"threshold": Threshold()}):
         with pytest.raises(AntsError, match="cannot change the share, ants, nest or policy"):
-            interventions.set_task(colony.task.but(castes={"a": fixed}))
+            interventions.set_task(colony.task.replace(castes={"a": fixed}))
 
 
 @pytest.mark.parametrize(

@@ -106,7 +106,7 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     world = World((8, 8, 1), tuple(queen.tolist()), ants=around)
     colony = begun(world, 6)
     colony.arrays["carries"][:] = 1
-    colony.arrays["percept"][:] = 64 | 3 << 2  # the queen ahead
+    colony.arrays["paper_state"][:] = 64 | 3 << 2  # the queen ahead
     colony.act(np.full((1, 6), GIVE))
     assert [ant[2:] for ant in ants(colony)] == [(0, 10)] * 6
     assert [ant[1] for ant in ants(colony)] == [(h + 3) % 6 for h in range(6)]
@@ -122,9 +122,9 @@ def test_a_blocked_move_turns_the_ant():
 def test_ants_look_like_obstacles_to_each_other():
     world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
     colony = begun(world, 2)
-    assert colony.arrays["percept"][0] >> 2 & 3 == 1
+    assert colony.arrays["paper_state"][0] >> 2 & 3 == 1
     colony.act(np.array([[PICK_UP, RIGHT]]))  # the second moves away
-    assert colony.arrays["percept"][0] >> 2 & 3 == 0
+    assert colony.arrays["paper_state"][0] >> 2 & 3 == 0
 
 
 def test_food_that_is_taken_grows_back_at_once():
@@ -142,7 +142,7 @@ def test_a_steep_deposit_after_long_carrying_leaves_nothing():
     colony.begin_episode()
     colony.arrays["carries"][:] = 1
     colony.arrays["carried"][:] = 30_000_000
-    colony.arrays["percept"][:] = 64  # with food, and three empty cells ahead
+    colony.arrays["paper_state"][:] = 64  # with food, and three empty cells ahead
     colony.act(np.array([[FORWARD]]))
     assert ants(colony)[0][0] == (3, 2, 0)
     assert not colony.snapshot().trail.any()

@@ -75,12 +75,14 @@ def test_diffusion_keeps_the_mass(rate):
     births=st.booleans(),
     lifespan=st.sampled_from([None, 5, 40]),
     regrowth=st.sampled_from([None, 0, 3]),
-    wander=st.sampled_from([1, 4]),
+    pile_move_interval=st.sampled_from([1, 4]),
 )
-def test_food_is_conserved(seed, ants, births, lifespan, regrowth, wander):
+def test_food_is_conserved(seed, ants, births, lifespan, regrowth, pile_move_interval):
     """In the ground + carried + delivered = at the start + regrown; no two ants share a cell."""
     world = worlds.open_world(seed=seed % 7, ranges=(6, 6, 6))
-    life = Life(births=births, lifespan=lifespan, regrowth=regrowth, wander=wander)
+    life = Life(
+        births=births, lifespan=lifespan, regrowth=regrowth, pile_move_interval=pile_move_interval
+    )
     colony = Colony(world, Task(life=life), TRAINING, seed, ants=ants)
     colony.begin_episode()
     for _ in range(6):

@@ -19,7 +19,7 @@ PLANNING = TrainingConfig("dyna_q", 0.1, 0.9, 0.5, 1.0, planning_steps=2)
 def kept(tmp_path_factory) -> dict[str, np.ndarray]:
     """The arrays of a colony in which everything comes and goes."""
     path = tmp_path_factory.mktemp("kept") / "colony.npz"
-    life = Life(births=True, lifespan=150, regrowth=2, wander=9)
+    life = Life(births=True, lifespan=150, regrowth=2, pile_move_interval=9)
     task = Task(delivery="truncates", evaporation_in_training=True, life=life)
     world = worlds.open_world(2, (14, 14, 14))
     colony = Colony(world, task, PLANNING, (1, 2), ants=12)
@@ -149,7 +149,7 @@ def test_moves_are_counted_beyond_32_bits(tmp_path) -> None:
     assert (now.moves == expected.moves + before).all()
     assert (now.blocked == expected.blocked + before).all()
     assert expected.moves.min() > 100
-    long.begin_some(np.array([True, False]))
+    long.reset_worlds(np.array([True, False]))
     assert long.outcome().moves.tolist() == [[0, expected.moves[0, 1] + before]]
     long.begin_episode()
     assert long.outcome().moves.tolist() == [[0, 0]]

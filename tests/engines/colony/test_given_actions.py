@@ -21,7 +21,7 @@ from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Life
 
 MEADOW = worlds.open_world(5, (9, 8, 7))
-LIVELY = Task(life=Life(births=True, lifespan=30, regrowth=2, wander=9))
+LIVELY = Task(life=Life(births=True, lifespan=30, regrowth=2, pile_move_interval=9))
 ALL = np.ones(3, bool)
 
 
@@ -36,9 +36,9 @@ def pass_ticks(colony: Colony, ticks: int = 40, seed: int = 1) -> Colony:
     for tick in range(ticks):
         colony.act(rng.integers(0, 5, shape))
         if tick == 7:
-            colony.begin_some(np.array([False, True, False]))
+            colony.reset_worlds(np.array([False, True, False]))
         if tick == 11:
-            colony.begin_some(np.array([False, False, True]), [77])
+            colony.reset_worlds(np.array([False, False, True]), [77])
     return colony
 
 
@@ -68,10 +68,10 @@ def test_threads_and_schedules_give_the_same(task, monkeypatch):
 
 def test_a_world_with_another_seed_is_as_in_a_new_colony():
     colony, new = pass_ticks(begun()), begun(seeds=(8, 9, 77))
-    colony.begin_some(ALL, [8, 9, 77])
+    colony.reset_worlds(ALL, [8, 9, 77])
     assert_same(colony, new)
     assert_same(pass_ticks(colony), pass_ticks(new))
-    colony.begin_some(np.array([True, False, True]), [9, 9])  # seeds may repeat
+    colony.reset_worlds(np.array([True, False, True]), [9, 9])  # seeds may repeat
     with pytest.raises(AntsError, match=r"^seeds contains 9 more than once; "):
         colony.save("never.npz")
 
@@ -125,7 +125,7 @@ def test_worlds_in_which_ants_learn_begin_anew_as_well(sharing):
             plain.begin_episode()
         for tick in range(16):
             if tick in (5, 9):
-                colony.begin_some(np.arange(2) == tick // 9)
+                colony.reset_worlds(np.arange(2) == tick // 9)
                 plains[tick // 9].end_episode()
                 plains[tick // 9].begin_episode()
             colony.tick()
@@ -150,11 +150,11 @@ def test_what_is_not_allowed():
     with pytest.raises(AntsError, match=r"^training is None, so ants do not choose actions; "):
         colony.tick()
     with pytest.raises(AntsError, match=r"^which is .*; give a bool for each of the \d+ worlds\.$"):
-        colony.begin_some(np.ones(2, bool))
+        colony.reset_worlds(np.ones(2, bool))
     with pytest.raises(AntsError, match=r"^there are 2 seeds for 1 world; give 1 seed\.$"):
-        colony.begin_some(np.array([True, False, False]), [1, 2])
+        colony.reset_worlds(np.array([True, False, False]), [1, 2])
     with pytest.raises(AntsError, match=r"^a seed is 0\.5; "):
-        colony.begin_some(np.array([True, False, False]), [0.5])
+        colony.reset_worlds(np.array([True, False, False]), [0.5])
     training = TrainingConfig("sarsa", 0.1, 0.9, 0.2, 0.9)
     learning = Colony(MEADOW, Task(), training, ants=9)
     learning.begin_episode()

@@ -81,13 +81,13 @@ def test_an_episode_that_did_not_begin_completely_is_refused(tmp_path: Any) -> N
 def test_some_worlds_that_did_not_begin_are_refused() -> None:
     made = colony()
     with interrupted_after_launch():
-        made.begin_some(np.array([True, False]), [7])
+        made.reset_worlds(np.array([True, False]), [7])
     with pytest.raises(AntsError, match="not all worlds have begun an episode"):
         made.tick()
-    made.begin_some(np.array([True, False]))
+    made.reset_worlds(np.array([True, False]))
     made.tick()
     fresh = Colony(worlds.paper(), task.foraging(), LEARNER, seeds=range(2), ants=8)
-    fresh.begin_some(np.array([True, False]))
+    fresh.reset_worlds(np.array([True, False]))
     with pytest.raises(AntsError, match="not all worlds have begun an episode"):
         fresh.tick()
 

@@ -245,7 +245,7 @@ def test_pictures_show_every_queen():
         (lambda: Colony([WORLD, replace(WORLD, other_queens=())], Task(foods=KINDS), TRAINING,
                         [1, 2]), "all worlds of a colony must have the same number"),
         (lambda: Task(foods=KINDS, life=Life(regrowth=3)), "set the regrowth of each kind instead"),
-        (lambda: Task(foods=KINDS, life=Life(wander=3)), "with one load in a cell can wander"),
+        (lambda: Task(foods=KINDS, life=Life(pile_move_interval=3)), "with one load in a cell"),
         (lambda: Task(foods={f"kind_{k}": Food() for k in range(9)}), "at most 8 are allowed"),
     ],
 )  # fmt: skip

@@ -133,7 +133,7 @@ def test_every_tick_of_drawn_protocols_equals_the_reference(kernel):
     assert expected <= done.keys(), done
 
 
-FORAGING = foraging().but(life={"regrowth": 0})
+FORAGING = foraging().replace(life={"regrowth": 0})
 PROTOCOL = [
     At(60, remove_ants=0.5),
     Every(40, start=50, stop=130, trail=0),

@@ -16,12 +16,12 @@ from taichi_ants.task import Field, Life, Pheromone, Task
 LIVELY = Task(
     pheromone=Pheromone("exponential", half_life=20, diffusion=0.2, deposit="add"),
     fields={
-        "home": Field(laid="without_food", deposit="fading"),
-        "wide": Field(laid="always", diffusion=0.3),
+        "home": Field(deposited_when="without_food", deposit="fading"),
+        "wide": Field(deposited_when="always", diffusion=0.3),
     },
     homing_cue="home",
     evaporation_in_training=True,
-    life=Life(births=True, lifespan=60, regrowth=2, wander=9),
+    life=Life(births=True, lifespan=60, regrowth=2, pile_move_interval=9),
 )
 TRAINING = TrainingConfig("dyna_q", 0.2, 0.9, 0.4, 0.9, planning_steps=2)
 CALM = TrainingConfig("q_learning", 0.2, 0.9, 0.4, 0.9)

@@ -68,7 +68,7 @@ def after_a_tick(
         ant = plain.ants[slot]
         ant.carries, ant.chosen = one.food, one.action
         plain.observe(ant)
-        arrays["carries"][slot], arrays["percept"][slot] = one.food, ant.percept
+        arrays["carries"][slot], arrays["paper_state"][slot] = one.food, ant.paper_state
         if one.food:
             arrays["ground"][arrays["cell"][slot]] = ANT_GROUND | 8 << 4
     kernels.act(np.array([[one.action for one in row]]))
@@ -186,7 +186,8 @@ def test_nobody_follows_into_the_cell_of_an_ant_that_changes_places():
 
 
 @pytest.mark.parametrize(
-    ("traffic", "paid"), [(RIGHT_OF_WAY, 0), (replace(FOLLOWING, grant=False), 0), (FOLLOWING, 1)]
+    ("traffic", "paid"),
+    [(RIGHT_OF_WAY, 0), (replace(FOLLOWING, reward_pushed=False), 0), (FOLLOWING, 1)],
 )
 def test_an_ant_that_is_pushed_where_it_wanted_to_go_is_paid_for_the_move_if_granted(traffic, paid):
     """They meet; the ant without food wanted to go where the trail is stronger."""
@@ -195,7 +196,7 @@ def test_an_ant_that_is_pushed_where_it_wanted_to_go_is_paid_for_the_move_if_gra
     assert after_a_tick(traffic, row, trails=trails) == [After(4, 1), After(3, paid)]
 
 
-@pytest.mark.parametrize("traffic", [QUEUES_ONLY, replace(FOLLOWING, grant=False)])
+@pytest.mark.parametrize("traffic", [QUEUES_ONLY, replace(FOLLOWING, reward_pushed=False)])
 def test_a_ring_of_three_ants_stays(traffic):
     """Three cells that touch each other; each ant wants the cell of the next one."""
     cells = [(3, 3, 0), (4, 3, 0), (4, 4, 0)]
@@ -216,7 +217,7 @@ def test_options_that_change_nothing_are_refused():
     from taichi_ants import AntsError
 
     for options, message in (
-        ({"grant": True}, "leave it out unless `swap` is True"),
+        ({"reward_pushed": True}, "leave it out unless `swap` is True"),
         ({"carriers_first": True}, "carriers_first` is True; leave it out"),
         ({"swap": "yes"}, "swap` is 'yes'"),
     ):

@@ -157,7 +157,7 @@ def test_every_step_with_rules_of_choice_and_noise(learner, observation, deposit
         rolled = plain_runs.rollout(world, table, seed, 1, 40, task, 0.1)
         for k, step in enumerate(rolled.trace):
             assert_equal_step(ours, k, step)
-        misread += int((ours.percepts != ours.states).sum())
+        misread += int((ours.paper_states != ours.states).sum())
         outcome = evaluate(world, table, 2, seed, 40, task, epsilon=0.1)
         assert outcome.returns[1] == rolled.returns[0]
     assert (slipped > 10) == ("slip" in noise)
@@ -219,14 +219,14 @@ def test_rollouts(observation, deposit):
                 assert np.array_equal(ours.q_values[k], table[step.state])
 
 
-def test_percepts_are_the_papers_states_whatever_the_observation():
+def test_paper_states_are_the_papers_states_whatever_the_observation():
     table = np.zeros((observations.get("six_cells").n_states, 5), np.float32)
     for seed in range(20):
         world = random_world(seed + 1000)
         other = rollout(world, table, seed, task=Task("six_cells"), max_steps=60)
         papers = rollout(world, table[:128], seed, max_steps=60)
-        assert np.array_equal(other.percepts, papers.states)
-        assert np.array_equal(other.next_percepts, papers.next_states)
+        assert np.array_equal(other.paper_states, papers.states)
+        assert np.array_equal(other.next_paper_states, papers.next_states)
         assert not np.array_equal(other.states, papers.states)
 
 

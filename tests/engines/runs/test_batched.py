@@ -54,13 +54,13 @@ def drawn_task(rng: np.random.Generator, observation: str, deposit: str, view: s
     )
 
 
-def sensible(rng: np.random.Generator, percept: int) -> int:
+def sensible(rng: np.random.Generator, paper_state: int) -> int:
     """An action that often succeeds, so that much happens."""
     if rng.random() < 0.3:
         return int(rng.integers(5))
-    codes = percept >> 4 & 3, percept >> 2 & 3, percept & 3
+    codes = paper_state >> 4 & 3, paper_state >> 2 & 3, paper_state & 3
     if 3 in codes:
-        return GIVE if percept >> 6 else PICK_UP
+        return GIVE if paper_state >> 6 else PICK_UP
     lures = [move for move, code in enumerate(codes) if code == 2]
     return int(rng.choice(lures or [0, 1, 2]))
 
@@ -71,7 +71,7 @@ def check_equal(ants: BatchedEnvironments, i: int, colony: ReferenceColony, worl
     now = ants.snapshot(i)
     assert tuple(world.grid.cells(now.ant_cells)[0].tolist()) == ant.cell
     assert (now.ant_headings[0], now.ant_carries[0]) == (ant.heading, ant.carries)
-    assert (arrays["percepts"][i], arrays["states"][i]) == (ant.percept, ant.state)
+    assert (arrays["paper_states"][i], arrays["states"][i]) == (ant.paper_state, ant.state)
     assert arrays["random_states"][i] == ant.stream.state
     for cell, ground in colony.world.ground.items():
         place = world.grid.index(cell)
@@ -100,8 +100,8 @@ def test_each_step_equals_the_reference(kernel):
         same_step = number % 2 == 1
         begins, arrays = np.zeros(n, bool), ants.arrays
         for _ in range(60):
-            percepts = arrays["percepts"].tolist()
-            actions = [sensible(rng, percept) for percept in percepts]
+            paper_states = arrays["paper_states"].tolist()
+            actions = [sensible(rng, paper_state) for paper_state in paper_states]
             ants.step(np.array(actions), begins & (not same_step), same_step)
             for i, colony in enumerate(colonies):
                 if begins[i] and not same_step:
@@ -127,7 +127,7 @@ def test_each_step_equals_the_reference(kernel):
                 if last and same_step:
                     (ant,) = colony.ants.values()
                     assert arrays["final_states"][i] == ant.state
-                    assert arrays["final_percepts"][i] == ant.percept
+                    assert arrays["final_paper_states"][i] == ant.paper_state
                     colony.begin_episode()
                 check_equal(ants, i, colony, world)
             begins = (arrays["terminations"] | arrays["truncations"]).astype(bool)
