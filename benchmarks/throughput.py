@@ -23,9 +23,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from measuring import PAGE, a_ratio, machine, publish
+from systems.paper_world import GRID
 
 from taichi_ants import Task, TrainingConfig, World, runtime, train, worlds
-from taichi_ants.analysis.paper.published import GRID
 from taichi_ants.analysis.tables import MISSING, Table, figure, plain_text, thousands
 from taichi_ants.engines.runs.results import TrainingResult
 from taichi_ants.errors import AntsError, count

@@ -20,7 +20,6 @@ from ppo import Agent, table, train
 
 import taichi_ants.envs  # noqa: F401  # registers the environments
 from taichi_ants import Colony, Life, TrainingConfig, save_policy, task, worlds
-from taichi_ants.studies.colony_study import scheduled
 
 ANTS, TICKS, WORLDS, EPISODES = 64, 1000, 4, 60
 FORAGING = replace(task.foraging(), life=Life(regrowth=0))  # food grows back at once
@@ -58,7 +57,9 @@ def foods_by_chance(agent: Agent) -> float:
 
 def tabular(seed: int, episodes: int) -> np.ndarray:
     """Return a table that 64 ants in one world have learned together."""
-    training = scheduled(TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0), episodes)
+    fading = 1 / max(1, round(0.7 * episodes))  # epsilon and the learning rate decrease in 70 %
+    decays = (0.01 / 0.3) ** fading, 0.01, 0.1**fading, 0.01
+    training = TrainingConfig("sarsa", 0.1, 0.9, 0.3, *decays, initial_q=10.0)
     colony = Colony(worlds.paper(), FORAGING, training, seed, ANTS, sharing="shared")
     colony.run(episodes, TICKS)
     return colony.q_values[0]

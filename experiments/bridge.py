@@ -1,9 +1,200 @@
 """Train colonies on a double bridge, and measure which branch they use.
 
-python experiments/bridge.py --quick
+Colonies learn on a bridge with branches of 23 and 36 steps. The script evaluates them on that
+bridge, on its mirror image, on one with equal branches, and on one whose short branch opens late.
+It prints the share of ants that cross by the short branch, without food and with it, and writes
+counts and two figures to a folder. See docs/bridge.md.
 """
 
-from taichi_ants.commands import run
+from __future__ import annotations
+
+from taichi_ants.studies.interruption import stoppable
+
+with stoppable():  # Ctrl-C also works during these slow imports
+    import argparse
+    from collections.abc import Mapping, Sequence
+    from dataclasses import asdict, replace
+    from functools import partial
+    from pathlib import Path
+    from typing import Any
+
+    import numpy as np
+    from bridge_report import (
+        DESIGNS,
+        LATE,
+        LOADS,
+        WINDOWS,
+        Design,
+        bridges,
+        length,
+        write_results,
+    )
+    from colony import learning, scheduled
+
+    from taichi_ants import Colony, Life, Task
+    from taichi_ants.engines.colony.interventions import Interventions
+    from taichi_ants.studies import command_line
+    from taichi_ants.studies.blocks import kept
+    from taichi_ants.studies.command_line import whole_number
+    from taichi_ants.studies.points import ColonyPoint, settings_of
+    from taichi_ants.studies.result_folder import work_or_show
+    from taichi_ants.studies.runner import Study
+    from taichi_ants.task import foraging, queueing
+    from taichi_ants.task.constants import EMPTY, OBSTACLE
+    from taichi_ants.worlds import double_bridge
+    from taichi_ants.worlds.double_bridge import ROOM_RADIUS, branch_cells, junction_cells
+
+REACH = 50  # number of ticks for which an ant lays a trail
+QUICK = {"seeds": 4, "episodes": 20, "ticks": 500, "evaluation_ticks": 1000}
+_LOOK_EVERY = 4  # ticks; all branches are longer, so no crossing is missed
+_QUEEN_ROOM, _FOOD_ROOM, _SHORT, _LONG = range(4)
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Return the settings of the command line."""
+    parser = command_line.Parser(__doc__)
+    add = parser.add_argument
+    add("--seeds", type=whole_number(1, 1000), default=40, metavar="N", help="number of seeds")
+    add("--seed", type=whole_number(), default=0, metavar="N", help="first seed")
+    counts: dict[str, Any] = {"type": whole_number(1, 10_000_000), "metavar": "N"}
+    add("--episodes", **counts, default=60, help="number of training episodes")
+    add("--ticks", **counts, default=1000, help="ticks per training episode")
+    add("--evaluation-ticks", **counts, default=3000, help="ticks per evaluation")
+    quick = (
+        f"use {QUICK['seeds']} seeds, too few for intervals, and fewer episodes and ticks: to see "
+        "that the study runs, not for conclusions"
+    )
+    add("--quick", action="store_true", help=quick)
+    command_line.add_common(parser)
+    command_line.add_results(parser, "bridge")
+    settings, given = parser.parse_given(arguments)
+    for name in QUICK.keys() - given.keys() if settings.quick else ():
+        setattr(settings, name, QUICK[name])
+    return command_line.with_folder(settings, "bridge")
+
+
+def task(design: Design) -> Task:
+    """Return the rules of a design; food grows back at once."""
+    rules, kind = {"queueing": queueing, "foraging": foraging}[design.rules](), design.evaporation
+    evaporation: dict[str, Any] = {"evaporation": kind}
+    if kind.isdecimal():
+        evaporation = {"evaporation": "exponential", "half_life": float(kind)}
+    trail = replace(rules.pheromone, level=REACH * design.slope, slope=design.slope, **evaporation)
+    return replace(rules, pheromone=trail, life=Life(regrowth=0))
+
+
+def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
+    """Return the training of colonies of a design.
+
+    The short branch is on the right in about half of the episodes and on the left in the others, so
+    colonies cannot learn its side.
+    """
+    right, left, *_ = bridges(design).values()
+    pool = double_bridge(**right), double_bridge(**left)
+    several = pool[0], task(design), scheduled(learning(), episodes), pool, design.ants
+    return ColonyPoint(*several, episodes=episodes, ticks=ticks, rollouts=1)
+
+
+def followed(
+    design: Design,
+    learned: ColonyPoint,
+    seeds: Sequence[int],
+    q_values: np.ndarray,
+    ticks: int,
+    where: Mapping[str, Any],
+) -> dict[str, np.ndarray]:
+    """Return the `crossings` of trained colonies on each bridge.
+
+    Training in the point `learned` gave the tables `q_values`, float32 (seeds, n_states, 5). An
+    episode has `ticks`, twice as many on `LATE`; `where` has the arguments `threads` and `arch`.
+    """
+    found = {}
+    for name, bridge in bridges(design).items():
+        late, parts, world = name == LATE, [], double_bridge(**bridge)
+        # Interventions need a colony with a single world.
+        each = [slice(s, s + 1) for s in range(len(seeds))] if late else [slice(None)]
+        for some in each:
+            given = world, seeds[some], q_values[some], False
+            colony = learned.colony(*given, schedule="by_world", **where)
+            parts.append(crossings(colony, bridge, length(name, ticks), ticks if late else 0))
+        found[name] = np.concatenate(parts, axis=-1)
+    return found
+
+
+def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:
+    """Run an episode, and count the crossings of the bridge by branch.
+
+    An ant crosses when it enters one room and was in the other before; its branch is the last one
+    that it was in. Only foragers that enter the food room and carriers that enter the queen's room
+    count. Rock closes the short branch until tick `opens`, which must be 0 if there are several
+    worlds. The colony has the schedule "by_world", in which ants keep their slots; `bridge` has the
+    arguments of `double_bridge`.
+
+    Returns:
+        int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.
+    """
+    zone, n_worlds = _zones(bridge), len(colony.seeds)
+    world = np.repeat(np.arange(n_worlds), colony.capacity)
+    counts = np.zeros((WINDOWS, len(LOADS), 2, n_worlds), np.int64)
+    room, branch = np.full(len(world), _QUEEN_ROOM), np.full(len(world), _SHORT)
+    colony.begin_episode(ticks)
+    if opens:
+        short, interventions = colony.grid.index(branch_cells(**bridge)[0]), Interventions(colony)
+        interventions.put(short, OBSTACLE)
+    while colony.ticks < ticks:
+        if opens and colony.ticks == opens:
+            interventions.put(short, EMPTY)
+        window = colony.ticks * WINDOWS // ticks
+        until = opens if colony.ticks < opens else ticks
+        colony.tick(min(_LOOK_EVERY, until - colony.ticks))
+        now = zone[colony.cells.ravel()]
+        carries, inside = colony.carrying.ravel(), now <= _FOOD_ROOM
+        useful = inside & (now != room) & (carries == (now == _QUEEN_ROOM))
+        where = carries[useful].astype(int), branch[useful] - _SHORT, world[useful]
+        np.add.at(counts[window], where, 1)
+        room = np.where(inside, now, room)
+        branch = np.where(inside, branch, now)
+    return counts
+
+
+def _zones(bridge: dict[str, Any]) -> np.ndarray:
+    """Return the room or branch of each cell; a junction belongs to its room."""
+    grid, junctions = double_bridge(**bridge).grid, junction_cells(**bridge)
+    zone = np.full(grid.size, _QUEEN_ROOM)
+    pile = junctions[1] + junctions[0]
+    zone[grid.distances(tuple(pile.tolist())) <= ROOM_RADIUS + 1] = _FOOD_ROOM
+    for number, cells in zip((_SHORT, _LONG), branch_cells(**bridge), strict=True):
+        zone[grid.index(cells)] = number
+    return zone
+
+
+def study(settings: argparse.Namespace) -> None:
+    """Run the study, or show its results if it is finished."""
+    command_line.load_plugin(settings.plugin)
+    seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
+    points = {design: point(design, settings.episodes, settings.ticks) for design in DESIGNS}
+    training = Study(tuple(points.values()), seeds)
+    ticks, where = settings.evaluation_ticks, {"threads": settings.threads, "arch": settings.arch}
+
+    def work(blocks: Path, ready: Path) -> None:
+        found = {}
+        with command_line.progress_bar("bridge") as progress:
+            outcomes = training.run(blocks, lambda share: progress(0.6 * share), **where)
+            for number, (design, one) in enumerate(points.items()):
+                path, given = blocks / f"followed-{number:06d}.npz", (design, one, seeds)
+                about = {**settings_of([one], seeds), "design": asdict(design), "ticks": ticks}
+                make = partial(followed, *given, outcomes[one]["q_values"], ticks, where)
+                found[design] = kept(path, about, make)
+                progress(0.6 + 0.4 * (number + 1) / len(points))
+        write_results(ready, found, seeds, ticks, draws=not settings.no_figures)
+
+    work_or_show(settings, {**training.settings(), "evaluation_ticks": ticks}, work)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the script."""
+    command_line.run_command(lambda: study(parse_arguments(arguments)), command_line.AGAIN)
+
 
 if __name__ == "__main__":
-    run("bridge")
+    main()

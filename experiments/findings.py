@@ -15,12 +15,12 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from pathlib import Path
     from typing import Any
 
+    import compare
     import matplotlib
     import numpy as np
     from matplotlib.figure import Figure
 
     from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, WALKS
-    from taichi_ants.commands import compare
     from taichi_ants.studies.command_line import Parser, run_command
 
 ROOT = Path(__file__).parents[1]

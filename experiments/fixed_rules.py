@@ -22,18 +22,12 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import TYPE_CHECKING
 
     import numpy as np
+    from colony import LARGE_SIZE, place, task_in
+    from colony_findings import ABROAD, EVALUATION_EPSILON, JOINT, WORLD_KINDS, WORLDS
 
     from taichi_ants import AntsError, Colony, Pheromone, Task, TrainingConfig, World, files, task
-    from taichi_ants.analysis.colony.study import (
-        ABROAD,
-        EVALUATION_EPSILON,
-        JOINT,
-        WORLD_KINDS,
-        WORLDS,
-    )
     from taichi_ants.analysis.statistics import bootstrap_interval
     from taichi_ants.learners.policies import FOLLOWED, RULES, trail_follower
-    from taichi_ants.studies.colony_study import LARGE_SIZE, place, task_in
     from taichi_ants.studies.command_line import (
         THREADS,
         Parser,

@@ -204,15 +204,18 @@ def make_figures(folder: Path) -> None:
 
     They have 256 colours, so that their history in Git stays small.
     """
+    import bridge
+    import colony
+    import compare
     from PIL import Image
 
-    from taichi_ants.commands import bridge, colony, compare
+    from taichi_ants.commands import colony as command
 
     results = ROOT / "results"
     compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
     colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
-    colony.live(colony.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
-    bridge.bridge(bridge.parse_arguments(["--out", str(results / "bridge")]))
+    command.live(command.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
+    bridge.study(bridge.parse_arguments(["--out", str(results / "bridge")]))
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

@@ -51,12 +51,11 @@ def test_the_wheel_holds_the_package_and_nothing_else(built):
         (entries,) = [name for name in wheel.namelist() if name.endswith("entry_points.txt")]
         assert "taichi-ants = taichi_ants.commands:main" in wheel.read(entries).decode()
     page = {f"taichi_ants/viewer/{name}" for name in ("page.html", *STYLES, *SCRIPTS)}
-    templates = ("base.html", "parts.html", "comparison.html", "colony.html")
+    templates = ("base.html", "parts.html")
     others = ("report.css", "report.js")
     page |= {f"taichi_ants/report/{name}" for name in (*templates, *others)}
     page |= {f"taichi_ants/live/{name}" for name in PARTS}
-    data = ("paper/claims.toml", "colony/series.toml", "taichi_ants.mplstyle")
-    page |= {f"taichi_ants/analysis/{name}" for name in data}
+    page |= {"taichi_ants/analysis/taichi_ants.mplstyle"}
     assert set(names) == sources("taichi_ants") | {"taichi_ants/py.typed"} | page
 
 
@@ -114,7 +113,7 @@ def test_help_lists_the_commands_in_a_line_each(arguments, tmp_path):
     "arguments",
     [
         *COMMANDS,
-        *("colony study", "colony live"),
+        "colony live",
         *("render episode", "render colony", "render learning", "render sheet"),
     ],
 )
@@ -146,14 +145,14 @@ def test_the_version(tmp_path):
 
 def test_a_command_by_its_name(kernels, tmp_path):
     """What it works with lies in the package: it runs in a folder of its own."""
-    tiny = [
-        *("--seeds", "1", "--episodes", "2", "--max-steps", "30", "--learners", "q_learning"),
-        *("--learning-rates", "0.1", "--discounts", "0.9", "--epsilons", "0.3"),
-        *("--epsilon-decays", "0.9", "--delivery", "terminates", "--no-figures"),
-    ]
-    done = call(["compare", *tiny], tmp_path, kernels=kernels)
+    Path(tmp_path, "tiny.toml").write_text(
+        'kind = "runs"\nseeds = 1\nepisodes = 60\nmeasures = ["return_last50"]\n'
+        'training = { learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 0.9 }\n'
+        "vary.training.learning_rate = [0.1, 0.3]\n"
+    )
+    done = call(["sweep", "tiny.toml", "--no-figures"], tmp_path, kernels=kernels)
     assert (done.returncode, done.stderr) == (0, "")
     (folder,) = Path(tmp_path, "results").iterdir()
-    assert folder.name == "compare"
+    assert folder.name == "sweep-tiny"
     assert (folder / "summary.csv").exists()
     assert '"command": "' in (folder / "manifest.json").read_text()

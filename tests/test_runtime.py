@@ -57,7 +57,7 @@ import sys
 import taichi_ants
 taichi_ants.World, taichi_ants.TrainingConfig, taichi_ants.reference, taichi_ants.states
 from taichi_ants import analysis, worlds
-from taichi_ants.analysis.paper import claims, figures, report, table2
+from taichi_ants.analysis import findings, results, statistics, tables
 assert "taichi" not in sys.modules
 """
     python(script, tmp_path)

@@ -7,18 +7,20 @@ that truncate.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from taichi_ants import TrainingConfig, worlds
-from taichi_ants.analysis.paper.published import GRID
 
 N_STATES, N_ACTIONS = 128, 5
 PICK_UP, GIVE = 3, 4
 CUE, GOAL = 2, 3  # codes of cells in view
 DEPOSIT = 250
 
+# The paper's grid: learning rate, discount, epsilon and its decay.
+GRID = tuple(product((0.001, 0.01), (0.9, 0.99), (0.3, 0.5), (0.99, 0.995)))
 CONFIGS = [TrainingConfig("q_learning", *point) for point in GRID]
 
 

@@ -18,14 +18,17 @@ from taichi_ants.studies.interruption import stoppable
 
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
+    import sys
     from pathlib import Path
 
     import numpy as np
 
+    sys.path.append(str(Path(__file__).parents[1]))
+    from bridge import crossings
+
     from taichi_ants import Colony, Field, files
     from taichi_ants.analysis import style
     from taichi_ants.analysis.statistics import bootstrap_interval
-    from taichi_ants.studies.bridge import crossings
     from taichi_ants.studies.command_line import Parser, progress_bar, run_command, whole_number
     from taichi_ants.task import Choice, Life, Pheromone, Task
     from taichi_ants.worlds import double_bridge

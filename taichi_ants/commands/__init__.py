@@ -11,9 +11,7 @@ import taichi_ants
 from taichi_ants.studies.interruption import stoppable
 
 COMMANDS = {  # modules of this package with their help
-    "compare": "repeat the paper's comparison of learners with many seeds",
-    "colony": "study how colonies scale, or run one colony of any size",
-    "bridge": "train colonies on a double bridge, and count which branch they use",
+    "colony": "run one colony of any size, or many in parallel",
     "sweep": "run every combination of the settings in a file, and compare them",
     "merge": "join the shards of a sweep, a comparison or a colony study",
     "status": "show what is done in a folder of results, and how long is left",

@@ -7,20 +7,25 @@ without --shard. See docs/many_machines.md.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import taichi_ants
+from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 
-# The functions of commands that compute or show results from their settings, with their modules
-# and the arguments without which the command line is not complete.
+# The functions of commands and scripts that compute or show results from their settings, with their
+# modules and the arguments without which the command line is not complete.
 STARTS = {
     "sweep": ("taichi_ants.commands.sweep", "sweep", ["FILE"]),
-    "compare": ("taichi_ants.commands.compare", "compare", []),
-    "colony": ("taichi_ants.commands.colony", "start", ["study"]),
+    "compare": ("compare", "compare", []),
+    "colony": ("colony", "study", ["study"]),
 }
+# Of scripts, which are not part of the package.
+EXPERIMENTS = Path(taichi_ants.__file__).parents[1] / "experiments"
 
 
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
@@ -49,6 +54,13 @@ def started(name: str, options: Mapping[str, Any]) -> None:
     Options that another version of the package did not have get their defaults.
     """
     place, function, arguments = STARTS[name]
+    if "." not in place and str(EXPERIMENTS) not in sys.path:
+        if not (EXPERIMENTS / f"{place}.py").exists():
+            raise AntsError(
+                f"the results are those of experiments/{place}.py, which only a clone of the "
+                "repository has; install taichi-ants from one, with `pip install -e .`."
+            )
+        sys.path.append(str(EXPERIMENTS))
     module = import_module(place)
     start: Callable[[argparse.Namespace], None] = getattr(module, function)
     usual = vars(module.parse_arguments(arguments))

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from taichi_ants import files, learners
-from taichi_ants.analysis.colony.study import OF_STUDY
-from taichi_ants.analysis.paper.measures import MEASURES as OF_RUNS
 from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
+from taichi_ants.measures.colonies import OF_STUDY
+from taichi_ants.measures.runs import MEASURES as OF_RUNS
 from taichi_ants.settings import DeclaredSetting, declared, flat
 from taichi_ants.studies.sweep_file import declaration_of, measure_of
 from taichi_ants.task import observations

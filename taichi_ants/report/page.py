@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib import resources
+from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -53,8 +54,8 @@ def signed(text: Any) -> Any:
     return re.sub(r"(?<![\w.-])-(?=[\d.])", "\N{MINUS SIGN}", text) if plain else text
 
 
-def fill(template: str, **parts: Any) -> str:
-    """Return a page as HTML; all text in `parts` is escaped."""
+def fill(template: Path, **parts: Any) -> str:
+    """Return a page as HTML from a file that extends base.html; text in `parts` is escaped."""
     from markupsafe import Markup
 
     shared = {
@@ -63,7 +64,8 @@ def fill(template: str, **parts: Any) -> str:
     }
     shared["policy"] = content_policy(f"\n{shared['script']}\n", f"\n{shared['style']}\n")
     marked = {name: Markup(text) for name, text in shared.items()}
-    return _templates().get_template(template).render(**marked, **parts)
+    page = _templates().from_string(template.read_text(encoding="utf-8"))
+    return page.render(**marked, **parts)
 
 
 class Player(NamedTuple):

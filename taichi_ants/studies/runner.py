@@ -18,7 +18,7 @@ from typing import Any, Generic, NamedTuple
 
 import numpy as np
 
-from taichi_ants import __version__, arguments, files
+from taichi_ants import PHYSICS, arguments, files
 from taichi_ants.errors import AntsError, checked_whole, count, shown
 from taichi_ants.features import COLONY, LONE
 from taichi_ants.studies.blocks import Blocks, Outcome
@@ -111,7 +111,7 @@ class Study(Generic[PointKind]):
             return None if name == "world" and isinstance(value, tuple) else known[value]
 
         for point in self.in_order:
-            facts = {"version": __version__, **facts_of(point, number_of)}
+            facts = {"physics": PHYSICS, **facts_of(point, number_of)}
             known[point] = hashlib.sha256(files.to_json(facts).encode()).hexdigest()[:32]
         return tuple(known[point] for point in self.in_order)
 

@@ -15,13 +15,13 @@ import numpy as np
 
 from taichi_ants import files
 from taichi_ants.analysis import designs, sensitivity, style, sweeps
-from taichi_ants.analysis.colony import study as of_colonies
 from taichi_ants.analysis.findings import Contrast, above, judge
-from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.files import parquet
 from taichi_ants.files.results import REPORT, ROWS
+from taichi_ants.measures import colonies as of_colonies
+from taichi_ants.measures import runs as of_runs
 from taichi_ants.measures.series import stops
 from taichi_ants.settings import flat
 from taichi_ants.studies import design

@@ -21,10 +21,10 @@ from taichi_ants import (
     rules,
     worlds,
 )
-from taichi_ants.analysis.colony import study as of_colonies
-from taichi_ants.analysis.paper import measures as of_runs
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.measures import colonies as of_colonies
+from taichi_ants.measures import runs as of_runs
 from taichi_ants.settings import (
     DeclaredSetting,
     all_of,

@@ -1,10 +1,8 @@
-"""The study of the colony and single colonies as a command: files held against the library."""
+"""Single colonies as a command: files held against the library."""
 
 from __future__ import annotations
 
 import csv
-import io
-import json
 import signal
 import subprocess
 import sys
@@ -12,107 +10,25 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import faults
 import numpy as np
 import pytest
 from command_lines import (
     EXPERIMENTS,
     assert_one_sentence,
     call,
-    contents,
     environment,
-    load,
     promptly,
     run,
     start,
 )
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
-from taichi_ants.analysis.colony.study import ABC, ABC_SILENT, BC, PAPER, A
 from taichi_ants.commands import colony as command
 from taichi_ants.learners import registry
 from taichi_ants.learners.policies import save_policy
-from taichi_ants.studies import colony_study
-from taichi_ants.studies.runner import Study
 from taichi_ants.task import Traffic, foraging, paper, queueing
 
-SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
-SMALL = [
-    *("study", "--world-kinds", "paper", "small", "--sizes", 1, 3),
-    *("--seeds", len(SEEDS), "--seed", SEEDS[0]),
-    *("--episodes", EPISODES, "--ticks", TICKS, "--rollouts", ROLLOUTS),
-]
-FILES = {
-    *("conditions.csv", "differences.csv", "seeds.csv", "findings.md", "manifest.json"),
-    *("report.html", "report.txt"),
-    *(f"figures/{name}.png" for name in ("elsewhere", "rules", "scaling", "training")),
-    *(
-        f"policies/paper_{rules}_{ants}.npz"
-        for rules in ("paper", "foraging", "queueing")
-        for ants in (1, 3)
-    ),
-}
-
-
-@pytest.fixture(scope="module")
-def remembered():
-    """Colonies that are studied again in this file give at once what they have given before.
-
-    Three of the rules that are not compared with others have kernels of those that are, since
-    each one takes seconds to compile.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        faults.remember(patch)
-        for rules, like in ((A, PAPER), (BC, ABC), (ABC_SILENT, ABC)):
-            base = colony_study.TASKS[like]
-            other = replace(base, pheromone=replace(base.pheromone, level=300))
-            patch.setitem(colony_study.TASKS, rules, other)
-        yield
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory, remembered):
-    """What one run of the command has printed, and its folder; not to be written to."""
-    place, out = tmp_path_factory.mktemp("finished"), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(place)
-        assert faults.run("colony", [*SMALL, "--out", "out"], out) == (0, "")
-    return out.getvalue(), place / "out"
-
-
-@pytest.mark.slow
-def test_all_files_are_there(finished):
-    out, folder = finished
-    assert set(contents(folder)) == FILES
-    report = (folder / "report.txt").read_text("utf-8")
-    assert out.startswith(report)
-    assert len(out.splitlines()) <= 42
-    assert out.splitlines()[-1] == "out/report.html"
-    assert "Deliveries per 1000 ticks of 3 ants" in report
-    assert "2 seeds, too few for a verdict, exploration rate 0.01; in brackets: without" in report
-    assert "What does each rule add?" in report
-    page = (folder / "report.html").read_text("utf-8")
-    assert (
-        "The paper&#39;s world, 2 seeds, too few for a verdict, exploration rate 0.01: deliveries"
-        in page
-    )
-    assert "Trained in open worlds, 3 ants, 2 seeds, too few for a verdict" in page
-    assert page.count('class="player"') == 3
-    with open(folder / "conditions.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
-    # In the paper's world seven rules for one and three ants, and of three rules those that were
-    # trained alone, or in open worlds; the latter in small worlds, too.
-    assert len(rows) == 7 * 2 + 3 + 3 + 3
-    manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
-    assert manifest["settings"]["training.learner"] == "sarsa"
-    assert manifest["settings"]["seeds"] == list(SEEDS)
-
-
-DECAYS = {"epsilon_decay": (0.01 / 0.3) ** (1 / 3), "learning_rate_decay": 0.1 ** (1 / 3)}
-LEAST = {"min_epsilon": 0.01, "min_learning_rate": 0.01, "initial_q": 10}
-TRAINING = TrainingConfig("sarsa", 0.1, 0.9, 0.3, **DECAYS, **LEAST)
 CALM = TrainingConfig("sarsa", 0.1, 0.9, 0.01, 1.0)
-OTHERS = [seed + 2**32 for seed in SEEDS]
 
 
 def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are frozen
@@ -120,143 +36,13 @@ def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are
     return Task(pheromone=pheromone, life=life)
 
 
-@pytest.mark.slow
-def test_the_numbers_are_those_of_the_library(finished):
-    """Three ants that forage: copies of one in the paper's world, trained there."""
-    _, folder = finished
-    rules = replace(foraging(), life=Life(regrowth=0))
-    alone = Colony(worlds.paper(), rules, TRAINING, SEEDS)
-    alone.run(EPISODES, TICKS)
-    table = {"sharing": "frozen", "q_values": alone.q_values}
-    colony = Colony(worlds.paper(), rules, CALM, OTHERS, 3, **table)
-    condition = ("paper", "foraging", "alone", "3")
-    assert_measured(folder, condition, colony.run(ROLLOUTS, TICKS))
-
-
-@pytest.mark.slow
-def test_ants_are_evaluated_in_worlds_that_they_have_not_seen(finished):
-    """Three ants that queue, each episode in another open world of a pool, then in small ones."""
-    _, folder = finished
-    rules = replace(queueing(), life=Life(regrowth=0))
-    draws = [np.random.default_rng(seed).integers(64, size=EPISODES) for seed in SEEDS]
-    pool = [[worlds.open_world(2**20 + n, (30, 30, 30)) for n in each] for each in draws]
-    places = [list(of_episode) for of_episode in zip(*pool, strict=True)]
-    together = Colony(places[0], rules, TRAINING, SEEDS, 3)
-    together.run(EPISODES, TICKS, worlds=places)
-    small = [worlds.open_world(seed, (15, 15, 15)) for seed in SEEDS]
-    table = {"sharing": "frozen", "q_values": together.q_values}
-    colony = Colony(small, rules, CALM, OTHERS, 3, **table)
-    assert_measured(folder, ("small", "queueing", "open", "3"), colony.run(ROLLOUTS, TICKS))
-
-
-def assert_measured(folder, condition, outcome):
-    """The measures of each seed are those of episodes (episodes, seeds) of three ants."""
-    with open(folder / "seeds.csv", newline="") as file:
-        rows = [row for row in csv.DictReader(file) if tuple(row.values())[:4] == condition]
-    assert [int(row["seed"]) for row in rows] == list(SEEDS)
-    blocked = outcome.blocked.sum(axis=0) / outcome.moves.sum(axis=0)
-    first = np.where(outcome.first_delivery < 0, TICKS, outcome.first_delivery).mean(axis=0)
-    expected = {
-        "deliveries": outcome.deliveries.mean(axis=0) * 1000 / TICKS,
-        "first_delivery": first,
-        "blocked": blocked,
-        "reward": outcome.returns.mean(axis=0) * 1000 / TICKS / 3,
-    }
-    for name, values in expected.items():
-        assert [float(row[name]) for row in rows] == pytest.approx(values.tolist())
-
-
-@pytest.mark.slow
-def test_a_finished_study_grows(finished, remembered, tmp_path, monkeypatch):
-    """By a kind of world, then by a seed: in the end, results are those of one study."""
-    _, folder = finished
-    monkeypatch.chdir(tmp_path)
-    at = SMALL.index("--seeds") + 1
-    one_seed = [*SMALL[:at], 1, *SMALL[at + 1 :], "--out", "out"]
-    without_small = [one for one in one_seed if one != "small"]
-    for arguments in (without_small, one_seed, [*SMALL, "--out", "out"]):
-        assert faults.run("colony", arguments) == (0, "")
-    grown, whole = contents(Path("out")), contents(folder)
-    for found in (grown, whole):
-        del found["manifest.json"], found["report.html"]  # they have the time of the work
-    assert grown == whole
-    last_size = SMALL.index("--seeds") - 1
-    fewer_sizes = [*SMALL[:last_size], *SMALL[last_size + 1 :]]
-    status, err = faults.run("colony", [*fewer_sizes, "--out", "out"])
-    assert status == 2
-    assert "that this study lacks (sizes 3)" in err
-
-
-@pytest.mark.slow
-def test_policies_say_where_they_come_from(finished):
-    _, folder = finished
-    policy = load_policy(folder / "policies" / "paper_foraging_3.npz")
-    metadata = policy.metadata
-    assert policy.observation == metadata["task"]["observation"] == "ants"
-    assert (metadata["regime"], metadata["ants"], metadata["world_kind"]) == ("joint", 3, "paper")
-    assert metadata["seed"] in SEEDS
-
-
-@pytest.mark.slow
-def test_a_finished_study_is_shown_and_nothing_is_lost(finished, capsys):
-    _, folder = finished
-    before = contents(folder)
-    status, out, _ = call("colony", [*SMALL, "--out", folder], capsys)
-    assert status == 0
-    assert out.startswith((folder / "report.txt").read_text("utf-8"))
-    assert "already has these results" in out
-    other = [*SMALL, "--out", folder, "--training.learner", "q_learning"]
-    status, _, err = call("colony", other, capsys)
-    assert status == 2
-    assert_one_sentence(err)
-    assert "training.learner" in err
-    assert contents(folder) == before
-
-
-def test_quick_has_a_folder_of_its_own():
-    parse = load("colony").parse_arguments
-    assert parse(["study"]).out == Path("results", "colony")
-    assert parse(["study", "--quick"]).out == Path("results", "colony-quick")
-
-
-def test_other_arenas_are_the_only_difference_and_their_order_is_none(
-    capsys, tmp_path, monkeypatch
-):
-    def stop(study, blocks, *more, **where):
-        (blocks / "0.npz").touch()
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Study, "reduced", stop)
-    monkeypatch.chdir(tmp_path)
-    small = ["study", "--out", "out", "--seeds", 1, "--sizes", 2, "--world-kinds"]
-    for world_kinds in (["paper", "small"], ["small", "paper", "small"]):
-        assert call("colony", [*small, *world_kinds], capsys)[0] == 130
-    _, _, err = call("colony", [*small, "paper"], capsys)
-    assert "unfinished work that this study lacks (world_kinds 'small')" in err
-    _, _, err = call("colony", [*small, "paper", "small", "--training.discount", 0.8], capsys)
-    assert "(training.discount is 0.9 instead of 0.8)" in err
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("fault", [faults.killed, faults.full])
-def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
-    fault, remembered, tmp_path
-):
-    arguments = [*SMALL, "--world-kinds", "small", "--no-figures"]
-    assert faults.assert_it_survives(fault, "colony", arguments, tmp_path / "out") > 40
-
-
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        ([], "study|live"),
+        ([], "live"),
         (["play"], "invalid choice: 'play'"),
         (["--ants", 2], "invalid choice: '2'"),
-        (["study", "--task.life.births"], "unrecognized arguments: --task.life.births"),
-        (["study", "--world.piles", 2], "unrecognized arguments: --world.piles 2"),
-        (["study", "--training.initial-q", 2], "this command sets --training.initial-q itself"),
         (["live", "--quick"], "unrecognized arguments: --quick"),
-        (["study", "--save", "x"], "unrecognized arguments: --save x"),
         (
             ["live", "--resume", "x", "--task.life.regrowth", 0],
             "--task.life.regrowth cannot change a resumed",
@@ -307,14 +93,6 @@ def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
         (["live", "--figure", "a.gif"], "'a.gif' cannot hold one picture"),
         (["live", "--figure", "/proc/x/a.png"], "cannot write '/proc/x/a.png'"),
         (["live", "--resume", "x"], "cannot read 'x'"),
-        (["study", "--world-kinds", "moon"], "--world-kinds: invalid choice: 'moon' (choose from"),
-        (
-            ["study", "--training.learner", "sarsa_lambda"],
-            "shared table requires; choose one of q_learning, sarsa,",
-        ),
-        (["study", "--sizes", "300", "8", "--world-kinds", "paper"], "the number of ants is 300"),
-        (["study", "--training.learner", "none"], "there is no learner 'none'"),
-        (["study", "--training.epsilon", 2], "`training.epsilon` is 2; it must be between 0 and 1"),
         (["live", "--ants", 0], "0 is not allowed"),
         (["live", "--ants", 500, "--world.ranges", 10, 10, 10], "the number of ants is 500"),
         (
@@ -503,21 +281,9 @@ def test_stopped_a_colony_is_saved_at_a_whole_tick(kernels, tmp_path, monkeypatc
     assert saved.outcome().deliveries == colony.outcome().deliveries
 
 
-@pytest.mark.parametrize(
-    ("kind", "owner", "name", "said"),
-    [
-        ("live", command, "new_colony", "Stopped.\n"),
-        (
-            *("study", colony_study, "plan"),
-            "Stopped; finished parts are saved. Run the same command again to resume.\n",
-        ),
-    ],
-)
-def test_stopped_before_it_begins_it_promises_only_what_is_so(
-    kind, owner, name, said, capsys, monkeypatch
-):
-    monkeypatch.setattr(owner, name, lambda *given: signal.raise_signal(signal.SIGINT))
-    assert call("colony", [kind], capsys) == (130, "", said)
+def test_stopped_before_it_begins_it_promises_nothing(capsys, monkeypatch):
+    monkeypatch.setattr(command, "new_colony", lambda *given: signal.raise_signal(signal.SIGINT))
+    assert call("colony", ["live"], capsys) == (130, "", "Stopped.\n")
 
 
 def test_a_colony_starts_from_a_policy(capsys):
@@ -696,8 +462,7 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
 @pytest.mark.parametrize(
     ("arguments", "expected"),
     [
-        ("", ("study", "live")),
-        ("study", ("--quick", "--world-kinds", "--sizes", "--training.learner", "--force")),
+        ("", ("live",)),
         (
             "live",
             ("--ants", "--world", "--save", "--resume", "--render", "--task.pheromone.half-life"),
@@ -706,10 +471,10 @@ def test_colonies_live_side_by_side_and_can_start_spread(capsys, tmp_path, monke
 )
 def test_help_is_quick_and_needs_no_taichi(arguments, expected, tmp_path):
     script = (
-        "import runpy, sys\n"
-        f"sys.argv = ['colony.py', *{arguments.split()!r}, '--help']\n"
+        "import sys\n"
+        "from taichi_ants.commands import run\n"
         "try:\n"
-        f"    runpy.run_path({str(EXPERIMENTS / 'colony.py')!r}, run_name='__main__')\n"
+        f"    run('colony', [*{arguments.split()!r}, '--help'])\n"
         "except SystemExit as end:\n"
         "    assert end.code == 0\n"
         "heavy = {'taichi', 'numpy', 'scipy', 'matplotlib', 'rich'} & set(sys.modules)\n"

@@ -11,11 +11,11 @@ import tracemalloc
 from collections import namedtuple
 from pathlib import Path
 
+import compare
 import numpy as np
 import pytest
 from command_lines import assert_one_sentence, call, command, contents, environment, load
 
-from taichi_ants.report import results
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.studies.sweep import read_sweep
 
@@ -62,8 +62,8 @@ def comparison_of(seeds, folder):
     study = command.build_study(settings)
 
     def measure(blocks):
-        arrays = results.measured(study, blocks, {})
-        comparison = results.comparison_of(settings, study, arrays)
+        arrays = compare.measured(study, blocks, {})
+        comparison = compare.comparison_of(settings, study, arrays)
         return {name: comparison.measures[name] for name in ("return_all", "greedy_steps")}
 
     return measure

@@ -7,13 +7,13 @@ import re
 import sys
 from collections import Counter
 
+import compare
 import numpy as np
 import pytest
 from command_lines import EXPERIMENTS, ROOT
 from PIL import Image
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, WALKS
-from taichi_ants.commands import compare
 
 sys.path.insert(0, str(EXPERIMENTS))
 import findings

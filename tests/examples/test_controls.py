@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bridge import crossings
 from command_lines import EXPERIMENTS
 from matplotlib.figure import Figure
 
@@ -22,7 +23,6 @@ from taichi_ants.baselines.goss import choices
 from taichi_ants.baselines.utility import Foraging
 from taichi_ants.learners import registry as learners
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.studies.bridge import crossings
 from taichi_ants.task import Caste, Noise, Threshold
 from taichi_ants.worlds import double_bridge, paper
 

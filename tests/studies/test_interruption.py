@@ -155,7 +155,7 @@ STARTS = {
     [("argparse", "script"), ("numpy", "module"), ("taichi._lib.core.taichi_python", "script")],
 )
 def test_while_a_command_is_imported(module, start, tmp_path):
-    arguments = ["compare.py"] if start == "script" else ["taichi-ants", "compare"]
+    arguments = ["compare.py"] if start == "script" else ["taichi-ants", "sweep", "file.toml"]
     script = SCRIPT.format(module=module, arguments=arguments, start=STARTS[start])
     done = subprocess.run(
         [sys.executable, "-c", script],
@@ -172,7 +172,8 @@ def test_while_a_command_is_imported(module, start, tmp_path):
 
 
 SCRIPTS = (
-    *("ant_system", "findings", "fixed_rules", "gallery", "goss", "hero", "offline", "utility"),
+    *("ant_system", "bridge", "colony", "compare", "findings", "fixed_rules", "gallery", "goss"),
+    *("hero", "offline", "utility"),
 )
 COUNTING = """
 import runpy, signal, sys

@@ -11,6 +11,7 @@ import pytest
 from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, train
 from taichi_ants.files import archives
 from taichi_ants.studies import points as kinds_of_points
+from taichi_ants.studies import runner
 from taichi_ants.studies.points import EVALUATION_SEEDS, ColonyPoint, RunPoint, world_facts
 from taichi_ants.studies.provenance import provenance, source
 from taichi_ants.studies.runner import Study
@@ -101,6 +102,16 @@ def test_evaporation_is_a_setting_of_each(training, greedy, tmp_path):
     for name in NAMES:
         assert np.array_equal(outcome[name], getattr(trained, name)[0])
         assert np.array_equal(outcome[f"greedy_{name}"], getattr(rollouts, name)[0])
+
+
+def test_the_key_of_a_point_holds_the_physics_number(monkeypatch):
+    """Results of other physics must not mix; a version alone does not change results."""
+    point = RunPoint(paper(), Task(), SARSA, 20, 80, 2)
+    keys = Study((point,), (0,)).keys
+    monkeypatch.setattr("taichi_ants.__version__", "9.9")
+    assert Study((point,), (0,)).keys == keys
+    monkeypatch.setattr(runner, "PHYSICS", runner.PHYSICS + 1)
+    assert Study((point,), (0,)).keys != keys
 
 
 LIVELY = Task(delivery="truncates", evaporation_in_training=True, life=Life(regrowth=0))
@@ -426,7 +437,7 @@ def test_provenance():
     facts = provenance(["experiments/compare.py", "--out", "a b"])
     assert facts["command"] == "experiments/compare.py --out 'a b'"
     for program in ("/home/me/bin/taichi-ants", "/home/me/taichi_ants/__main__.py"):
-        assert provenance([program, "compare"])["command"] == "taichi-ants compare"
+        assert provenance([program, "sweep"])["command"] == "taichi-ants sweep"
     assert facts["packages"]["taichi"] == "1.7.4"
     assert {"kiwisolver", "mdurl"} <= facts["packages"].keys()  # which Matplotlib and Rich need
     assert not {"pytest", "mypy", "pip"} & facts["packages"].keys()

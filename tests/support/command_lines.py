@@ -30,7 +30,7 @@ def promptly() -> float:
 
 def environment(kernels: Path, **changes: str | None) -> dict[str, str]:
     """Return environment variables that cache kernels in a folder; changes to None remove names."""
-    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    paths = [str(ROOT), str(EXPERIMENTS), *filter(None, [os.environ.get("PYTHONPATH")])]
     wanted = {
         **os.environ,
         "PYTHONPATH": os.pathsep.join(paths),
@@ -75,9 +75,12 @@ def start(
     )
 
 
+STUDIES = ("compare", "colony", "bridge")  # scripts with studies, not starters of commands
+
+
 def load(name: str) -> ModuleType:
-    """Return the module of a command."""
-    return importlib.import_module(f"taichi_ants.commands.{name}")
+    """Return the module of a command, or of a script with a study."""
+    return importlib.import_module(name if name in STUDIES else f"taichi_ants.commands.{name}")
 
 
 Outcome = tuple[int, str, str]

@@ -17,14 +17,15 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NoReturn
 
+import colony
+import compare
 import pytest
 from command_lines import assert_one_sentence, load
 
 from taichi_ants import Task, files
 from taichi_ants.analysis.bounds import baselines
 from taichi_ants.files import results as result_files
-from taichi_ants.report import results
-from taichi_ants.studies import colony_study, result_folder
+from taichi_ants.studies import result_folder
 from taichi_ants.studies.points import ColonyPoint, RunPoint
 
 KILLED, WENT_ON = 77, 78  # exit statuses
@@ -33,9 +34,9 @@ KILLED, WENT_ON = 77, 78  # exit statuses
 def remember(patch: pytest.MonkeyPatch) -> None:
     """Cache the results of the engines, and remove times from results."""
     for owner, name in (
-        *((RunPoint, "do"), (ColonyPoint, "do"), (results, "what_policies_do")),
+        *((RunPoint, "do"), (ColonyPoint, "do"), (compare, "what_policies_do")),
         *((baselines, "bound_rows"), (baselines, "policy_rows")),
-        *((colony_study, "_drawn"), (colony_study, "limits_of")),
+        *((colony, "_drawn"), (colony, "limits_of")),
     ):
         known = _remembered(getattr(owner, name))
         patch.setattr(owner, name, staticmethod(known) if isinstance(owner, type) else known)

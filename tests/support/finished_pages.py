@@ -5,21 +5,21 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from colony import colony_page
+from colony_figures import draw_all as draw_study
+from colony_findings import Results as StudyResults
+from paper.comparison import DYNA_P5
+from paper.figures import draw_all
+from paper.page import Seen, comparison_page
+from paper.report import Results
 from synthetic_colony_study import build as build_study
 from synthetic_comparison import build, change, unchanged
 
 from taichi_ants import Colony, Task, TrainingConfig, worlds
 from taichi_ants.analysis.bounds.baselines import Baseline
-from taichi_ants.analysis.colony.figures import draw_all as draw_study
-from taichi_ants.analysis.colony.tables import Results as StudyResults
 from taichi_ants.analysis.drawings import drawings
-from taichi_ants.analysis.paper.figures import draw_all
-from taichi_ants.analysis.paper.published import DYNA_P5
-from taichi_ants.analysis.paper.report import Results
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
-from taichi_ants.report.colony import colony_page
-from taichi_ants.report.comparison import Seen, comparison_page
 from taichi_ants.report.page import Picture, Player
 from taichi_ants.viewer import record_colony, record_episode
 
@@ -72,7 +72,7 @@ def colony_html() -> str:
     colony.begin_episode()
     found = study_results()
     return colony_page(
-        *found,
+        found,
         drawings=drawings(draw_study(found.rows)),
         players=[Player("Paper's rules", "Nine ants", record_colony(colony, 30))],
         facts=FACTS,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-
-from taichi_ants.analysis.colony.study import REGIMES, RULES, Condition, Measured
+from colony_findings import REGIMES, RULES, Condition, Measured
 
 SIZES = (1, 2, 4, 8)
 

@@ -10,12 +10,21 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from paper.comparison import (
+    DYNA_P3,
+    GRID,
+    Q_LEARNING,
+    SARSA,
+    VARIANTS,
+    Comparison,
+    GridPoint,
+    Row,
+    Variant,
+)
+from paper.figures import curves_of
 
 from taichi_ants.analysis.behaviour import DELIVERS, WALKS
-from taichi_ants.analysis.paper.comparison import Comparison, GridPoint, Row, Variant
-from taichi_ants.analysis.paper.figures import curves_of
-from taichi_ants.analysis.paper.measures import measures_of_runs
-from taichi_ants.analysis.paper.published import DYNA_P3, GRID, Q_LEARNING, SARSA, VARIANTS
+from taichi_ants.measures.runs import measures_of_runs
 
 EARLY = 50  # number of early episodes
 EPISODES = ("returns", "steps", "deliveries")

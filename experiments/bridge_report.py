@@ -1,0 +1,270 @@
+"""Designs and results of the double bridge: the share of ants that take the short branch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants import files
+from taichi_ants.analysis import style
+from taichi_ants.analysis.findings import LEAST_SEEDS
+from taichi_ants.analysis.statistics import bootstrap_interval
+from taichi_ants.analysis.sweeps import draw_lines
+from taichi_ants.analysis.tables import Table, interval, number, plain_text, sentence
+from taichi_ants.errors import count
+from taichi_ants.files.results import REPORT
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SHORT_RIGHT, SHORT_LEFT, EQUAL = "23 and 36", "36 and 23", "23 and 23, food ahead"
+EQUAL_ASIDE = "23 and 23, food aside"
+LATE = "36, later 23 too"  # the short branch opens halfway through the evaluation
+BRIDGES = (SHORT_RIGHT, SHORT_LEFT, EQUAL, EQUAL_ASIDE, LATE)
+LOADS = ("foragers", "carriers")
+WINDOWS = 10  # parts of an evaluation; the late share is that of the second half
+
+
+@dataclass(frozen=True)
+class Design:
+    """The rules of a colony and the bridge on which it learns.
+
+    Attributes:
+        rules: "queueing" or "foraging", see `taichi_ants.task`.
+        aside: The argument of `worlds.double_bridge`.
+        slope: The slope of the trail. The deposit is chosen so that an ant lays it for 50 ticks.
+        evaporation: "linear" (by 1 per tick), "none", or the half-life in ticks as a number.
+    """
+
+    rules: str = "queueing"
+    aside: int = 1
+    ants: int = 32
+    slope: int = 10
+    evaporation: str = "linear"
+
+
+# Settings and the values to which each is changed alone, from the default design.
+PANELS: dict[str, tuple[Any, ...]] = {
+    "ants": (8, 16, 32, 64),
+    "slope": (1, 2, 5, 10, 20),
+    "evaporation": ("none", "linear", "100", "20"),
+}
+OTHERS = (Design(aside=0), Design(rules="foraging"), Design(rules="foraging", aside=0))
+DESIGNS = tuple(
+    dict.fromkeys(
+        [Design(), *OTHERS]
+        + [replace(Design(), **{name: one}) for name, some in PANELS.items() for one in some]
+    )
+)
+# Designs that are also evaluated on a bridge whose short branch opens late.
+LATE_DESIGNS = (Design(), *OTHERS, Design(evaporation="none"))
+
+# Crossings by design and bridge, int64 (windows, loads, branches, seeds), the short branch first.
+Crossings = Mapping[Design, Mapping[str, np.ndarray]]
+
+
+def bridges(design: Design) -> dict[str, dict[str, Any]]:
+    """Return the bridges on which a design is evaluated, as arguments of `double_bridge`.
+
+    On the bridge `LATE`, rock closes the short branch for the first half of the time.
+    """
+    unequal: dict[str, Any] = {"short": 23, "long": 36, "aside": design.aside}
+    equal = {"short": 23, "long": 23}
+    found = {SHORT_RIGHT: unequal, SHORT_LEFT: {**unequal, "mirrored": True}, EQUAL: equal}
+    if design.aside:
+        found[EQUAL_ASIDE] = {**equal, "aside": design.aside}
+    if design in LATE_DESIGNS:
+        found[LATE] = unequal
+    return found
+
+
+def length(bridge: str, ticks: int) -> int:
+    """Return the length in ticks of the evaluation on a bridge; `LATE` takes twice as long."""
+    return 2 * ticks if bridge == LATE else ticks
+
+
+def late_shares(crossed: np.ndarray) -> np.ndarray:
+    """Return the short branch's share in the second half, float64 (loads, seeds), nan if none."""
+    return _shares(crossed[len(crossed) // 2 :].sum(axis=0))
+
+
+def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, Any]]:
+    """Return a row for each design, bridge, seed, load and window, with the counts of crossings."""
+    return [
+        {
+            **asdict(design),
+            **{"bridge": bridge, "seed": seed, "load": load},
+            "from_tick": w * length(bridge, ticks) // WINDOWS,
+            **{"short": int(crossed[w, k, 0, s]), "long": int(crossed[w, k, 1, s])},
+        }
+        for design, bridges in found.items()
+        for bridge, crossed in bridges.items()
+        for s, seed in enumerate(seeds)
+        for k, load in enumerate(LOADS)
+        for w in range(WINDOWS)
+    ]
+
+
+def write_results(
+    folder: Path, found: Crossings, seeds: Sequence[int], ticks: int, draws: bool
+) -> None:
+    """Write counts, report and, if `draws`, figures of evaluations of `ticks` ticks."""
+    table = rows(found, seeds, ticks)
+    files.write_csv(folder / "shares.csv", table, list(table[0]))
+    files.write_text(folder / REPORT, report(found, ticks))
+    if draws:
+        figures = files.check_writable_folder(folder / "figures")
+        with style.all_or_none(figures):
+            draw(figures / "bridge.png", found, ticks)
+            draw_late(figures / "late.png", found, ticks)
+
+
+def report(found: Crossings, ticks: int) -> str:
+    """Return tables of the late shares of all designs and of the shares after a late opening."""
+    headers = [*asdict(Design())]
+    lines, late = [], []
+    for design, bridges in found.items():
+        row = [*map(str, asdict(design).values())]
+        for bridge, crossed in bridges.items():
+            if bridge != LATE:
+                lines.append([*row, bridge, *map(_cell, late_shares(crossed))])
+                continue
+            for k, load in enumerate(LOADS):
+                *first, last = _shares(crossed)[WINDOWS // 2 :, k]
+                means = [number(_percent(values)[0], 0) for values in first]
+                colonies = f"{np.count_nonzero(last > 0.5)} of {np.isfinite(last).sum()}"
+                late.append([*row, load, *means, _cell(last), colonies])
+    means_of = _means(found)
+    shares = Table(
+        f"Share of the short branch, second half: {means_of}",
+        [*headers, "branches", *(f"{load}, %" for load in LOADS)],
+        lines,
+        text_columns=len(headers) + 1,
+    )
+    edges = [w * 2 * ticks // WINDOWS for w in range(WINDOWS // 2 + 1)]
+    since = Table(
+        f"Share of a short branch that opens after {ticks} ticks, by ticks since then",
+        [*headers, "%", *(f"{a} to\n{b}" for a, b in pairwise(edges)), "colonies\nabove 50 %"],
+        late,
+        [f"{sentence(means_of)}. Colonies are counted in the last column of ticks."],
+        text_columns=len(headers) + 1,
+    )
+    return plain_text([shares, since], 120)
+
+
+def _cell(values: np.ndarray) -> str:
+    mean, low, high = _percent(values)
+    return number(mean, 0) + ("" if np.isnan(low) else f" {interval(low, high, 0)}")
+
+
+def _means(found: Crossings) -> str:
+    seeds = next(iter(found[Design()].values())).shape[-1]
+    if seeds < LEAST_SEEDS:
+        few = f"too few for intervals (use {LEAST_SEEDS} or more)"
+        return f"means over {count(seeds, 'seed')}, {few}"
+    return f"means over {seeds} seeds with 95 % intervals"
+
+
+def draw(path: Path, found: Crossings, ticks: int) -> None:
+    """Draw the shares over time on three bridges, and against three settings."""
+    titles = {
+        SHORT_RIGHT: "Short branch to the right",
+        SHORT_LEFT: "Short branch to the left",
+        EQUAL: "Equal branches: right branch",
+    }
+    with style.styled():
+        figure = style.new_figure(5.6)
+        above, below = figure.subplots(2, len(PANELS), sharey=True)
+        for axes, (bridge, title) in zip(above, titles.items(), strict=True):
+            # The food of equal branches is never aside.
+            ahead = {} if bridge == EQUAL else {", food ahead": found[Design(aside=0)][bridge]}
+            _draw_shares(axes, {"": found[Design()][bridge], **ahead}, ticks)
+            axes.set(title=title, xlabel="Tick")
+        for axes, (name, values) in zip(below, PANELS.items(), strict=True):
+            mirrored = np.array([_of_both_sides(found, name, value) for value in values])
+            _draw_lines(axes, {load: (values, mirrored[:, k]) for k, load in enumerate(LOADS)})
+            axes.set(title=name.capitalize())
+            if name != "evaporation":
+                axes.set_xticks(values)
+        caption = (
+            f"{sentence(_means(found))}. Upper row: {Design().ants} ants.\n"
+            "Lower row: food aside, one setting varies; second half of the time, mean of both "
+            "mirror images.\nEvaporation: none, 1 per tick (linear), or a half-life in ticks."
+        )
+        for axes in (above[0], below[0]):
+            axes.set(ylabel="Crossings (%)", ylim=(0, 103))
+        title = "Share of crossings by the short branch of a double bridge"
+        style.frame(figure, title, caption, style.legend_entries(above))
+    style.save(figure, path)
+
+
+def _of_both_sides(found: Crossings, name: str, value: Any) -> np.ndarray:
+    bridges = found[replace(Design(), **{name: value})]
+    return np.mean([late_shares(bridges[one]) for one in (SHORT_RIGHT, SHORT_LEFT)], axis=0)
+
+
+def draw_late(path: Path, found: Crossings, ticks: int) -> None:
+    """Draw the shares before and after the short branch opens, for three designs."""
+    panels = {
+        "Food aside": Design(),
+        "Food ahead": Design(aside=0),
+        "Food aside, no evaporation": Design(evaporation="none"),
+    }
+    with style.styled():
+        figure = style.new_figure(3.2)
+        several = figure.subplots(1, len(panels), sharey=True)
+        for axes, (title, design) in zip(several, panels.items(), strict=True):
+            _draw_shares(axes, {"": found[design][LATE]}, 2 * ticks)
+            axes.axvline(ticks, color=style.GREY, linewidth=0.9)
+            axes.annotate("opens", (ticks, 95), (-4, 0), textcoords="offset points", ha="right")
+            axes.set(title=title, xlabel="Tick", xticks=[0, ticks, 2 * ticks])
+        several[0].set(ylabel="Crossings (%)", ylim=(0, 103))
+        caption = (
+            f"{sentence(_means(found))}; {Design().ants} ants that have learned with both branches "
+            "open and follow their final policy.\nIn the model of Goss and others, no colony "
+            "switches to a short branch that opens late."
+        )
+        title = "Share of crossings by a short branch that opens late"
+        style.frame(figure, title, caption, style.legend_entries(several))
+    style.save(figure, path)
+
+
+def _draw_shares(axes: Axes, crossed: Mapping[str, np.ndarray], ticks: int) -> None:
+    """Draw shares over time; the keys of `crossed` are appended to the names of the loads."""
+    middle = [(w + 0.5) * ticks / WINDOWS for w in range(WINDOWS)]
+    lines = {
+        f"{load}{words}": (middle, _shares(counts)[:, k])
+        for words, counts in crossed.items()
+        for k, load in enumerate(LOADS)
+    }
+    _draw_lines(axes, lines)
+    axes.set(xlim=(0, ticks), xticks=np.linspace(0, ticks, 4))
+
+
+def _draw_lines(axes: Axes, lines: Mapping[str, tuple[Sequence[Any], np.ndarray]]) -> None:
+    """Draw lines by label, each as positions on the x-axis and shares (positions, seeds)."""
+    axes.axhline(50, color=style.GREY, linewidth=0.7, linestyle="dashed")
+    points = {
+        label: [(place, *_percent(values)) for place, values in zip(places, shares, strict=True)]
+        for label, (places, shares) in lines.items()
+    }
+    draw_lines(axes, points)
+
+
+def _shares(crossed: np.ndarray) -> np.ndarray:
+    """Return the share of the short branch, float64 (..., seeds), nan without a crossing."""
+    total = crossed.sum(axis=-2)
+    return np.where(total > 0, crossed[..., 0, :] / np.maximum(total, 1), np.nan)
+
+
+def _percent(shares: np.ndarray) -> tuple[float, float, float]:
+    """Return the mean over seeds with crossings and its interval, nan for too few seeds."""
+    there = shares[np.isfinite(shares)]
+    low, high = bootstrap_interval(there[None]) if len(there) >= LEAST_SEEDS else ([np.nan],) * 2
+    mean = there.mean() if there.size else np.nan
+    return 100 * float(mean), 100 * float(low[0]), 100 * float(high[0])

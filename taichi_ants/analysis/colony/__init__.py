@@ -1,1 +1,0 @@
-"""The scaling study of the colony: data, comparisons, tables and figures."""

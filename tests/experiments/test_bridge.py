@@ -1,0 +1,179 @@
+"""The study of the double bridge: crossings, designs, and shares from known counts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bridge_report
+import numpy as np
+import pytest
+from bridge import crossings, point, task
+from bridge_report import (
+    BRIDGES,
+    DESIGNS,
+    EQUAL,
+    LATE,
+    SHORT_LEFT,
+    SHORT_RIGHT,
+    WINDOWS,
+    Design,
+    bridges,
+    late_shares,
+)
+from PIL import Image
+
+from taichi_ants import AntsError, Colony, TrainingConfig
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
+
+TICKS = 100
+BRIDGE = {"short": 10, "long": 13, "mirrored": True, "aside": 1}
+
+
+class Scripted:
+    """A colony of ants that stand where a script says: (place, load) of each ant by tick."""
+
+    def __init__(self, script: list[dict[int, tuple[str, int]]]) -> None:
+        grid, (nest, food) = double_bridge(**BRIDGE).grid, junction_cells(**BRIDGE)
+        short, long = (cells[len(cells) // 4] for cells in branch_cells(**BRIDGE))
+        places = {"nest": nest, "food": food, "short": short, "long": long}
+        self.places = {name: int(grid.index(cell)) for name, cell in places.items()}
+        assert len(set(self.places.values())) == 4
+        self.script, self.seeds, self.ticks = script, (7, 8), 0
+        self.capacity = len(script) // 2
+        self.cells = np.zeros((2, self.capacity), np.int32)
+        self.carrying = np.zeros((2, self.capacity), bool)
+
+    def begin_episode(self, length: int) -> None:
+        self.ticks = 0
+        self._place()
+
+    def tick(self, n: int) -> None:
+        self.ticks += n
+        self._place()
+
+    def _place(self) -> None:
+        for ant, moments in enumerate(self.script):
+            name, load = moments[max(tick for tick in moments if tick <= self.ticks)]
+            self.cells.flat[ant], self.carrying.flat[ant] = self.places[name], load
+
+
+def test_an_ant_crosses_when_it_comes_to_the_other_room_by_its_last_branch() -> None:
+    there_and_back = {
+        **{0: ("nest", 0), 8: ("short", 0), 20: ("food", 0)},
+        **{40: ("long", 1), 60: ("short", 1), 72: ("long", 1), 80: ("nest", 1)},
+    }
+    turns_round = {0: ("nest", 0), 20: ("long", 0), 40: ("nest", 0), 60: ("long", 0)}
+    without_food = {0: ("nest", 0), 4: ("long", 0), 24: ("food", 0), 48: ("short", 0)}
+    without_food[88] = ("nest", 0)
+    with_food = {0: ("nest", 1), 8: ("short", 1), 20: ("food", 1), 48: ("short", 0)}
+    colony = Scripted([there_and_back, turns_round, without_food, with_food])
+    found = crossings(colony, BRIDGE, TICKS)
+    assert found.shape == (WINDOWS, 2, 2, 2)
+    # Window, load, branch, world: only useful crossings count.
+    counted = [tuple(one) for one in np.argwhere(found).tolist()]
+    assert counted == [(1, 0, 0, 0), (2, 0, 1, 1), (7, 1, 1, 0)]
+    assert found.sum() == 3
+
+
+@pytest.mark.parametrize("opens", [0, 301])
+def test_nobody_takes_the_short_branch_before_it_opens(opens: int) -> None:
+    place, ticks = double_bridge(**BRIDGE), 602
+    training = TrainingConfig("sarsa", 0.1, 0.9, epsilon=0.02, epsilon_decay=1.0)
+    follow = {"sharing": "frozen", "q_values": trail_follower("queues"), "schedule": "by_world"}
+    colony = Colony(place, task(Design()), training, [3], 12, **follow)
+    found = crossings(colony, BRIDGE, ticks, opens)
+    before, after = found[: WINDOWS // 2].sum(axis=(0, 1, 3)), found[5:].sum(axis=(0, 1, 3))
+    assert colony.ticks == ticks
+    assert after[0] > 10
+    assert (before[0] == 0) == (opens > 0)
+    if opens:
+        assert before[1] > 10
+    short = place.grid.index(branch_cells(**BRIDGE)[0])
+    assert not (colony.arrays["walls"][short]).any()
+
+
+def test_colonies_learn_where_the_short_branch_lies_on_either_side() -> None:
+    one = point(Design(), episodes=60, ticks=10)
+    assert one.pool == (double_bridge(aside=1), double_bridge(mirrored=True, aside=1))
+    drawn = np.array([[place is one.pool[0] for place in of] for of in one.places(range(20))])
+    assert 0.4 < drawn.mean() < 0.6
+    assert one.training.initial_q > 0
+    assert one.training.next_epsilon(one.training.epsilon) < one.training.epsilon
+
+
+def test_a_design_is_a_task_and_bridges() -> None:
+    assert len(set(DESIGNS)) == len(DESIGNS)
+    for design in DESIGNS:
+        rules = task(design)
+        assert rules.observation == {"queueing": "queues", "foraging": "ants"}[design.rules]
+        assert rules.pheromone.fades_after == 50
+        assert rules.life.regrowth == 0
+    assert task(Design(evaporation="20")).pheromone.half_life == 20
+    assert task(Design(evaporation="none")).pheromone.evaporation == "none"
+    assert tuple(bridges(Design())) == BRIDGES
+    assert tuple(bridges(Design(aside=0))) == (SHORT_RIGHT, SHORT_LEFT, EQUAL, LATE)
+    assert LATE not in bridges(Design(ants=8))
+    assert bridges(Design())[EQUAL].get("aside", 0) == 0
+
+
+SEEDS = (3, 4, 5)
+
+
+def counts(seeds: int) -> dict:
+    """Each colony sends 3 foragers of 4 and 9 carriers of 10 by the short branch, but the last."""
+    crossed = np.zeros((WINDOWS, 2, 2, seeds), np.int64)
+    crossed[:, 0] = [[3], [1]]
+    crossed[:, 1] = [[9], [1]]
+    crossed[..., -1] = 0
+    return {design: dict.fromkeys(BRIDGES, crossed) for design in DESIGNS}
+
+
+@pytest.fixture
+def found() -> dict:
+    return counts(len(SEEDS))
+
+
+def test_late_shares_are_of_the_second_half(found: dict) -> None:
+    crossed = found[Design()][BRIDGES[0]].copy()
+    crossed[: WINDOWS // 2, :, 0] = 1000
+    shares = late_shares(crossed)
+    np.testing.assert_allclose(shares[:, :2], [[0.75] * 2, [0.9] * 2])
+    assert np.isnan(shares[:, 2]).all()
+
+
+def test_few_seeds_give_no_intervals_and_the_report_says_how_many(found: dict) -> None:
+    """Nor do ten of which some had no crossing."""
+    text = bridge_report.report(found, 3000)
+    assert text.count("3 seeds, too few for") == 2  # a table each
+    assert "[" not in text
+    assert "[" not in bridge_report.report(counts(10), 3000)
+
+
+def test_shares_after_a_late_opening() -> None:
+    """Foragers by the short branch: nobody before, 10, 30, 50, 70, 90 % after, in 11 colonies."""
+    crossed = np.zeros((WINDOWS, 2, 2, 12), np.int64)
+    crossed[:5, :, 1] = 9
+    crossed[5:, 0, 0] = np.array([1, 3, 5, 7, 9])[:, None]
+    crossed[5:, 0, 1] = 10 - crossed[5:, 0, 0]
+    crossed[:, 0, :, 0] = crossed[:, 0, ::-1, 0]  # this one ends with 10 %
+    crossed[:, :, :, -1] = 0
+    text = bridge_report.report({Design(): {LATE: crossed}}, 3000)
+    (foragers,) = [line for line in text.splitlines() if " foragers " in line]
+    *means, low, high, colonies, of, all_of_them = foragers.split()[6:]
+    assert means == ["17", "34", "50", "66", "83"]
+    assert float(low[1:-1]) < 83 < float(high[:-1])
+    assert (colonies, of, all_of_them) == ("10", "of", "11")
+    assert "opens after 3000 ticks" in text
+
+
+def test_colonies_in_which_nobody_crosses_are_left_out_of_the_figure(
+    found: dict, tmp_path: Path
+) -> None:
+    path = tmp_path / "bridge.png"
+    for draw in (bridge_report.draw, bridge_report.draw_late):
+        draw(path, found, 3000)
+        with Image.open(path) as image:
+            assert np.asarray(image.convert("RGB")).std() > 5
+        with pytest.raises(AntsError):
+            draw(tmp_path / "nowhere" / "bridge.png", found, 3000)

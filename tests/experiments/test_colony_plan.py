@@ -1,0 +1,93 @@
+"""What the study of the colony plans; what comes out is tried as a command."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from colony import (
+    COMPARED,
+    POOL,
+    TASKS,
+    greedy,
+    measured,
+    plan,
+    study_of,
+)
+from colony_findings import ELSEWHERES, WORLD_KINDS, Condition
+
+from taichi_ants import TrainingConfig, worlds
+from taichi_ants.analysis.bounds.limits import limits_of
+
+SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0, 0.01)
+SEEDS = (3, 4)
+
+
+@pytest.fixture(scope="module")
+def planned():
+    return plan([*WORLD_KINDS, *ELSEWHERES], (1, 4, 16, 64), SEEDS, SARSA, 60, 1000, 4)
+
+
+def test_every_design_has_its_conditions(planned) -> None:
+    jointly = [one for one in planned if one.regime == "joint"]
+    assert len(jointly) == len(WORLD_KINDS) * len(TASKS) * 4
+    for regime, sizes in (("alone", {4, 16, 64}), ("with_4", {16, 64}), ("with_16", {64})):
+        found = {
+            one.ants
+            for one in planned
+            if (one.world_kind, one.rules, one.regime) == ("open", "paper", regime)
+        }
+        assert found == sizes
+    abroad = {one.world_kind: one.ants for one in planned if one.regime == "open"}
+    assert abroad.keys() == {"paper", "piles", *ELSEWHERES}
+    assert {world_kind for world_kind, ants in abroad.items() if ants != 64} == {"large"}
+    assert len(planned) == len(jointly) + len(WORLD_KINDS) * len(COMPARED) * 6 + len(abroad) * 3
+
+
+def test_nobody_is_evaluated_where_it_was_trained(planned) -> None:
+    for (world_kind, *_), point in planned.items():
+        teacher = point.after or point
+        if world_kind == "paper" and point.after is None:
+            assert point.pool is None
+            assert point.world == worlds.paper()
+        elif teacher.pool is not None:
+            assert len(set(teacher.pool)) == POOL
+            seen = point.world if isinstance(point.world, tuple) else (point.world,)
+            assert not set(seen) & set(teacher.pool)
+        places = teacher.places(SEEDS)
+        assert places is None or len(places) == 60
+
+
+def test_epsilon_and_learning_rate_fall_in_the_first_70_percent(planned) -> None:
+    training = planned[Condition("paper", "foraging", "joint", 64)].training
+    epsilon, rate = training.epsilon, training.learning_rate
+    for _ in range(42):
+        epsilon, rate = training.next_epsilon(epsilon), training.next_learning_rate(rate)
+    assert (epsilon, rate) == pytest.approx((0.01, 0.01))
+    assert training.next_epsilon(epsilon) == pytest.approx(0.01)
+
+
+def test_every_condition_is_evaluated_without_exploration_too(planned) -> None:
+    points = set(study_of(planned, SEEDS).points)
+    for point in planned.values():
+        calm = greedy(point)
+        assert {point, calm} <= points
+        assert (calm.exploration, calm.episodes) == (0, 0)
+        assert calm.after == (point.after or point)
+        assert (calm.world, calm.task, calm.ants) == (point.world, point.task, point.ants)
+
+
+def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
+    one = Condition("piles", "queueing", "joint", 64)
+    elsewhere = Condition("moving", "queueing", "open", 64)
+    conditions = {condition: planned[condition] for condition in (one, elsewhere)}
+    point = planned[one]
+    expected = [limits_of(world, point.task).deliveries(64) for world in point.world]
+    assert expected[0] != expected[1]
+    values = {point: {"deliveries": np.array([700.0, 700.0])} for point in conditions.values()}
+    values |= {greedy(p): {"deliveries": np.array([800.0, 800.0])} for p in conditions.values()}
+    found = measured(conditions, values, len(SEEDS))
+    assert found[one]["bound"].tolist() == expected
+    assert np.isnan(found[elsewhere]["bound"]).all()  # the limits do not hold where food moves
+    assert found[one]["greedy"].tolist() == [800, 800]
+    assert found[one]["bound_share"] == pytest.approx(700 / np.array(expected))
+    assert np.isnan(found[elsewhere]["bound_share"]).all()

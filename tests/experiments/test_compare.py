@@ -1,0 +1,529 @@
+"""The paper's comparison as a command: its files, held against the library."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import compare as module
+import faults
+import numpy as np
+import pytest
+from command_lines import (
+    EXPERIMENTS,
+    assert_one_sentence,
+    call,
+    contents,
+    environment,
+    load,
+    promptly,
+    run,
+    start,
+)
+
+from taichi_ants import (
+    Task,
+    TrainingConfig,
+    evaluate,
+    load_policy,
+    train,
+    worlds,
+)
+from taichi_ants.analysis.behaviour import DELIVERS
+from taichi_ants.files import archives
+from taichi_ants.measures.runs import measures_of_runs
+from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
+
+GARDEN = EXPERIMENTS / "maps" / "garden.txt"
+SEEDS, EPISODES, MAX_STEPS, ROLLOUTS = (7, 8, 9), 60, 45, 50
+SMALL = [
+    *("--seeds", len(SEEDS), "--seed", SEEDS[0], "--episodes", EPISODES),
+    *("--max-steps", MAX_STEPS, "--learners", "sarsa", "dyna_q"),
+    *("--planning-steps", 2, "--learning-rates", 0.01, "--discounts", 0.9, 0.99),
+    *("--epsilons", 0.3, "--epsilon-decays", 0.995),
+]
+TINY = [
+    *("--seeds", 1, "--episodes", 2, "--max-steps", 30, "--learners", "q_learning"),
+    *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
+    *("--delivery", "terminates", "--no-figures"),
+]
+COLUMNS = [
+    *("learner", "hyperparameters", "learning_rate", "discount", "epsilon", "epsilon_decay"),
+    *("delivery", "seeds"),
+]
+for measure in (
+    *("return_last50", "steps_last50", "steps_all", "deliveries_last50"),
+    *("greedy_return", "greedy_steps", "greedy_deliveries"),
+):
+    COLUMNS += [f"{measure}_{name}" for name in ("mean", "ci_low", "ci_high")]
+    if not measure.startswith(("deliveries", "greedy_deliveries")):
+        COLUMNS += [f"{measure}_{name}" for name in ("iqm", "iqm_ci_low", "iqm_ci_high")]
+COLUMNS += [
+    f"runs_{name}" for name in ("delivers", "walks_the_trail", "circles_with_food", "other")
+]
+FIGURES = {
+    *("figures/learning_curves.png", "figures/return_against_deliveries.png"),
+}
+LEARNERS = {
+    "sarsa": ("sarsa", ""),
+    "dyna_q_p2": ("dyna_q", "planning_steps=2"),
+}
+# Within 45 steps some deliver and some do not, in all of these.
+SHOWN = [
+    f"{delivery}_{learner}_{behaviour}"
+    for delivery in ("truncates", "terminates")
+    for learner in LEARNERS
+    for behaviour in ("delivers", "circles_with_food")
+]
+POLICY = f"policies/{SHOWN[0]}.npz"
+RENDERS = {f"renders/{name}.gif" for name in SHOWN}
+FILES = {
+    *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "runs.npz"),
+    *("manifest.json", "report.html", "report.txt", "summary.csv", "table2.csv", "table2.md"),
+    *(f"policies/{name}.npz" for name in SHOWN),
+    *FIGURES,
+    *RENDERS,
+}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory, kernels):
+    """The folder that one run of the command has left; not to be written to."""
+    place = tmp_path_factory.mktemp("compare")
+    done = run("compare", [*SMALL, "--out", "deep/out"], kernels, place)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""  # no progress bar where nobody looks
+    folder = place / "deep" / "out"
+    report = (folder / "report.txt").read_text("utf-8")
+    assert done.stdout.startswith(report)
+    assert re.fullmatch(
+        r"\n\d+\.\d s; all results are in deep/out/\ndeep/out/report.html\n",
+        done.stdout.removeprefix(report),
+    )
+    return folder
+
+
+@pytest.fixture
+def copy(finished, tmp_path):
+    """A copy of it to try things on."""
+    return Path(shutil.copytree(finished, tmp_path / "out"))
+
+
+@pytest.fixture
+def compare(capsys, monkeypatch):
+    """Calls the script within this process, without a worker process, which `finished` has."""
+    monkeypatch.setattr(module.runtime, "available_threads", lambda: 1)
+    return lambda *arguments: call("compare", arguments, capsys)
+
+
+def read_csv(path):
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def config_of(row):
+    """The configuration that a row of summary.csv names."""
+    numbers = [float(row[name]) for name in COLUMNS[2:6]]
+    own = (pair.split("=") for pair in row["hyperparameters"].split())
+    return TrainingConfig(row["learner"], *numbers, **{name: int(value) for name, value in own})
+
+
+def task_of(row, training=False, greedy=True):
+    """The task that a row names, with these evaporations."""
+    return Task(
+        delivery=row["delivery"], evaporation_in_training=training, evaporation_in_evaluation=greedy
+    )
+
+
+def trained_as(rows, *more):
+    """What the library makes of several rows: returns, steps, deliveries and tables, by name."""
+    runs = [train(worlds.paper(), config_of(row), *more, task_of(row)) for row in rows]
+    names = ("returns", "steps", "deliveries", "q_values")
+    return {name: np.concatenate([getattr(run, name) for run in runs]) for name in names}
+
+
+CALM = Task(evaporation_in_evaluation=False)
+
+
+def test_files(finished):
+    assert set(contents(finished)) == FILES
+    assert not (finished / "unfinished").exists()
+
+
+def test_summary_lists_the_grid(finished):
+    text = (finished / "summary.csv").read_text("utf-8")
+    assert text.splitlines()[0] == ",".join(COLUMNS)
+    rows = read_csv(finished / "summary.csv")
+    assert len({(config_of(row), task_of(row)) for row in rows}) == len(rows) == 2 * 2 * 2
+    learners = [(row["learner"], row["hyperparameters"], row["delivery"]) for row in rows]
+    names = LEARNERS.values()
+    deliveries = "truncates", "terminates"
+    assert set(learners) == {(*name, delivery) for name in names for delivery in deliveries}
+    assert {row["discount"] for row in rows} == {"0.9", "0.99"}
+    assert {row["seeds"] for row in rows} == {str(len(SEEDS))}
+
+
+def test_runs_are_what_the_library_gives_in_the_order_of_the_summary(finished):
+    rows = read_csv(finished / "summary.csv")
+    arrays = archives.read(finished / "runs.npz")
+    trained = trained_as(rows, SEEDS, EPISODES, MAX_STEPS)
+    greedy = evaluate(worlds.paper(), trained["q_values"], ROLLOUTS, SEEDS, MAX_STEPS)
+    names = ("returns", "steps", "deliveries")
+    outcome = trained | {f"greedy_{name}": getattr(greedy, name) for name in names}
+    expected = measures_of_runs(outcome)
+    assert arrays["return_all"].shape == (len(rows), len(SEEDS))
+    for name, values in expected.items():
+        np.testing.assert_array_equal(arrays[name], values, err_msg=name)
+    assert set(arrays) - set(expected) == {
+        *("behaviours", "policy_returns"),
+        *(f"curve_{name}" for name in names),
+    }
+    assert {name: arrays[f"curve_{name}"].shape[:2] for name in names} == dict.fromkeys(
+        names, (4, 3)
+    )
+    assert arrays["deliveries_all"].any()
+    assert arrays["greedy_deliveries"].any()
+
+
+def test_baselines(finished):
+    rows = {(row["baseline"], row["discount"]): row for row in read_csv(finished / "baselines.csv")}
+    assert set(rows) == {
+        *(("shortest delivery", ""), ("optimal policy", "0.9"), ("optimal policy", "0.99")),
+        *(("random policy", ""), ("trail follower", "")),
+    }
+    shortest = rows["shortest delivery", ""]
+    assert (float(shortest["return_mean"]), float(shortest["steps_mean"])) == (45, 34)
+    uniform = np.zeros((len(SEEDS), 128, 5))
+    outcome = evaluate(worlds.paper(), uniform, ROLLOUTS, SEEDS, MAX_STEPS, CALM)
+    row = rows["random policy", ""]
+    assert float(row["return_mean"]) == pytest.approx(outcome.returns.mean())
+    assert float(row["steps_mean"]) == pytest.approx(outcome.steps.mean())
+
+
+def test_policies_are_those_of_median_runs_of_each_behaviour(finished):
+    rows = read_csv(finished / "summary.csv")
+    for name in SHOWN:
+        q_values, _, metadata = load_policy(finished / "policies" / f"{name}.npz")
+        behaviour = metadata["behaviour"].replace(" ", "_")
+        delivery, learner = name.removesuffix(f"_{behaviour}").split("_", 1)
+        mine = [
+            row
+            for row in rows
+            if (row["learner"], row["hyperparameters"]) == LEARNERS[learner]
+            and row["delivery"] == delivery
+        ]
+        if learner == "sarsa":  # its configuration in the paper's table 2 is one of these
+            (chosen,) = [row for row in mine if row["discount"] == "0.9"]
+        else:
+            chosen = max(mine, key=lambda row: float(row["return_last50_iqm"]))
+        assert TrainingConfig(**metadata["config"]) == config_of(chosen)
+        assert Task.from_dict(metadata["task"]) == task_of(chosen)
+        trained = train(
+            worlds.paper(), config_of(chosen), SEEDS, EPISODES, MAX_STEPS, task_of(chosen)
+        )
+        number = SEEDS.index(metadata["seed"])
+        assert np.array_equal(q_values, trained.q_values[0, number])
+        returns = trained.returns[0, :, -50:].mean(axis=1)
+        assert metadata["return_last50"] == returns[number]
+        # What it does was seen as in training: without evaporation.
+        once = evaluate(worlds.paper(), trained.q_values[0], 1, SEEDS, MAX_STEPS, CALM)
+        alike = once.deliveries[:, 0] == (metadata["behaviour"] == "delivers")
+        assert alike[number]
+        assert int(chosen[f"runs_{behaviour}"]) == alike.sum()
+        assert (returns[alike] < returns[number]).sum() == (alike.sum() - 1) // 2
+        assert metadata["task"]["evaporation_in_training"] is False
+
+
+def test_behaviours_are_those_of_the_policies(finished):
+    rows = read_csv(finished / "summary.csv")
+    archive = archives.read(finished / "runs.npz")
+    behaviours, returns = archive["behaviours"], archive["policy_returns"]
+    trained = trained_as(rows, SEEDS, EPISODES, MAX_STEPS)
+    once = evaluate(worlds.paper(), trained["q_values"], 1, SEEDS, MAX_STEPS, CALM)
+    assert np.array_equal(returns, once.returns[..., 0])
+    assert np.array_equal(behaviours == DELIVERS, once.deliveries[..., 0] == 1)
+    lines = read_csv(finished / "behaviours.csv")
+    assert sum(int(line["runs"]) for line in lines) == behaviours.size
+    for number, row in enumerate(rows):
+        assert int(row["runs_delivers"]) == (behaviours[number] == DELIVERS).sum()
+        assert sum(int(row[name]) for name in COLUMNS[-4:]) == len(SEEDS)
+        mine = [line for line in lines if all(line[name] == row[name] for name in COLUMNS[:7])]
+        mean = sum(float(line["policy_return_mean"]) * int(line["runs"]) for line in mine)
+        assert mean == pytest.approx(returns[number].sum())
+
+
+@pytest.mark.parametrize(("training", "greedy"), [("on", "off"), ("off", "off")])
+def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, compare):
+    flags = ["--task.evaporation-in-training", str(training == "on").lower()]
+    flags += ["--task.evaporation-in-evaluation", str(greedy == "on").lower()]
+    out = tmp_path / "out"
+    assert compare(*TINY, "--episodes", 30, *flags, "--out", out)[0] == 0
+    (row,) = read_csv(out / "summary.csv")
+    task = task_of(row, training == "on", greedy == "on")
+    trained = train(worlds.paper(), config_of(row), 0, 30, 30, task)
+    rollouts = evaluate(worlds.paper(), trained.q_values, ROLLOUTS, [0], 30, task)
+    as_trained = replace(task, evaporation_in_evaluation=training == "on")
+    once = evaluate(worlds.paper(), trained.q_values, 1, [0], 30, as_trained)
+    archive = archives.read(out / "runs.npz")
+    assert np.array_equal(archive["return_all"], trained.returns.mean(axis=2))
+    assert np.array_equal(archive["greedy_return"], rollouts.returns.mean(axis=2))
+    assert np.array_equal(archive["policy_returns"], once.returns[..., 0])
+    manifest = json.loads((out / "manifest.json").read_text("utf-8"))
+    assert manifest["settings"]["task.evaporation_in_training"] is (training == "on")
+    assert manifest["settings"]["task.evaporation_in_evaluation"] is (greedy == "on")
+    words = f"Training {'with' if training == 'on' else 'without'} evaporation of trails, greedy"
+    for name in ("report.txt", "table2.md"):
+        assert words in (out / name).read_text("utf-8")
+    first, *_ = read_csv(out / "baselines.csv")
+    assert (first["baseline"] == "exact bounds") == (training == "on")
+    status, _, err = compare(*TINY, "--episodes", 30, "--out", out)
+    assert status == 2
+    assert "task.evaporation_in_evaluation is " in err
+    assert ("task.evaporation_in_training is" in err) == (training == "on")
+
+
+def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
+    """Without evaporation, as in training."""
+    name = "truncates_sarsa_circles_with_food"
+    q_values, _, metadata = load_policy(finished / "policies" / f"{name}.npz")
+    shown = (finished / "renders" / f"{name}.gif").read_bytes()
+    for evaporation in (False, True):
+        path = tmp_path / f"{evaporation}.gif"
+        task = Task(evaporation_in_evaluation=evaporation)
+        more = {"seed": metadata["seed"], "max_steps": MAX_STEPS, "task": task}
+        episode = replace(Episode.play(worlds.paper(), q_values, **more), name="circles with food")
+        pictures = frames(episode.snapshots(), (720, 480), title="SARSA, truncates")
+        save_animation(path, pictures, pause=PAUSE)
+        assert (path.read_bytes() == shown) == (not evaporation)
+
+
+@pytest.mark.parametrize("draws", [False, True])
+def test_what_is_prepared_beside_can_be_done(draws):
+    """Nobody is told if it fails there: then all is ready later."""
+    settings = module.parse_arguments(["--seeds", "1"])
+    point = module.build_study(settings).points[0]
+    module.warm_up(point, None, {"threads": None, "arch": None}, draws)
+
+
+def test_a_page_that_is_gone_is_made_again_from_the_other_files(copy, compare):
+    """To the same bytes: numbers, figures and players."""
+    before = contents(copy)
+    page = before["report.html"].decode("utf-8")
+    assert page.count('class="player"') == 2  # delivers, circles with food
+    assert page.count('class="plot wide"') == 2
+    assert "SARSA" in page
+    (copy / "report.html").unlink()
+    status, out, err = compare(*SMALL, "--out", copy)
+    assert (status, err) == (0, "")
+    assert out.endswith(f"\n{copy}/report.html\n")
+    assert contents(copy) == before
+
+
+@pytest.mark.slow  # the worker process draws animations meanwhile
+def test_a_figure_that_fails_costs_no_results_and_is_drawn_later(tmp_path, compare, monkeypatch):
+    def fails(*given):
+        raise RuntimeError("no font")
+
+    arguments = [*SMALL, "--out", tmp_path / "out"]
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "draw_figures", fails)
+        status, _, err = compare(*arguments)
+    assert status == 0
+    assert "there are no figures, because one failed with RuntimeError: no font." in err
+    assert set(contents(tmp_path / "out")) == FILES - FIGURES - RENDERS
+    assert compare(*arguments)[0] == 0
+    assert set(contents(tmp_path / "out")) == FILES
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (["--seeds", 2], "that this study lacks (seed "),
+        (["--episodes", 61], "(episodes is 60 instead of 61)"),
+        (["--max-steps", 46], "(max_steps is 45 instead of 46)"),
+        (["--discounts", 0.9], "that this study lacks (training.discount "),
+        (["--world", "open", "--world.seed", 3], "(not the same worlds)"),
+    ],
+)
+def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
+    before = contents(copy)
+    status, _, err = compare(*SMALL, *change, "--out", copy)
+    assert status == 2
+    assert_one_sentence(err)
+    assert named in err
+    assert "--force" in err
+    assert contents(copy) == before
+
+
+def test_lists_drop_what_is_said_twice(tmp_path, compare):
+    lists = ["--discounts", "0.5", "0.9", "0.90", "--epsilons", "0.1", "0.2"]
+    status, _, _ = compare(*TINY, *lists, "--out", tmp_path / "out")
+    rows = read_csv(tmp_path / "out" / "summary.csv")
+    assert status == 0
+    assert [(row["discount"], row["epsilon"]) for row in rows] == [
+        *(("0.5", "0.1"), ("0.5", "0.2"), ("0.9", "0.1"), ("0.9", "0.2")),
+    ]
+
+
+def test_quick_takes_few_seeds_and_a_folder_of_its_own(tmp_path, compare, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    drawn = [one for one in TINY if one != "--no-figures"]
+    assert compare(*drawn, "--quick", "--seeds", 50)[0] == 0
+    folder = tmp_path / "results" / "compare-quick"
+    assert list((folder / "figures").iterdir())
+    assert list((folder / "policies").iterdir())
+    assert not (folder / "renders").exists()
+    assert {row["seeds"] for row in read_csv(folder / "summary.csv")} == {"10"}
+    assert load("compare").parse_arguments([]).out == Path("results", "compare")
+    assert load("compare").parse_arguments(["--quick", "--out", "here"]).out == Path("here")
+
+
+@pytest.mark.parametrize("world", ["open", "garden"])
+def test_other_worlds(world, tmp_path, compare):
+    chosen = ["--world", GARDEN] if world == "garden" else ["--world", "open", "--world.seed", 5]
+    status, _, err = compare(*TINY, *chosen, "--out", tmp_path / "out")
+    assert (status, err) == (0, "")
+    name = "garden.txt" if world == "garden" else "open, world seed 5"
+    for file in ("report.txt", "claims.md", "table2.md"):
+        text = (tmp_path / "out" / file).read_text("utf-8")
+        assert text.startswith(f"World: {name}.\n"), file
+    assert "47.3" not in text
+    verdicts = read_csv(tmp_path / "out" / "claims.csv")
+    assert {row["verdict"] for row in verdicts} == {"not tested"}
+    (row,) = read_csv(tmp_path / "out" / "summary.csv")
+    built = worlds.load_map(GARDEN) if world == "garden" else worlds.open_world(5)
+    expected = train(built, config_of(row), 0, 2, 30)
+    archive = archives.read(tmp_path / "out" / "runs.npz")
+    assert np.array_equal(archive["return_all"], expected.returns.mean(axis=2))
+    assert np.array_equal(archive["steps_all"], expected.steps.mean(axis=2))
+
+
+def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, compare):
+    plugin = EXPERIMENTS / "plugins" / "hysteretic.py"
+    changes = ["--plugin", plugin, "--learners", "hysteretic", "--discounts", 0, 1]
+    status, out, _ = compare(*TINY, *changes, "--out", tmp_path / "out")
+    assert status == 0
+    assert out.startswith("World: the paper's.\n")
+    archive = archives.read(tmp_path / "out" / "runs.npz")
+    returns = archive["return_all"][:, 0]
+    best = int(returns.argmax())
+    greedy = archive["greedy_return"][best].mean()
+    cells = [line.split() for line in out.splitlines() if line.startswith("hysteretic *")]
+    assert cells[0][3] == f"{returns[best]:.1f}"
+    assert " paper " not in out.split("Learner")[1]  # it does not have such a learner
+    tables = (tmp_path / "out" / "table2.md").read_text("utf-8")
+    lines = [line.split(" | ") for line in tables.splitlines() if line.startswith("| hysteretic *")]
+    assert lines[4][2] == f"{greedy:.1f}"
+    assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in tables
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "the discount is 1.0; it must be at least 0 and below 1" in page
+    assert max(len(line) for line in out.splitlines()[:-2]) < 80
+
+
+def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
+    names = ["expected_sarsa", "dyna_q", "sarsa_lambda"]
+    more = ["--training.trace-decay", "0.5"]
+    status, out, _ = compare(*TINY, "--learners", *names, *more, "--out", tmp_path / "out")
+    rows = read_csv(tmp_path / "out" / "summary.csv")
+    assert status == 0
+    assert [(row["learner"], row["hyperparameters"]) for row in rows] == [
+        ("expected_sarsa", ""),
+        *(("dyna_q", "planning_steps=3"), ("dyna_q", "planning_steps=5")),
+        ("sarsa_lambda", "trace_decay=0.5 trace_length=32"),
+    ]
+    assert "Expected SARSA" in out
+    assert "trace_decay=0.5" in " ".join(out.split())
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param(faults.killed, marks=pytest.mark.slow),
+        pytest.param(faults.full, marks=pytest.mark.long),
+    ],
+)
+def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
+    fault, tmp_path, monkeypatch
+):
+    faults.remember(monkeypatch)
+    both = [*TINY, "--delivery", "both"]
+    assert faults.assert_it_survives(fault, "compare", both, tmp_path / "out") > 40
+
+
+PICTURED = [
+    *("--seeds", 2, "--episodes", 20, "--learners", "q_learning", "sarsa", "--discounts", 0.9),
+    *("--learning-rates", 0.1, "--epsilons", 0.3, "--epsilon-decays", 0.9),
+]
+
+
+def blocks_in(folder):
+    """Finished blocks with the time at which they were written."""
+    found = (folder / "unfinished" / "blocks").glob("*.npz")
+    return {path.name: path.stat().st_mtime_ns for path in found}
+
+
+@pytest.mark.slow
+def test_an_interruption_of_the_pictures_keeps_the_runs(kernels, tmp_path):
+    """Ctrl-C on a terminal."""
+    arguments = [*PICTURED, "--out", "out"]
+    process = start("compare", arguments, kernels, tmp_path, start_new_session=True)
+    unfinished = tmp_path / "out" / "unfinished"
+    while process.poll() is None and not list(unfinished.glob("ready/*/policies/*")):
+        time.sleep(0.002)
+    time.sleep(0.3)
+    os.killpg(process.pid, signal.SIGINT)
+    sent = time.perf_counter()
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, ""), err
+    assert err.startswith("Stopped")
+    assert err.count("\n") == 1
+    assert time.perf_counter() - sent < promptly()
+    assert len(blocks_in(tmp_path / "out")) == 2 * 2
+
+
+REHEARSED = """
+import pathlib, numpy as np
+import compare
+from paper.page import played
+from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.viewer import record_episode
+
+point = compare.build_study(compare.parse_arguments(["--seeds", "1"])).points[0]
+episode = played(point, np.zeros((point.task.n_states, N_ACTIONS), np.float32), 0)
+compare.warm_up(point, None, {"threads": 1, "arch": None}, False)
+
+from taichi.lang.kernel_impl import Kernel
+materialize, late = Kernel.materialize, []
+
+def noted(self, key=None, **how):
+    if key not in self.compiled_kernels:
+        late.append(self.func.__name__)
+    return materialize(self, key, **how)
+
+Kernel.materialize = noted
+compare.render_policy(pathlib.Path("a.gif"), episode, "title")
+record_episode(episode, "delivers")
+print(late)
+"""
+
+
+@pytest.mark.long
+def test_what_is_prepared_beside_has_all_kernels_that_drawing_needs(kernels, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", REHEARSED],
+        cwd=tmp_path,
+        env=environment(kernels),
+        text=True,
+        capture_output=True,
+        check=True,
+    )
+    assert done.stdout.splitlines()[-1] == "[]"

@@ -1,0 +1,77 @@
+"""What the claims read from a comparison."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from paper.comparison import FIGURE_1, Q_LEARNING, SARSA
+from paper.quantities import (
+    READS,
+    grids_of,
+    rank_correlation,
+    share_above,
+)
+from synthetic_comparison import build, remeasured, subset, unchanged
+
+AT_FIGURE_1, MEAN_OF_ALL = READS["at figure 1"], READS["mean of all"]
+
+
+def test_what_is_missing_is_nan() -> None:
+    comparison = build({"truncates": unchanged}, seeds=2, variants=[SARSA], grid=[FIGURE_1])
+    part = grids_of(comparison, "truncates")
+    assert np.isfinite(AT_FIGURE_1.values(part, "return_last50", SARSA)).all()
+    assert np.isnan(MEAN_OF_ALL.values(part, "return_last50", SARSA)).all()
+    for missing in (
+        grids_of(comparison, "terminates"),
+        grids_of(replace(comparison, world="garden.txt"), "truncates"),
+        grids_of(subset(comparison, [0], 2, 49), "truncates"),
+    ):
+        assert np.isnan(AT_FIGURE_1.values(missing, "return_last50", SARSA)).all()
+    for quantity in (
+        share_above("return_last50", Q_LEARNING, SARSA),
+        rank_correlation("return_last50", "steps_all", SARSA),
+    ):
+        (effect,) = quantity.effects.values()
+        assert np.isnan(effect(part)).all()
+
+
+def test_the_held_out_half_does_not_choose() -> None:
+    """The configuration that shines on odd seeds only is not chosen for them."""
+    comparison = build({"truncates": unchanged}, seeds=6, variants=[SARSA], noise=0.0, shared=0.0)
+    comparison.arrays["returns"][...] = 10
+    comparison.arrays["returns"][3, ::2] = 20  # best on the seeds that choose, poor on the others
+    comparison.arrays["returns"][3, 1::2] = 0
+    comparison.arrays["returns"][5, 1::2] = 99
+    comparison = remeasured(comparison)
+    values = READS["best on held-out seeds"].values(
+        grids_of(comparison, "truncates"), "return_last50", SARSA
+    )
+    assert values.tolist() == [0.0, 0.0, 0.0]
+
+
+def test_shares_count_ties_by_half() -> None:
+    comparison = build({"truncates": unchanged}, seeds=2, variants=[Q_LEARNING, SARSA])
+    comparison.arrays["returns"][...] = 10
+    comparison.arrays["returns"][:4, 0] = 20  # four of 16 pairs are above, the others tie
+    comparison = remeasured(comparison)
+    part = grids_of(comparison, "truncates")
+    for sign, expected in ((1, [10 / 16, 0.5]), (-1, [6 / 16, 0.5])):
+        quantity = share_above("return_last50", Q_LEARNING, SARSA, sign)
+        (share,) = (effect(part) for effect in quantity.effects.values())
+        assert share.tolist() == expected
+
+
+def test_the_rank_correlation_is_spearmans_within_each_seed() -> None:
+    from scipy.stats import spearmanr
+
+    comparison = build({"truncates": unchanged}, seeds=3, variants=[SARSA], noise=20.0)
+    comparison.arrays["steps"][:, 2] = 50  # constant: no correlation
+    comparison = remeasured(comparison)
+    quantity = rank_correlation("return_last50", "steps_last50", SARSA)
+    (found,) = (effect(grids_of(comparison, "truncates")) for effect in quantity.effects.values())
+    returns, steps = (comparison.measures[name] for name in ("return_last50", "steps_last50"))
+    for seed in (0, 1):
+        assert found[seed] == pytest.approx(spearmanr(returns[:, seed], steps[:, seed])[0])
+    assert found[2] == 0

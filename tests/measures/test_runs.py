@@ -1,0 +1,70 @@
+"""The measures of a lone run, by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taichi_ants.measures.runs import MEASURES, measures_of_runs
+
+
+def single_run(
+    returns: list[int], steps: list[int], deliveries: list[int]
+) -> dict[str, np.ndarray]:
+    """One configuration, one seed, two rollouts."""
+    arrays = {
+        "returns": returns,
+        "steps": steps,
+        "deliveries": deliveries,
+        "greedy_returns": [45, 45],
+        "greedy_steps": [34, 36],
+        "greedy_deliveries": [1, 0],
+    }
+    return measures_of_runs({name: np.array(one)[None, None] for name, one in arrays.items()})
+
+
+def measured(run: dict[str, np.ndarray], name: str) -> float:
+    return float(run[name][0, 0])
+
+
+def test_measures_by_hand() -> None:
+    returns = [0] * 50 + [10, 20] * 25 + [30] * 50
+    steps = [600] * 50 + [100, 50] * 25 + [34, 36] * 25
+    deliveries = [0] * 50 + [1, 1, 1, 0, 1] * 10 + [1] * 50
+    run = single_run(returns, steps, deliveries)
+    assert measured(run, "return_last50") == 30
+    assert measured(run, "return_first50") == 0
+    assert measured(run, "steps_last50") == 35
+    assert measured(run, "steps_first50") == 600
+    assert measured(run, "steps_all") == pytest.approx((600 + 75 + 35) / 3)
+    assert measured(run, "deliveries_last50") == 1
+    assert measured(run, "deliveries_second50") == 0.8
+    assert measured(run, "shortest_episode") == 34
+    assert measured(run, "improved") == 1
+    assert measured(run, "return_fluctuation_first50") == 0
+    assert measured(run, "return_fluctuation_last50") == 0
+    # Changes of the return: 10 once, then 10 49 times, 10 once; 149 changes in all.
+    assert measured(run, "return_fluctuation_all") == pytest.approx(np.sqrt(51 * 100 / 149 / 2))
+    # Of the length: 500 once, 50 49 times, 16 once (50 to 34), 2 49 times.
+    squares = 500**2 + 49 * 50**2 + 16**2 + 49 * 2**2
+    assert measured(run, "steps_fluctuation_all") == pytest.approx(np.sqrt(squares / 149 / 2))
+    assert measured(run, "greedy_return") == 45
+    assert measured(run, "greedy_steps") == 35
+    assert measured(run, "greedy_deliveries") == 0.5
+    assert measured(run, "greedy_repeats") == 0
+
+
+def test_independent_episodes_fluctuate_by_their_standard_deviation() -> None:
+    returns = np.random.default_rng(0).normal(0, 20, size=100_000).round().astype(int)
+    run = single_run(returns.tolist(), [1] * 100_000, [1] * 100_000)
+    assert measured(run, "return_fluctuation_all") == pytest.approx(20, rel=0.01)
+
+
+def test_short_runs_use_all_episodes_or_say_that_they_cannot() -> None:
+    run = single_run([1, 2, 6], [3, 4, 5], [0, 0, 1])
+    assert measured(run, "return_last50") == 3
+    assert measured(run, "deliveries_last50") == pytest.approx(1 / 3)
+    for name, measure in MEASURES.items():
+        assert np.isnan(measured(run, name)) == (measure.episodes > 3), name
+    assert np.isnan(measured(run, "steps_first50"))
+    assert np.isnan(measured(single_run([1], [1], [0]), "return_fluctuation_all"))
