@@ -284,8 +284,8 @@ def check_finite(
     for c, s in np.argwhere(~finite)[:1]:
         raise AntsError(
             f"learner {configs[c].learner!r} computed action values that are not finite, with "
-            f"{configs[c]} and seed {seeds[s]}; correct its TD error, or use smaller rewards and "
-            "action values."
+            f"{configs[c]} and seed {seeds[s]}; try your own learner with "
+            "`taichi-ants check FILE`, or use smaller rewards and action values."
         )
 
 

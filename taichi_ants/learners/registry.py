@@ -33,9 +33,9 @@ _LEARNERS: dict[str, Learner] = {}
 def register(learner: Learner) -> Learner:
     """Return a learner after registering it; it replaces your own learner of the same name.
 
-    Existing results, colonies and kernels do not change. The first use of a learner tries its
-    functions. Raises AntsError if the name is not an identifier or belongs to a built-in learner,
-    or a field does not have the form that `Learner` describes.
+    Existing results, colonies and kernels do not change. `taichi-ants check FILE` tries the
+    functions of your learners. Raises AntsError if the name is not an identifier or belongs to a
+    built-in learner, or a field does not have the form that `Learner` describes.
     """
     expect("learner", learner, Learner)
     name = learner.name
@@ -45,8 +45,7 @@ def register(learner: Learner) -> Learner:
     if learner.begin is not None:
         check_arguments(f"the function begin of {name!r}", learner.begin, parts[:2])
     if learner.td_error is not None:
-        drawn = learner.draws_next_action and not learner.plans
-        check_td_error(name, learner.td_error, drawn)
+        check_td_error(name, learner.td_error)
     _try_sizes(learner)
     taken = {one.name for one in declared(TrainingConfig)}
     for clash in taken & {one.name for one in declared(learner.hyperparameters)}:

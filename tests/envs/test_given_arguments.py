@@ -150,7 +150,8 @@ def test_completion_lists_public_names_and_imports_nothing() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, env=environment(None)
     )
     assert done.stdout == (
-        "['Caste', 'Choice', 'Field'] ['RuleCheck', 'check_observation', 'check_rule']\n"
+        "['Caste', 'Choice', 'Field'] "
+        "['RuleCheck', 'check_learner', 'check_observation', 'check_rule']\n"
     ), done.stderr
 
 

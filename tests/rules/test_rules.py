@@ -502,9 +502,6 @@ def test_a_rule_that_differs_from_its_twin_is_refused(clean):
     check = check_rule("same", inputs=50)
     assert "but its Python function" in check.difference
     assert str(check).startswith("same: 50 drawn inputs and 0 ticks")
-    task = Task(pheromone=Pheromone("same"), evaporation_in_training=True)
-    with pytest.raises(AntsError, match="rule 'same' cannot be used: its kernel returns"):
-        Colony(worlds.paper(), task, own_config(), 0).run(1, 1)
 
 
 def fails_at_large(level):

@@ -24,7 +24,6 @@ from taichi_ants.engines.layout import (
     STEPS,
     Command,
 )
-from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.engines.runs.step import (
     EXTRA_CELLS,
     Ant,
@@ -89,7 +88,6 @@ def run_kernel(
     argument pack.
     """
     learns = learner is not None
-    learner = checked_plugin(learner) if learns else None
     on_policy = learns and learner.draws_next_action
     begins = learns and learner.begin is not None
     hyperparameters = learner.hyperparameters if learns else Hyperparameters
