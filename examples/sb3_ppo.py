@@ -1,8 +1,8 @@
 """Train an ant to fetch food by PPO of Stable-Baselines3.
 
-The task rewards only a pick-up (3) and a delivery (10). Requires Stable-Baselines3: `pip install -e
-".[sb3]"`. Prints for each seed how many of 100 rollouts deliver food, first with sampled actions,
-then with greedy actions. A seed takes about 40 seconds.
+The task rewards only a pick-up (3) and a delivery (10). Requires Stable-Baselines3: `pip install
+"stable-baselines3>=2.4"`. Prints for each seed how many of 100 rollouts deliver food, first with
+sampled actions, then with greedy actions. A seed takes about 40 seconds.
 """
 
 import argparse
@@ -10,11 +10,11 @@ import argparse
 import gymnasium
 import numpy as np
 import torch
+from sb3_vec_env import SB3VecEnv
 from stable_baselines3 import PPO
 
 import taichi_ants
 from taichi_ants import task, worlds
-from taichi_ants.envs.sb3 import SB3VecEnv
 
 N_ENVS, ROLLOUTS = 64, 100
 

@@ -37,6 +37,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
         EVALUATION_EPSILON,
         FEW,
         JOINT,
+        OF_STUDY,
         PAPER,
         QUEUES,
         RULES,
@@ -80,7 +81,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.errors import count
     from taichi_ants.files.results import MANIFEST, REPORT
     from taichi_ants.learners.policies import load_policy, save_policy
-    from taichi_ants.measures.colonies import MEASURES, OF_STUDY, measures_of
+    from taichi_ants.measures.finished import COLONY, Run, values_of
     from taichi_ants.report.page import (
         Player,
         Shown,
@@ -296,7 +297,8 @@ def study_of(conditions: Plan, seeds: Sequence[int]) -> Study[ColonyPoint]:
 def with_measures(points: Sequence[ColonyPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
     """Return an outcome of one point with its measures."""
     (point,) = points
-    values = measures_of({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
+    run = Run.of_colony({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
+    values = values_of(run)
     return {**outcome, **{f"{VALUE}{name}": array[None] for name, array in values.items()}}
 
 
@@ -317,7 +319,7 @@ def take_results(
     for condition, several in rows.items():
         point = conditions[condition]
         columns = {name: np.array([float(row[name]) for row in several]) for name in OF_STUDY}
-        own = {name: columns[name] for name in MEASURES}
+        own = {name: columns[name] for name in COLONY}
         # Only this measure of ants that do not explore is in the results.
         calm = dict.fromkeys(own, np.full(len(several), np.nan))
         calm["deliveries"] = columns["greedy"]
@@ -471,7 +473,7 @@ def colony_page(results: Results, **parts: Any) -> str:
 def _statements(judged: Judged) -> Statements:
     lines = []
     for (world_kind, series), by_sizes in judged.items():
-        unit = MEASURES[series.measure]
+        unit = COLONY[series.measure].label
         told = [
             Shown(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
             for (n, less), one in by_sizes.items()

@@ -30,7 +30,7 @@ from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import seeds_in_words
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import sentence
-from taichi_ants.measures.colonies import MEASURES
+from taichi_ants.measures.finished import COLONY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,7 +75,7 @@ def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
             f"{sizes}. {_spread(rows)} Thin line: from the worst to the best seed. Grey: the "
             "bounds of the worlds, from the lowest to the highest; bar: their mean."
         )
-        title = f"{title}: {MEASURES['deliveries']}"
+        title = f"{title}: {COLONY['deliveries'].label}"
         style.frame(figure, title, textwrap.fill(caption, 120), {})
     return figure
 
@@ -107,7 +107,7 @@ def _lines(
         shape = len(measures), len(world_kinds)
         axes = figure.subplots(*shape, sharex="col", sharey="row", squeeze=False)
         for line_of_axes, measure in zip(axes, measures, strict=True):
-            line_of_axes[0].set_ylabel(textwrap.fill(sentence(MEASURES[measure]), 30))
+            line_of_axes[0].set_ylabel(textwrap.fill(sentence(COLONY[measure].label), 30))
             points: dict[str, dict[str, list[tuple[float, ...]]]] = {
                 world_kind: {one.words: [] for one in designs} for world_kind in world_kinds
             }

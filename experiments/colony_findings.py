@@ -41,7 +41,7 @@ from taichi_ants.analysis.tables import (
 )
 from taichi_ants.errors import count
 from taichi_ants.files import tomllib
-from taichi_ants.measures.colonies import MEASURES, OF_STUDY
+from taichi_ants.measures.finished import COLONY
 
 # Kinds of world for training and evaluation, with their names in tables and figures.
 WORLD_KINDS: dict[str, str] = {
@@ -109,6 +109,13 @@ class Condition(NamedTuple):
 
 
 EVALUATION_EPSILON = 0.01  # the exploration rate of the evaluation
+# Measures of the study, which also evaluates without exploration and computes bounds.
+OF_STUDY: dict[str, str] = {
+    **{name: measure.label for name, measure in COLONY.items()},
+    "greedy": "deliveries per 1000 ticks without exploration",
+    "bound": "most deliveries per 1000 ticks that are possible in the world of the seed",
+    "bound_share": "deliveries as a share of that bound",
+}
 # Measures of each seed, float64 (seeds,), by their names in `OF_STUDY`.
 Measured = Mapping[Condition, Mapping[str, np.ndarray]]
 
@@ -124,7 +131,7 @@ class Series:
     Attributes:
         question: The question that the series helps to answer.
         statement: A statement that is true if the differences are above 0.
-        measure: A name in `MEASURES`.
+        measure: A name in `COLONY`.
         against: "same" compares equal numbers of ants, "smaller" each number with all smaller ones.
         least: The fewest ants for "same". With one ant, all regimes and some rules are the same.
         main: Whether it is one of the main findings.
@@ -264,7 +271,7 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
 
     The last table has policies from open worlds in other worlds, with intervals and worst seeds.
     """
-    seeds = f"{_basis(rows)}: {MEASURES['deliveries']}"
+    seeds = f"{_basis(rows)}: {COLONY['deliveries'].label}"
     trained = [one for one in rows if one.condition.regime != ABROAD]
     abroad = [one for one in rows if one.condition.regime == ABROAD]
     tables = []
@@ -341,7 +348,7 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
             range_ = "" if low == high else f" {interval(low, high, 0)}"
             line.append(figure(best.estimates["bound"].mean) + range_)
         cells.append(["Mean bound, right of way [range]", *line])
-    title = f"{sentence(MEASURES['deliveries'])} of {count(largest, 'ant')}"
+    title = f"{sentence(COLONY['deliveries'].label)} of {count(largest, 'ant')}"
     note = f"{_basis(rows)}; in brackets: without exploration; %: share of the world's bound."
     return Table(title, ("", *_headers(shown)), cells, [note] if cells else [])
 
@@ -369,7 +376,7 @@ def headlines(rows: Sequence[ConditionRow], judged: Judged) -> Table:
     headers = ("Statement", *_headers(world_kinds))
     note = (
         "Below the verdict: the number of ants, and the means compared, in "
-        f"{MEASURES['deliveries']}. {_basis(rows)}."
+        f"{COLONY['deliveries'].label}. {_basis(rows)}."
     )
     return Table("", headers, cells, [note] if cells else [], text_columns=len(headers))
 
@@ -429,7 +436,7 @@ def found(rows: Sequence[ConditionRow], judged: Judged) -> list[Block]:
                 world = "" if world_kind == shown else sentence(WORLDS[world_kind])
                 verdicts = _verdicts(by_condition, world_kind, series, findings)
                 lines.append([world, sentence(series.statement), *verdicts])
-                units.append(MEASURES[series.measure])
+                units.append(COLONY[series.measure].label)
                 shown = world_kind
         what = f"{sentence(' or '.join(dict.fromkeys(units)))}, as the statement says"
         notes = [f"{what}; {_basis(rows)}."]

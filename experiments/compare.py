@@ -43,7 +43,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.files.inputs import recorded
     from taichi_ants.files.results import MANIFEST, REPORT
     from taichi_ants.learners.policies import save_policy
-    from taichi_ants.measures.runs import MEASURES, measures_of_runs
+    from taichi_ants.measures.finished import LONE, Run, values_of
     from taichi_ants.rendering import PAUSE, Episode, colony_snapshots, frames, save_animation
     from taichi_ants.rendering.snapshots import colony_of_rollout
     from taichi_ants.report.page import made_facts, setting_facts
@@ -188,7 +188,7 @@ def measured(
 def with_measures(points: Sequence[RunPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
     """Return an outcome with the measures of its runs, and with what their policies do."""
     followed = what_policies_do(points[0], seeds, outcome["q_values"])
-    values = {**measures_of_runs(outcome), **followed}
+    values = {**values_of(Run.of_lone_ant(outcome)), **followed}
     return {**outcome, **{f"{VALUE}{name}": array for name, array in values.items()}}
 
 
@@ -227,7 +227,7 @@ def comparison_of(
     return Comparison(
         rows=tuple(Row.of(point.task, point.training) for point in study.points),
         seeds=study.seeds,
-        measures={name: arrays[name] for name in MEASURES},
+        measures={name: arrays[name] for name in LONE},
         behaviours=arrays["behaviours"],
         policy_returns=arrays["policy_returns"],
         episodes=first.episodes,

@@ -1,9 +1,10 @@
 """Draw all pictures of the README and the docs, in `renders/` and `docs/figures/`.
 
-`render.py` draws the pictures in `renders/`, with arguments from this script. The pictures in
-`docs/figures/` show the results in `results/compare`, `results/colony` and `results/bridge`, and a
-run of a million ants. If results are missing, the script runs the study first. The comparison takes
-less than a minute on two cores; see docs/colony_study.md and docs/bridge.md for the other two.
+The scripts `render.py`, `learning.py` and `policy_sheet.py` draw the pictures in `renders/`. The
+pictures in `docs/figures/` show the results in `results/compare`, `results/colony` and
+`results/bridge`, and a run of a million ants. If results are missing, the script runs the study
+first. The comparison takes less than a minute on two cores; see docs/colony_study.md and
+docs/bridge.md for the other two.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import threading
     from collections.abc import Iterator
     from contextlib import contextmanager
+    from importlib import import_module
     from pathlib import Path
     from typing import Any
 
@@ -45,7 +47,7 @@ GALLERY: dict[str, list[str]] = {
     ],
     "learning.gif": ["learning", "--size", "1200x480", "--fps", "12"],
     "policy_sheet.png": [
-        *("sheet", "--seed", "7"),
+        *("policy_sheet", "--seed", "7"),
         *("--title", "What SARSA has learned in the world of the paper, after 500 episodes"),
     ],
 }
@@ -96,13 +98,22 @@ def make_gallery(settings: argparse.Namespace) -> None:
     """Make all pictures, and replace existing ones."""
     for name, arguments in GALLERY.items():
         path = settings.folder / "renders" / name
-        render.show(render.parse_arguments([*arguments, "--out", str(path)]))
+        script, chosen = drawing([*arguments, "--out", str(path)])
+        script.show(chosen)
     with chromium() as browser:
         if browser is not None:
             make_viewer(settings.folder / "docs" / "figures", browser)
             make_live(settings.folder / "docs" / "figures", browser)
     if not settings.no_figures:
         make_figures(settings.folder / "docs" / "figures")
+
+
+def drawing(arguments: list[str]) -> tuple[Any, argparse.Namespace]:
+    """Return the module that draws a picture, and its settings."""
+    if arguments[0] in ("episode", "colony"):
+        return render, render.parse_arguments(arguments)
+    script = import_module(arguments[0])
+    return script, script.parse_arguments(arguments[1:])
 
 
 @contextmanager

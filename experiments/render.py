@@ -1,4 +1,4 @@
-"""Draw an episode, a colony, learning, or a policy.
+"""Draw an episode or a colony.
 
 See `render.py episode --help`, for example, for the options of an episode.
 """

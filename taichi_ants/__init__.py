@@ -23,14 +23,13 @@ if TYPE_CHECKING:
         testing,
         worlds,
     )
-    from taichi_ants.analysis.results import compare, plot
+    from taichi_ants.analysis.results import compare, plot, summary
     from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.engines.runs.results import Rollouts, TrainingResult
     from taichi_ants.engines.runs.traces import Trace, rollout, trace_training
     from taichi_ants.engines.runs.training import continue_training, evaluate, train
     from taichi_ants.envs.formats import tabulate
-    from taichi_ants.envs.minari_data import from_minari, to_minari
     from taichi_ants.errors import AntsError
     from taichi_ants.learners.config import TrainingConfig
     from taichi_ants.learners.policies import load_policy, save_policy
@@ -44,13 +43,12 @@ __version__ = "0.1.0"
 PHYSICS = 1  # rises when equal settings and seeds give other numbers; see tests/golden/record.py
 
 _NAMES_IN = {
-    "analysis.results": ("compare", "plot"),
+    "analysis.results": ("compare", "plot", "summary"),
     "engines.colony.colony": ("Colony", "ColonyEpisodes"),
     "engines.colony.interventions": ("Interventions",),
     "engines.runs.results": ("Rollouts", "TrainingResult"),
     "engines.runs.traces": ("Trace", "rollout", "trace_training"),
     "engines.runs.training": ("continue_training", "evaluate", "train"),
-    "envs.minari_data": ("from_minari", "to_minari"),
     "envs.formats": ("tabulate",),
     "errors": ("AntsError",),
     "learners.config": ("TrainingConfig",),
@@ -87,7 +85,6 @@ __all__ = [
     "continue_training",
     "envs",
     "evaluate",
-    "from_minari",
     "learners",
     "load_policy",
     "measures",
@@ -101,10 +98,10 @@ __all__ = [
     "rules",
     "save_policy",
     "states",
+    "summary",
     "tabulate",
     "task",
     "testing",
-    "to_minari",
     "trace_training",
     "train",
     "worlds",

@@ -99,20 +99,6 @@ def is_flag(value: object) -> bool:
     return isinstance(value, bool) or type(value).__name__ in ("bool", "bool_")
 
 
-def check_new_name(kind: str, name: object, built_in: Iterable[str]) -> None:
-    """Raise AntsError unless you can register a learner or observation (`kind`) by this name."""
-    if not isinstance(name, str) or not name.isidentifier():
-        raise AntsError(
-            f"the name of the {kind} is {shown(name)}; it must be a word of letters, digits and _ "
-            "that does not start with a digit."
-        )
-    if name in built_in:
-        raise AntsError(
-            f"{name!r} is the name of a built-in {kind}, which cannot be replaced; choose another "
-            "name."
-        )
-
-
 def checked_flag(name: str, value: object) -> bool:
     """Return a bool as a Python bool; AntsError for other values, even true ones like "off"."""
     if not is_flag(value):

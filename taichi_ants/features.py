@@ -1,8 +1,8 @@
 """Features: what a task and a world use, and what those who run them support.
 
-`Task.uses` and `World.uses` name every setting that differs from its default. Whoever runs a task
-has a literal set of the features that it supports, and refuses all others in one sentence. So a
-feature that is added later is refused wherever no set names it.
+`Task.uses` and `World.uses` name every setting that differs from its default. Each engine,
+environment and analysis has a literal set of the features that it supports, and refuses all others
+in one sentence. So a feature that is added later is refused wherever no set names it.
 """
 
 from __future__ import annotations

@@ -164,12 +164,7 @@ class When(ProtocolEvent, path="when"):
     def check(self) -> None:
         """Check all settings."""
         super().check()
-        one = measures.get(self.measure)
-        if one.of is not None:
-            raise AntsError(
-                f"`when.measure` is {self.measure!r}, which needs the series of {one.of!r}; choose "
-                "a measure of a single state."
-            )
+        measures.get(self.measure).check_single_state("`when.measure`")
         if (self.above is None) == (self.below is None):
             raise AntsError("`when` needs a bound; give either `above` or `below`.")
 

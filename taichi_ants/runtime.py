@@ -125,7 +125,7 @@ def refresh() -> None:
 
 
 def start_with_checks() -> None:
-    """Start Taichi anew on one thread, with checks of the bounds of arrays."""
+    """Restart Taichi on one thread, with checks of the bounds of arrays."""
     import taichi as ti
 
     _init(ti, Runtime("cpu", 1), debug=True, offline_cache=False)

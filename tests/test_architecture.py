@@ -19,14 +19,14 @@ import taichi_ants
 # From the ground up: a part imports parts of lower layers only. Each part stands here.
 LAYERS = (
     {"errors", "environment", "subnormals"},
-    {"files", "grid", "settings"},
+    {"files", "grid", "registry", "settings"},
     {"rules"},
     {"task"},
     {"features", "runtime", "worlds", "learners"},
     {"arguments", "measures"},
     {"interventions"},
     {"protocol"},
-    {"baselines", "engines", "reference"},
+    {"engines", "reference"},
     {"analysis", "rendering", "testing"},
     {"offline"},
     {"viewer", "envs"},
@@ -36,9 +36,7 @@ LAYERS = (
     {"__main__"},
 )
 # Kernels live in these; runtime starts Taichi.
-PARTS_WITH_TAICHI = {
-    *("baselines", "task", "learners", "engines", "rendering", "offline", "envs", "runtime")
-}
+PARTS_WITH_TAICHI = {*("task", "learners", "engines", "rendering", "offline", "envs", "runtime")}
 
 FOLDERS = ("taichi_ants", "experiments", "examples")
 FILES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
@@ -173,7 +171,7 @@ def test_taichi_is_started_in_one_place():
 
 
 # Parts that no other part needs.
-EXTRAS = {"baselines", "offline", "envs"}
+EXTRAS = {"offline", "envs"}
 
 
 def test_the_core_does_not_import_extras():
@@ -188,7 +186,7 @@ def test_ants_learn_without_the_extras(tmp_path):
     """Alone and in a colony, where importing the extras fails."""
     script = """
 import sys
-for module in ("taichi_ants.baselines", "taichi_ants.offline", "taichi_ants.envs",
+for module in ("taichi_ants.offline", "taichi_ants.envs",
                "minari", "gymnasium", "pettingzoo"):
     sys.modules[module] = None
 from taichi_ants import Colony, TrainingConfig, evaluate, train, worlds

@@ -34,7 +34,6 @@ from taichi_ants.learners.policies import Policy
 from taichi_ants.live.choices import Choices
 from taichi_ants.live.setup import Setup
 from taichi_ants.reference.colony import ReferenceColony
-from taichi_ants.rendering.learning import learning_checkpoints
 from taichi_ants.settings import Setting, declared
 from taichi_ants.studies.points import ColonyPoint, RunPoint
 from taichi_ants.task import Task
@@ -71,7 +70,6 @@ LONE_RUNS = {
     "trace_training": lambda rules: trace_training(WORLD, LEARNER, task=rules),
     "trace_policies": lambda rules: next(trace_policies(WORLD, TABLE[None], [0], task=rules)),
     "record": lambda rules: record(WORLD, task=rules),
-    "learning_checkpoints": lambda rules: learning_checkpoints(WORLD, LEARNER, task=rules),
     "RunPoint": lambda rules: RunPoint(WORLD, rules, LEARNER),
 }
 ENVIRONMENTS = {

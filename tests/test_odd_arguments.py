@@ -25,7 +25,7 @@ from taichi_ants.analysis import statistics
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
-from taichi_ants.rendering import learning_checkpoints, policy_sheet, save_animation
+from taichi_ants.rendering import save_animation
 from taichi_ants.studies.command_line import Parser, notice
 from taichi_ants.viewer import check_page, frame, notebook, record_colony
 
@@ -49,11 +49,7 @@ ODD = {
     "configs": lambda _: train(WORLD, SCALAR, 0, 1),
     "progress": lambda _: train(WORLD, CONFIG, 0, 1, progress="x"),
     "progress of rollouts": lambda _: evaluate(WORLD, TABLE, progress=np.zeros(0)),
-    "progress of checkpoints": lambda _: learning_checkpoints(
-        WORLD, CONFIG, checkpoints=[1], progress=3
-    ),
     "progress of a colony": lambda colony: colony.run(1, 1, progress=object()),
-    "checkpoints": lambda _: learning_checkpoints(WORLD, CONFIG, checkpoints=range(10**6, 0, -1)),
     "world": lambda _: Colony(SCALAR, None, CONFIG),
     "world of an episode": lambda colony: colony.begin_episode(world=SCALAR),
     "which": lambda colony: colony.reset_worlds(RAGGED),
@@ -70,8 +66,6 @@ ODD = {
     "no learner": lambda _: learners.get(["sarsa"]),
     "no configuration": lambda _: learners.with_hyperparameters(None),
     "a name of one's own": lambda _: learners.td_learner(LONG, print),
-    "a checkpoint": lambda _: learning_checkpoints(WORLD, CONFIG, checkpoints=SCALAR),
-    "a task": lambda _: learning_checkpoints(WORLD, CONFIG, checkpoints=[0], task=np.zeros(0)),
     "who is followed": lambda colony: record_colony(colony, follow=np.zeros(0)),
     "a state": lambda _: states.state_name(2**31),
     "progress of a record": lambda _: record(WORLD, episodes=1, max_steps=2, progress=3),
@@ -91,7 +85,7 @@ ODD = {
         Colony(WORLD, None, None, range(3), 2, sharing="frozen"), RAGGED
     ),
     "two runs": lambda _: rollout(WORLD, train(WORLD, CONFIG, range(2), 1)),
-    "two policies": lambda _: policy_sheet(np.zeros((2, 128, 5))),
+    "two policies": lambda _: rollout(WORLD, np.zeros((2, 128, 5))),
     "a world's name": lambda _: places.check_seed_counts(LONG),
 }
 
@@ -110,7 +104,6 @@ def test_results_and_policies_are_taken_for_their_tables() -> None:
     policy = Policy(table, "paper", {})
     for given in (result, policy):
         assert rollout(WORLD, given) == rollout(WORLD, table)
-        assert (policy_sheet(given) == policy_sheet(table)).all()
     assert evaluate(WORLD, result, 3).steps.tolist() == [[evaluate(WORLD, table, 3).steps.tolist()]]
 
 
@@ -121,11 +114,6 @@ def test_several_tables_are_counted_where_one_is_wanted() -> None:
 
 def test_whole_numbers_of_numpy_are_whole_numbers() -> None:
     assert len(rollout(WORLD, TABLE, max_steps=SCALAR)) == 5
-
-
-def test_a_title_longer_than_a_picture_is_shortened() -> None:
-    shown = policy_sheet(TABLE, LONG)
-    assert (shown == policy_sheet(TABLE, LONG[:1000])).all()
 
 
 def test_no_message_fills_a_screen(capsys: pytest.CaptureFixture[str]) -> None:

@@ -113,8 +113,7 @@ def test_help_lists_the_commands_in_a_line_each(arguments, tmp_path):
     "arguments",
     [
         *COMMANDS,
-        "colony live",
-        *("render episode", "render colony", "render learning", "render sheet"),
+        *("colony live", "render episode", "render colony"),
     ],
 )
 def test_commands_have_help_of_their_own_which_needs_little(arguments, tmp_path):

@@ -77,7 +77,7 @@ class Comparison:
     """The results of all configurations, each trained and evaluated with all seeds.
 
     Attributes:
-        measures: `MEASURES` of each run by name, float64 (rows, seeds).
+        measures: `LONE` of each run by name, float64 (rows, seeds).
         behaviours: Behaviours of the final policies, indices into `BEHAVIOURS`, int (rows, seeds).
         policy_returns: Returns of the episodes that show the behaviours, integer (rows, seeds).
         episodes, rollouts, max_steps: Those of a `RunPoint`.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from policy_sheet import policy_sheet
 
 from paper import comparison as paper
 from paper import report
@@ -23,7 +24,7 @@ from taichi_ants.analysis.drawings import Drawing, drawings
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
 from taichi_ants.learners.policies import load_policy
-from taichi_ants.rendering import Episode, policy_sheet
+from taichi_ants.rendering import Episode
 from taichi_ants.report.page import Picture, Player, Shown, Statement, Statements, fill
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.studies.runner import Study

@@ -27,7 +27,7 @@ from paper.comparison import (
     Variant,
 )
 from taichi_ants.analysis.findings import UNBOUNDED
-from taichi_ants.measures.runs import MEASURES, WINDOW
+from taichi_ants.measures.finished import LONE, WINDOW
 
 SHARE, DIFFERENCE = (0.0, 1.0), (-1.0, 1.0)
 ALL = f"all {len(GRID)}"
@@ -188,9 +188,9 @@ def _quantity(
     scope: str, measure: str, effects: dict[str, Effect], bounds: tuple[float, float] = UNBOUNDED
 ) -> Quantity:
     """Return a quantity in the unit of a measure; `bounds` apply to shares and counts."""
-    one = MEASURES[measure]
+    one = LONE[measure]
     possible = UNBOUNDED if one.uses_iqm else bounds
-    return Quantity(f"{one.words}, {scope}", one.unit, effects, possible)
+    return Quantity(f"{one.label}, {scope}", one.unit, effects, possible)
 
 
 def share_above(measure: str, first: Variant, second: Variant, sign: int = 1) -> Quantity:
@@ -204,7 +204,7 @@ def share_above(measure: str, first: Variant, second: Variant, sign: int = 1) ->
         return (0.5 + 0.5 * sign * signs).mean(axis=EVERY_CONFIGURATION)
 
     label = f"{first.label} {'above' if sign > 0 else 'below'} {second.label}"
-    words = f"{MEASURES[measure].words}, in which share of 16 matched configurations of a seed"
+    words = f"{LONE[measure].label}, in which share of 16 matched configurations of a seed"
     return Quantity(words, "share of 16 pairs", {label: share}, SHARE)
 
 
@@ -215,7 +215,7 @@ def growth(later: str, earlier: str, *variants: Variant) -> Quantity:
     """Return one measure minus another of each learner, as the mean over all configurations."""
     words, mean = READS["mean of all"]
     both = Read(
-        f"minus {MEASURES[earlier].words}, {words}",
+        f"minus {LONE[earlier].label}, {words}",
         lambda grids, _, variant: mean(grids, later, variant) - mean(grids, earlier, variant),
     )
     return of(both, later, *variants)
@@ -236,7 +236,7 @@ def rank_correlation(first: str, second: str, variant: Variant) -> Quantity:
         scale = np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
         return (one * other).sum(axis=0) / np.where(scale > 0, scale, 1.0)
 
-    pair = f"{MEASURES[first].words} and {MEASURES[second].words}"
+    pair = f"{LONE[first].label} and {LONE[second].label}"
     words = f"rank correlation of {pair} over the 16 configurations of a seed"
     return Quantity(words, "correlation", {variant.label: correlation}, DIFFERENCE)
 
@@ -250,8 +250,8 @@ def stronger(measure: str, factor: str) -> Quantity:
 
     others = [other for other in FACTORS if other != factor]
     return Quantity(
-        f"{MEASURES[measure].words}, absolute effect of a hyperparameter, mean of the learners",
-        MEASURES[measure].unit,
+        f"{LONE[measure].label}, absolute effect of a hyperparameter, mean of the learners",
+        LONE[measure].unit,
         {f"{factor} minus {other}".replace("_", " "): effects(other) for other in others},
         of_estimates=lambda estimates: _first_minus_second(np.abs(estimates), np.mean),
     )
@@ -264,9 +264,9 @@ def more_dependent(measure: str, factor: str, *both: tuple[Variant, Variant]) ->
         return lambda grids: np.concatenate([pairs(grids(measure, v), factor) for v in variants])
 
     return Quantity(
-        f"{MEASURES[measure].words}, standard deviation of the effect of {factor} over 8 pairs of "
+        f"{LONE[measure].label}, standard deviation of the effect of {factor} over 8 pairs of "
         "configurations (jackknife over seeds)",
-        MEASURES[measure].unit,
+        LONE[measure].unit,
         {f"{one.label} minus {other.label}": effects(one, other) for one, other in both},
         of_estimates=lambda estimates: _first_minus_second(estimates, partial(np.std, ddof=1)),
     )

@@ -32,7 +32,7 @@ from taichi_ants.analysis.tables import (
     thousands,
 )
 from taichi_ants.errors import count
-from taichi_ants.measures.runs import WINDOW
+from taichi_ants.measures.finished import WINDOW
 
 WIDTH = 79  # columns of the narrowest common terminal
 MOST_LINES = 12  # of the table in the report of one screen

@@ -16,7 +16,7 @@ from paper.comparison import TABLE_2, Comparison, PaperRow, Row, Variant
 from taichi_ants.analysis.behaviour import BEHAVIOURS, NAMES, counts
 from taichi_ants.analysis.statistics import RANDOM_SEED, Estimator, interquartile_mean
 from taichi_ants.analysis.sweeps import centre_columns, centres_of
-from taichi_ants.measures.runs import MEASURES
+from taichi_ants.measures.finished import LONE
 
 DRAWS = 20_000
 # Measures in table 2. The paper has one number of steps, which can be read in two ways.
@@ -51,7 +51,7 @@ class Summary(NamedTuple):
 def summarise(comparison: Comparison) -> list[Summary]:
     """Return a summary of each configuration, in the order of the rows."""
     values = {name: comparison.measures[name] for name in _MEASURES}
-    estimates = centres_of(values, [name for name in values if MEASURES[name].uses_iqm])
+    estimates = centres_of(values, [name for name in values if LONE[name].uses_iqm])
     rows = zip(comparison.rows, estimates, comparison.behaviours, strict=True)
     seeds = len(comparison.seeds)
     return [Summary(row, seeds, found, counts(done)) for row, found, done in rows]

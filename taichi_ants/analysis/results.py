@@ -115,11 +115,7 @@ def compare(
         AntsError: The seeds differ, a result does not have the measure or the configuration, or no
             seed has a value in both results.
     """
-    for name, result in (("a", a), ("b", b)):
-        if not isinstance(result, Tidy):
-            raise AntsError(
-                f"{name} is {shown(result)}; give a result of Colony.run, train or evaluate."
-            )
+    _check_results({"a": a, "b": b})
     if not isinstance(level, (int, float)) or not 0 < level < 1:
         raise AntsError(f"level is {shown(level)}; it must be a number between 0 and 1.")
     tables = a.measured(), b.measured()
@@ -152,8 +148,24 @@ def compare(
     )
 
 
+def _check_results(results: Mapping[str, object]) -> None:
+    for name, result in results.items():
+        if not isinstance(result, Tidy):
+            raise AntsError(
+                f"{name} is {shown(result)}; give a result of Colony.run, train or evaluate."
+            )
+
+
 def summary(result: Tidy, last: int | None = None) -> Summary:
-    """Return means over seeds with intervals; see `Tidy.summary`."""
+    """Return means over seeds with 95 % intervals, for each configuration and measure.
+
+    The value of a seed is its mean over episodes, at the last tick of each.
+
+    Args:
+        result: The result of `Colony.run`, `train` or `evaluate`.
+        last: The number of episodes to use, from the last one; None uses all.
+    """
+    _check_results({"result": result})
     table, rows = result.measured(), []
     if not table.values:
         raise AntsError(_NO_NUMBERS)
@@ -189,15 +201,10 @@ def plot(
     if path is not None:
         expect("path", path, str, Path)
         check_one_of("the suffix of path", Path(path).suffix, (".png",))
-    named = results if isinstance(results, Mapping) else {"": results}
-    for name, result in named.items():
-        if not isinstance(result, Tidy):
-            raise AntsError(
-                f"a result{f' ({name})' if name else ''} is {shown(result)}; give results of "
-                "Colony.run, train or evaluate."
-            )
+    named = results if isinstance(results, Mapping) else {"result": results}
+    _check_results(named)
     table = _together({name: result.measured() for name, result in named.items()})
-    names = [part for name in measures for part in parts_of(table, name)] or list(table.usual)
+    names = [part for name in measures for part in parts_of(table, name)] or list(table.plotted)
     if not names:
         raise AntsError(_NO_NUMBERS)
     if len(table.groups) > _MOST_LINES:
@@ -261,7 +268,7 @@ def _together(tables: Mapping[str, Measured]) -> Measured:
         of_group=np.concatenate(of_group),
         seeds=first.seeds,
         groups=tuple(groups),
-        usual=tuple(name for name in first.usual if name in common),
+        plotted=tuple(name for name in first.plotted if name in common),
         units=first.units,
     )
 

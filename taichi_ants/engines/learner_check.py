@@ -1,7 +1,7 @@
 """A trial of a learner from outside the package, in Taichi's debug mode, which checks indices.
 
 Taichi's compiler can crash on unexpected code, and compiled code can crash when it reads outside an
-array. So this runs in a process of its own: `taichi-ants check FILE`.
+array. So the command `taichi-ants check FILE` runs it in a separate process.
 """
 
 import numpy as np

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -65,7 +65,9 @@ class Snapshot(Record):
         ant_idle: bool (n,), whether each ant is idle, see `Labour`.
         ant_thresholds: float32 (n,), the response thresholds of the ants; 0 without one.
         fields: The levels of each pheromone by name, (grid.size,); "trail" is `trail`.
-        counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers.
+        counts: Counts of the episode so far: the fields of `ColonyEpisodes`, as integers. Also
+            `nest_deliveries`, `food_deliveries` and `caste_deliveries`, int32 (nests or kinds of
+            food or castes,).
         world: The world at the start of the episode; None if unknown.
     """
 
@@ -87,7 +89,7 @@ class Snapshot(Record):
     ant_idle: np.ndarray = field(default_factory=_none)
     ant_thresholds: np.ndarray = field(default_factory=_none)
     fields: Mapping[str, np.ndarray] = field(default_factory=dict)
-    counts: Mapping[str, int] = field(default_factory=dict)
+    counts: Mapping[str, Any] = field(default_factory=dict)
     world: World | None = None
 
     @property

@@ -119,7 +119,7 @@ class LoneAnts(Ants):
 
     def facts(self, last: bool = False) -> dict[str, np.ndarray]:
         arrays, when = self.batched.arrays, "final_" if last else ""
-        packed = _PACKED_MASKS.take(arrays[f"{when}percepts"], mode="clip")
+        packed = _PACKED_MASKS.take(arrays[f"{when}paper_states"], mode="clip")
         return {
             "state": arrays[f"{when}states"].astype(np.int64),
             "action_mask": packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS],

@@ -71,9 +71,9 @@ class TrainingConfig(Settings, path="training"):
         initial_q: float = 0.0,
         **more: float,
     ) -> None:
-        given = locals()
-        for one in declared(TrainingConfig):
-            object.__setattr__(self, one.name, given[one.name])
+        values = locals()
+        for setting in declared(TrainingConfig):
+            object.__setattr__(self, setting.name, values[setting.name])
         self.check()
         try:
             pairs = {**dict(hyperparameters), **more}
@@ -105,11 +105,11 @@ class TrainingConfig(Settings, path="training"):
 
     def _changed(self, changes: Mapping[str, Any]) -> TrainingConfig:
         """Take other names as hyperparameters; drop those of the learner before."""
-        own = [one.name for one in declared(TrainingConfig)]
-        more = {name: value for name, value in changes.items() if name not in own}
+        common = [setting.name for setting in declared(TrainingConfig)]
+        more = {name: value for name, value in changes.items() if name not in common}
         same = changes.get("learner", self.learner) == self.learner
         kept = dict(self.hyperparameters) if same else {}
-        changed = super()._changed({n: value for n, value in changes.items() if n in own})
+        changed = super()._changed({n: value for n, value in changes.items() if n in common})
         return replace(changed, hyperparameters=tuple({**kept, **more}.items()))
 
     def next_learning_rate(self, rate: float) -> float:
@@ -139,11 +139,11 @@ class Hyperparameters(Settings, path="training"):
     """
 
     def __post_init__(self) -> None:
-        kinds = {one.name: one.kind for one in declared(type(self))}
-        for one in fields(self):
-            if kinds.get(one.name) not in (int, float):
+        kinds = {setting.name: setting.kind for setting in declared(type(self))}
+        for field in fields(self):
+            if kinds.get(field.name) not in (int, float):
                 raise AntsError(
-                    f"the field {one.name} has the type {one.type}; declare it as "
+                    f"the field {field.name} has the type {field.type}; declare it as "
                     "Annotated[int, Setting(...)] or Annotated[float, Setting(...)]."
                 )
         self.check()

@@ -49,7 +49,7 @@ def read_rates(kind: type[Hyperparameters]) -> Callable[..., Any]:
     The rates are a struct of the first three arguments, f32, and of the hyperparameters by name,
     i32 or f32, which it reads from the f64 array `numbers`, starting at `begin`.
     """
-    more = {one.name: ti.i32 if one.kind is int else ti.f32 for one in declared(kind)}
+    more = {setting.name: ti.i32 if setting.kind is int else ti.f32 for setting in declared(kind)}
     rates_type = ti.types.struct(learning_rate=ti.f32, discount=ti.f32, epsilon=ti.f32, **more)
     kinds = tuple(more.values())
 

@@ -232,10 +232,10 @@ def load_policy(path: PathLike) -> Policy:
 def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
     table = checked_values(q_values, Task(observations.get(observation).name))
     if table.ndim != 2:
-        places = ", ".join("0" * (table.ndim - 2))
+        indices = ", ".join("0" * (table.ndim - 2))
         raise AntsError(
             f"q_values has shape {table.shape}, but a policy file has one table, "
-            f"{table.shape[-2:]}; give one of them, for example q_values[{places}]."
+            f"{table.shape[-2:]}; give one of them, for example q_values[{indices}]."
         )
     return table
 

@@ -10,13 +10,13 @@ import math
 from dataclasses import asdict, replace
 from importlib import import_module
 
-from taichi_ants.errors import AntsError, check_new_name, expect, shown, unusable
+from taichi_ants.errors import AntsError, expect, unusable
 from taichi_ants.learners.config import Hyperparameters, TrainingConfig
 from taichi_ants.learners.learner import Learner, Memory, check_arguments, check_td_error
+from taichi_ants.registry import Registry
 from taichi_ants.settings import declared, not_a_setting
 
-# The built-in learners and their labels. Learner NAME is in the file `name.py`, which imports
-# Taichi and is therefore imported on first use.
+# The built-in learners and their labels.
 BUILT_IN = {
     "q_learning": "Q-learning",
     "sarsa": "SARSA",
@@ -27,7 +27,15 @@ BUILT_IN = {
     "n_step_sarsa": "n-step SARSA",
     "prioritized_sweeping": "Prioritized sweeping",
 }
-_LEARNERS: dict[str, Learner] = {}
+
+
+def _load(name: str) -> Learner:
+    """Import the file `name.py` of a built-in learner on first use, because it imports Taichi."""
+    return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
+
+
+LEARNERS = Registry("learner", "taichi_ants.learners.register", BUILT_IN, _load)
+get, names = LEARNERS.get, LEARNERS.names
 
 
 def register(learner: Learner) -> Learner:
@@ -39,22 +47,21 @@ def register(learner: Learner) -> Learner:
     """
     expect("learner", learner, Learner)
     name = learner.name
-    check_new_name("learner", name, BUILT_IN)
-    parts = ["memory", "at", "step", "rates", "random_state"]
-    check_arguments(f"the function learn of {name!r}", learner.learn, parts)
+    LEARNERS.check_new(name)
+    arguments = ["memory", "at", "step", "rates", "random_state"]
+    check_arguments(f"the function learn of {name!r}", learner.learn, arguments)
     if learner.begin is not None:
-        check_arguments(f"the function begin of {name!r}", learner.begin, parts[:2])
+        check_arguments(f"the function begin of {name!r}", learner.begin, arguments[:2])
     if learner.td_error is not None:
         check_td_error(name, learner.td_error)
     _try_sizes(learner)
-    taken = {one.name for one in declared(TrainingConfig)}
-    for clash in taken & {one.name for one in declared(learner.hyperparameters)}:
-        raise AntsError(
-            f"{clash!r} is a setting of all learners; choose another name for this hyperparameter "
-            f"of {name!r}."
-        )
-    _LEARNERS[name] = learner
-    return learner
+    for setting in declared(learner.hyperparameters):
+        if setting.name in {common.name for common in declared(TrainingConfig)}:
+            raise AntsError(
+                f"{setting.name!r} is a setting of all learners; choose another name for this "
+                f"hyperparameter of {name!r}."
+            )
+    return LEARNERS.add(name, learner)
 
 
 def _try_sizes(learner: Learner) -> None:
@@ -72,19 +79,6 @@ def _try_sizes(learner: Learner) -> None:
         raise unusable(learner, f"{part} fails ({error})") from error
 
 
-def get(name: str) -> Learner:
-    """Return the learner of this name; AntsError, with a list of all names, if there is none."""
-    expect("the learner", name, str)
-    if name in BUILT_IN:
-        return getattr(import_module(f"taichi_ants.learners.{name}"), name.upper())
-    if name not in _LEARNERS:
-        raise AntsError(
-            f"there is no learner {shown(name)}; choose one of {', '.join(names())}, or give the "
-            "file that registers it with --plugin."
-        )
-    return _LEARNERS[name]
-
-
 def label(name: str) -> str:
     """Return the label for readers, for example "Dyna-Q"; for learners of plugins, the name."""
     expect("name", name, str)
@@ -98,15 +92,9 @@ def with_hyperparameters(config: TrainingConfig) -> TrainingConfig:
     """
     expect("the configuration", config, TrainingConfig)
     kind = get(config.learner).hyperparameters
-    own_names = [one.name for one in declared(kind)]
+    known = [setting.name for setting in (*declared(kind), *declared(TrainingConfig))]
     for name, _ in config.hyperparameters:
-        if name not in own_names:
-            known = [*own_names, *(one.name for one in declared(TrainingConfig))]
+        if name not in known[: len(declared(kind))]:
             raise AntsError(f"`training.{name}` {not_a_setting(name, known, config.learner)}")
-    own = kind(**dict(config.hyperparameters))
-    return replace(config, hyperparameters=tuple(asdict(own).items()))
-
-
-def names() -> tuple[str, ...]:
-    """Return the names of all registered learners, in the order of registration."""
-    return (*BUILT_IN, *_LEARNERS)
+    hyperparameters = kind(**dict(config.hyperparameters))
+    return replace(config, hyperparameters=tuple(asdict(hyperparameters).items()))

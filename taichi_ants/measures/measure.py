@@ -1,4 +1,4 @@
-"""The class of measures: named functions of the state of a colony."""
+"""The class of measures: named functions of the state of a colony, or of finished runs."""
 
 from __future__ import annotations
 
@@ -6,29 +6,38 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taichi_ants.errors import AntsError, shown
 
+if TYPE_CHECKING:
+    from taichi_ants.task import Task
+    from taichi_ants.worlds.world import World
+
+COUNTS, RUN = "counts", "run"  # values of `of` that do not name a measure
 # A number, numbers by the names of parts, or an array.
 Value = float | Mapping[str, float] | np.ndarray
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A named function of the state of one world of a colony.
+    """A named function, whose argument depends on `of`.
 
     Attributes:
         name: The name, with the part after a point: "entropy" or "entropy.trail".
-        function: A function of a `Snapshot` that returns a number, numbers by the names of parts,
-            or an array. In a run, the arrays of the snapshot are read-only.
+        function: A function that returns a number, numbers by the names of parts, or an array.
         unit: The unit of the value, for axes and tables; "" if it has none.
         summary: A short description for lists.
-        of: The name of another measure, whose series the function reads. The function then takes
-            the values of that measure in the episode so far, float64 (n,), and the snapshot. None
-            for a function of the snapshot alone.
+        of: The arguments of the function. None: the `Snapshot` of a world, with read-only arrays in
+            a run. "counts": the counts of an episode by name, integers in `Snapshot.counts` and
+            arrays of episodes in finished runs, so the measure works for lone ants, too. The name
+            of another measure: its values in the episode so far, float64 (n,), and the snapshot.
+            "run": a `Run`; the value is then float64 (...) with the number of each run.
+        parts: A function of a world and a task that returns the names of the parts.
+        is_array: Whether the value is an array.
+        episodes: The fewest episodes of training that a measure of a run needs.
     """
 
     name: str
@@ -36,28 +45,48 @@ class Measure:
     unit: str = ""
     summary: str = ""
     of: str | None = None
+    parts: Callable[[World, Task], tuple[str, ...]] = lambda world, task: ()
+    is_array: bool = False
+    episodes: int = 0
 
     @property
     def part(self) -> str:
         """The part of the value that the name selects; "" for the whole value."""
         return self.name.partition(".")[2]
 
-    def select(self, part: str) -> Measure:
-        """Return the measure of one part of the value."""
-        return replace(self, name=f"{self.name.partition('.')[0]}.{part}")
+    @property
+    def label(self) -> str:
+        """The text for axes and tables of finished runs."""
+        words = self.summary or self.name.replace("_", " ")
+        return f"{words} ({self.unit})" if self.unit and self.of != RUN else words
+
+    @property
+    def uses_iqm(self) -> bool:
+        """Whether tables of finished runs have an IQM; shares and counts have only a mean."""
+        return self.of == RUN and self.unit in ("reward", "steps")
+
+    @property
+    def reads_series(self) -> bool:
+        """Whether it reads the series of another measure."""
+        return self.of not in (None, COUNTS, RUN)
+
+    def check_single_state(self, where: str) -> None:
+        """Raise AntsError if it does not read a single state, which the caller has."""
+        if self.of not in (None, COUNTS):
+            needs = "finished runs" if self.of == RUN else f"the series of {self.of!r}"
+            raise AntsError(
+                f"{where} is {self.name!r}, which needs {needs}; choose a measure of a single "
+                "state."
+            )
 
     def __call__(self, snapshot: Any) -> float:
         """Return the value in a snapshot as one number.
 
         Raises:
-            AntsError: The measure needs a series, or its value is an array or has several parts.
+            AntsError: The measure does not read one state, is an array, or has several parts.
         """
-        if self.of is not None:
-            raise AntsError(
-                f"the measure {self.name!r} needs the series of {self.of!r}, not one state; use it "
-                "in Colony.run(measures=..., every=...)."
-            )
-        value = self.value(snapshot)
+        self.check_single_state("the measure")
+        value = self.read(snapshot)
         if isinstance(value, np.ndarray):
             raise AntsError(
                 f"the measure {self.name!r} is an array of shape {value.shape}; choose one that "
@@ -72,24 +101,21 @@ class Measure:
             )
         return next(iter(value.values()))
 
-    def value(self, *given: Any) -> Value:
-        """Return the value: a float, floats by part, or an array.
+    def read(self, snapshot: Any, values: np.ndarray | None = None) -> Value:
+        """Return the value in a state: a float, floats by part, or an array.
+
+        `values` is the series of the measure that `of` names.
 
         Raises:
             AntsError: The function fails or returns something else, or the part does not exist.
         """
-        try:
-            value = self.function(*given)
-        except AntsError:
-            raise
-        except Exception as error:
-            reason = " ".join(f"{type(error).__name__}: {error}".split())
-            raise AntsError(
-                f"the measure {self.name!r} failed with {reason}; correct its function."
-            ) from error
+        if self.of == COUNTS:
+            value = self.computed(snapshot.counts)
+        else:
+            value = self.computed(*([] if self.of is None else [values]), snapshot)
         if isinstance(value, Mapping):
             if not self.part:
-                return {str(part): self._number(one) for part, one in value.items()}
+                return {str(part): self._number(number) for part, number in value.items()}
             if self.part not in value:
                 parts = ", ".join(map(str, value))
                 raise AntsError(f"{self.name!r} is not a part of the measure; it has {parts}.")
@@ -99,6 +125,22 @@ class Measure:
         if isinstance(value, np.ndarray) and value.ndim:
             return value
         return self._number(value)
+
+    def computed(self, *arguments: Any) -> Any:
+        """Return what the function returns; AntsError if it fails."""
+        try:
+            return self.function(*arguments)
+        except AntsError:
+            raise
+        except Exception as error:
+            reason = " ".join(f"{type(error).__name__}: {error}".split())
+            raise AntsError(
+                f"the measure {self.name!r} failed with {reason}; correct its function."
+            ) from error
+
+    def select(self, part: str) -> Measure:
+        """Return the measure of one part of the value."""
+        return replace(self, name=f"{self.name.partition('.')[0]}.{part}")
 
     def _number(self, value: object) -> float:
         if isinstance(value, np.ndarray) and value.ndim == 0:

@@ -1,4 +1,4 @@
-"""The paths of ants with food: their length, and its ratio to the shortest path."""
+"""The shortest path of ants with food."""
 
 from __future__ import annotations
 
@@ -11,27 +11,7 @@ import numpy as np
 from taichi_ants.task.constants import FOOD, OBSTACLE, QUEEN
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.records import Snapshot
     from taichi_ants.worlds.world import World
-
-
-def path_length(snapshot: Snapshot) -> float:
-    """Return the mean ticks from pick-up to delivery, of all loads delivered in the episode.
-
-    An ant that walks straight to the queen from a pick-up k moves away from her needs k + 1 ticks.
-    The value is nan before the first delivery.
-    """
-    counts = snapshot.counts
-    return counts["carried"] / counts["deliveries"] if counts["deliveries"] else math.nan
-
-
-def path_ratio(snapshot: Snapshot) -> float:
-    """Return `path_length` divided by the fewest ticks that a load of this world needs, at least 1.
-
-    The fewest ticks are those of `shortest_path`. The value is nan before the first delivery.
-    """
-    shortest = math.nan if snapshot.world is None else shortest_path(snapshot.world)
-    return path_length(snapshot) / shortest
 
 
 @lru_cache(maxsize=256)

@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from taichi_ants.errors import AntsError, checked_whole, entries_of, shown
-from taichi_ants.measures.measure import Measure, Value
+from taichi_ants.measures.measure import RUN, Measure, Value
 from taichi_ants.measures.registry import get
 
 
 class Colony(Protocol):
     """The part of a colony that the recorder reads."""
-
-    @property
-    def seeds(self) -> tuple[int, ...]: ...
-
-    @property
-    def episode(self) -> int: ...
 
     @property
     def episode_ticks(self) -> np.ndarray: ...
@@ -57,31 +51,18 @@ class Series:
             return NotImplemented
         ours, theirs = self._arrays(), other._arrays()
         return ours.keys() == theirs.keys() and all(
-            np.array_equal(one, theirs[name], equal_nan=one.dtype.kind == "f")
-            for name, one in ours.items()
+            np.array_equal(array, theirs[name], equal_nan=array.dtype.kind == "f")
+            for name, array in ours.items()
         )
 
     __hash__ = None  # type: ignore[assignment]
 
     def _arrays(self) -> dict[str, np.ndarray]:
-        where = {"world": self.worlds, "episode": self.episodes, "tick": self.ticks}
-        return {
-            **where,
-            **{f".{n}": array for n, array in (*self.values.items(), *self.maps.items())},
-        }
+        indices = {"world": self.worlds, "episode": self.episodes, "tick": self.ticks}
+        return indices | {f".{n}": array for n, array in (*self.values.items(), *self.maps.items())}
 
     def __repr__(self) -> str:
-        names = ", ".join([*self.values, *self.maps])
-        return f"Series({len(self)} rows of {names})"
-
-
-class Row(NamedTuple):
-    """The values of all measures of one world at one tick."""
-
-    world: int
-    episode: int
-    tick: int
-    values: dict[str, Value]
+        return f"Series({len(self)} rows of {', '.join([*self.values, *self.maps])})"
 
 
 class Recorder:
@@ -96,23 +77,28 @@ class Recorder:
     """
 
     def __init__(self, measures: Any = (), every: int | None = None) -> None:
-        single = isinstance(measures, (str, Measure))
-        listed = [measures] if single else entries_of(measures)
+        listed = [measures] if isinstance(measures, (str, Measure)) else entries_of(measures)
         if listed is None:
             raise AntsError(f"measures is {shown(measures)}; give a list of names of measures.")
-        self.measures = [get(one) for one in listed]
-        names = [one.name for one in self.measures]
-        for name in names:
-            if names.count(name) > 1:
-                raise AntsError(f"measures has {name!r} more than once; remove one of them.")
+        self.measures = [get(name) for name in listed]
+        names = [measure.name for measure in self.measures]
+        for measure in self.measures:
+            if names.count(measure.name) > 1:
+                raise AntsError(f"measures has {measure.name!r} more than once; list it once.")
+            if measure.of == RUN:
+                measure.check_single_state("measures")
         self.every = None if every is None else checked_whole("every", every)
         if self.every is not None and not self.measures:
             raise AntsError(f"every is {every}, but measures is empty; name at least one measure.")
         # Measures whose values the series of others need.
-        self._sources = {one.of: get(one.of) for one in self.measures if one.of is not None}
-        self._rows: list[Row] = []
+        self._sources = {
+            str(measure.of): get(str(measure.of))
+            for measure in self.measures
+            if measure.reads_series
+        }
+        self._rows: list[tuple[int, int, int]] = []  # world, episode, tick
+        self._values: list[dict[str, Value]] = []  # of each row
         self._units: dict[str, str] = {}
-        self._episode = 0
         self.begin(0)
 
     def begin(self, episode: int) -> None:
@@ -127,69 +113,48 @@ class Recorder:
 
     def read(self, colony: Colony) -> None:
         """Read all measures, except in worlds that have not changed since their last row."""
-        if not self.measures:
-            return
-        for world, tick in enumerate(colony.episode_ticks.tolist()):
+        for world, tick in enumerate(colony.episode_ticks.tolist() if self.measures else ()):
             if self._read.get(world) == tick:  # its episode has ended
                 continue
             self._read[world] = tick
-            snapshot, found = colony.snapshot(world), dict[str, Value]()
+            snapshot, values = colony.snapshot(world), dict[str, Value]()
             for array in (*vars(snapshot).values(), *snapshot.fields.values()):
                 if isinstance(array, np.ndarray):  # all measures of the row read it
                     array.setflags(write=False)
             for name, source in self._sources.items():
                 self._earlier.setdefault((world, name), []).append(source(snapshot))
             for measure in self.measures:
-                given: list[Any] = [snapshot]
-                if measure.of is not None:
-                    given.insert(0, np.array(self._earlier[world, measure.of]))
-                value = measure.value(*given)
-                for name, one in _named(measure.name, value):
-                    found[name], self._units[name] = one, measure.unit
-            self._rows.append(Row(world, self._episode, tick, found))
+                earlier = self._earlier.get((world, str(measure.of)))
+                value = measure.read(snapshot, None if earlier is None else np.array(earlier))
+                parts = value.items() if isinstance(value, Mapping) else [("", value)]
+                for part, number in parts:
+                    name = f"{measure.name}.{part}" if part else measure.name
+                    values[name], self._units[name] = number, measure.unit
+            self._rows.append((world, self._episode, tick))
+            self._values.append(values)
 
     def series(self) -> Series | None:
         """Return all rows so far; None without measures."""
         if not self.measures:
             return None
-        rows = self._rows
-        names = dict.fromkeys(name for row in rows for name in row.values)
-        arrays = [
-            n for n in names if any(isinstance(row.values.get(n), np.ndarray) for row in rows)
-        ]
-        return Series(
-            worlds=np.array([row.world for row in rows], np.int32),
-            episodes=np.array([row.episode for row in rows], np.int32),
-            ticks=np.array([row.tick for row in rows], np.int32),
-            values={
-                name: np.array([row.values.get(name, math.nan) for row in rows], float)
-                for name in names
-                if name not in arrays
-            },
-            maps={name: _stacked(name, [row.values.get(name) for row in rows]) for name in arrays},
-            units=dict(self._units),
-        )
+        values: dict[str, np.ndarray] = {}
+        maps: dict[str, np.ndarray] = {}
+        for name in self._units:
+            column = [row.get(name, math.nan) for row in self._values]
+            if not any(isinstance(value, np.ndarray) for value in column):
+                values[name] = np.array(column, float)
+            elif len({np.shape(value) for value in column}) > 1:  # type: ignore[arg-type]
+                raise AntsError(
+                    f"the measure {name!r} returned arrays of different shapes; return the same "
+                    "shape for all worlds and ticks."
+                )
+            else:
+                maps[name] = np.stack(column)  # type: ignore[arg-type]
+        worlds, episodes, ticks = np.array(self._rows, np.int32).reshape(-1, 3).T.copy()
+        return Series(worlds, episodes, ticks, values, maps, dict(self._units))
 
 
 def stops(ticks: int, every: int | None) -> Iterator[int]:
     """Yield the ticks of the rows of an episode of this length, in which the last tick has one."""
     yield from range(every or ticks, ticks, every or ticks)
     yield ticks
-
-
-def _named(name: str, value: Value) -> Iterator[tuple[str, Value]]:
-    """Yield the names and values of the columns of a measure, one for each part."""
-    if isinstance(value, Mapping):
-        yield from ((f"{name}.{part}", one) for part, one in value.items())
-    else:
-        yield name, value
-
-
-def _stacked(name: str, arrays: Sequence[Any]) -> np.ndarray:
-    """Return the arrays of all rows as one array; AntsError if their shapes differ."""
-    if len({np.shape(one) for one in arrays}) > 1:
-        raise AntsError(
-            f"the measure {name!r} returned arrays of different shapes; return the same shape for "
-            "all worlds and ticks."
-        )
-    return np.stack(arrays)

@@ -1,10 +1,9 @@
-"""Results as tidy rows, one value a row, for pandas, Parquet, CSV, summaries and figures."""
+"""Results as tidy rows, one value a row, for pandas, Parquet and CSV."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +12,7 @@ from taichi_ants import files
 from taichi_ants.errors import AntsError, imported
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import pandas
-    from matplotlib.figure import Figure
-
-    from taichi_ants.analysis.results import Summary
 
 
 @dataclass(frozen=True)
@@ -33,7 +27,7 @@ class Measured:
         of_group: The number of the row's configuration, (R,); 0 for colonies.
         seeds: The seeds, in the order of the result.
         groups: The names of the configurations; one empty name for colonies.
-        usual: The measures in a figure, if you name none.
+        plotted: The measures in a figure, if you name none.
         units: The unit of each measure by name; missing if it has none.
     """
 
@@ -43,7 +37,7 @@ class Measured:
     of_group: np.ndarray
     seeds: tuple[int, ...]
     groups: tuple[str, ...] = ("",)
-    usual: tuple[str, ...] = ()
+    plotted: tuple[str, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
 
 
@@ -59,22 +53,18 @@ class Tidy:
 
         They are ordered by measure. A value that does not exist is nan.
         """
-        table = self.measured()
-        index = [array.tolist() for array in table.index.values()]
-        for name, values in table.values.items():
-            for *where, value in zip(*index, values.tolist(), strict=True):
-                yield {**dict(zip(table.index, where, strict=True)), "measure": name,
-                       "value": float(value)}  # fmt: skip
+        columns = self.columns()
+        for row in zip(*(array.tolist() for array in columns.values()), strict=True):
+            yield dict(zip(columns, row, strict=True))
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return the columns of the tidy rows, arrays (rows,) by name."""
         table = self.measured()
         n, rows = len(table.values), len(table.of_seed)
-        found = {name: np.concatenate([array] * n) if n else array[:0]
-                 for name, array in table.index.items()}  # fmt: skip
-        found["measure"] = np.repeat(np.array([*table.values], object), rows)
-        several = [np.asarray(values, float) for values in table.values.values()]
-        return {**found, "value": np.concatenate([np.empty(0), *several])}
+        columns = {name: np.tile(array, n) for name, array in table.index.items()}
+        columns["measure"] = np.repeat(np.array([*table.values], object), rows)
+        columns["value"] = np.concatenate([np.empty(0), *table.values.values()], dtype=float)
+        return columns
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the tidy rows as a `pandas.DataFrame`; AntsError if pandas is not installed."""
@@ -83,8 +73,7 @@ class Tidy:
 
     def to_csv(self, path: files.PathLike) -> None:
         """Write the tidy rows to a file of comma-separated values, with an empty field for nan."""
-        names = [*self.measured().index, "measure", "value"]
-        files.write_csv(path, self.rows(), names)
+        files.write_csv(path, self.rows(), [*self.measured().index, "measure", "value"])
 
     def to_parquet(self, path: files.PathLike) -> None:
         """Write the tidy rows to a Parquet file; AntsError if pyarrow is not installed."""
@@ -97,20 +86,6 @@ class Tidy:
         table = arrow.table(columns)
         files.write_atomically(path, lambda file: parquet.write_table(table, file))
 
-    def summary(self, last: int | None = None) -> Summary:
-        """Return means over seeds with 95 % intervals, for each configuration and measure.
-
-        The value of a seed is its mean over episodes, at the last tick of each.
-
-        Args:
-            last: The number of episodes to use, from the last one; None uses all.
-        """
-        return _presentation().summary(self, last)
-
-    def plot(self, *measures: str, path: str | Path | None = None) -> Figure:
-        """Return a figure of means over seeds with 95 % intervals; see `taichi_ants.plot`."""
-        return _presentation().plot(self, *measures, path=path)
-
 
 def seed_array(seeds: Any) -> np.ndarray:
     """Return seeds as int64, or as Python integers if one does not fit."""
@@ -122,25 +97,26 @@ def seed_array(seeds: Any) -> np.ndarray:
 
 def parts_of(table: Measured, name: object) -> list[str]:
     """Return a measure as a list, or the names of its parts; AntsError if there is none."""
-    parts = [one for one in table.values if one.startswith(f"{name}.")]
-    found = [name] if isinstance(name, str) and name in table.values else parts
-    if not found:
+    if isinstance(name, str) and name in table.values:
+        return [name]
+    parts = [column for column in table.values if column.startswith(f"{name}.")]
+    if not parts:
         raise AntsError(
             f"the result has no measure {name!r} that is a number; "
             + (f"choose one of {', '.join(table.values)}, or " if table.values else "")
             + "run the colony with measures=[...]."
         )
-    return found
+    return parts
 
 
 def checked_measure(table: Measured, name: object) -> np.ndarray:
     """Return the values of a measure, or of its only part; AntsError if there is not one."""
-    found = parts_of(table, name)
-    if len(found) > 1:
+    parts = parts_of(table, name)
+    if len(parts) > 1:
         raise AntsError(
-            f"the measure {name!r} has {len(found)} parts; choose one of {', '.join(found)}."
+            f"the measure {name!r} has {len(parts)} parts; choose one of {', '.join(parts)}."
         )
-    return np.asarray(table.values[found[0]], float)
+    return np.asarray(table.values[parts[0]], float)
 
 
 def last_rows(table: Measured) -> np.ndarray:
@@ -151,10 +127,3 @@ def last_rows(table: Measured) -> np.ndarray:
     last = np.zeros(len(ticks), ticks.dtype)
     np.maximum.at(last, which.ravel(), ticks)
     return ticks == last[which.ravel()]
-
-
-def _presentation() -> Any:
-    """Return the module of figures and intervals."""
-    import taichi_ants  # here, because `analysis` builds on the results that use this module
-
-    return import_module(".results", taichi_ants.analysis.__name__)

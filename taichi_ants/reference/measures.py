@@ -107,9 +107,20 @@ def share_in_region(colony: ReferenceColony, name: str) -> float:
     return sum(inside) / len(inside) if inside else NONE
 
 
+def deliveries_by(colony: ReferenceColony, part: str) -> int:
+    """Return the deliveries of a nest, a kind of food or a caste, such as "nest_0"."""
+    owner, _, number = part.partition("_")
+    if owner == "caste":
+        return colony.record.by_caste[int(number)]
+    place = ("nest", "food").index(owner)
+    return sum(n for key, n in colony.record.apart.items() if key[place] == int(number))
+
+
 def measured(colony: ReferenceColony, name: str) -> float:
-    """Return the value of a measure of `MEASURES`, or of "regions.NAME"."""
+    """Return the value of a measure of `MEASURES`, or of a part of "regions" or "deliveries_by"."""
     before, _, part = name.partition(".")
+    if before == "deliveries_by":
+        return deliveries_by(colony, part)
     return share_in_region(colony, part) if before == "regions" else MEASURES[name](colony)
 
 

@@ -3,20 +3,11 @@
 - `picture` draws a world at its start.
 - `frames` draws the snapshots of `Episode.snapshots` or `colony_snapshots` as arrays; `Scene`
   draws a single snapshot.
-- `learning_frames` shows an ant at several stages of training, side by side.
-- `policy_sheet` shows the best action of a policy in each state.
 - `save_picture` and `save_animation` write arrays to files, which appear only once complete.
 """
 
 from taichi_ants.engines.records import Snapshot
-from taichi_ants.rendering.learning import (
-    Checkpoint,
-    learning_checkpoints,
-    learning_frames,
-    typical_seed,
-)
 from taichi_ants.rendering.scene import Scene, Status
-from taichi_ants.rendering.sheet import policy_sheet
 from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames, picture
 from taichi_ants.rendering.writers import (
     PAUSE,
@@ -28,7 +19,6 @@ from taichi_ants.rendering.writers import (
 
 __all__ = [
     "PAUSE",
-    "Checkpoint",
     "Episode",
     "Scene",
     "Snapshot",
@@ -38,12 +28,8 @@ __all__ = [
     "check_picture",
     "colony_snapshots",
     "frames",
-    "learning_checkpoints",
-    "learning_frames",
     "picture",
-    "policy_sheet",
     "save_animation",
     "save_picture",
-    "typical_seed",
 ]
 __dir__ = __all__.copy  # completion lists only public names

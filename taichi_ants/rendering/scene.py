@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +16,7 @@ from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks,
 from taichi_ants.task import Observation, Pheromone, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.field import COMPASS, TRAIL
-from taichi_ants.task.states import REACHABLE_STATES, TASK_NAMES
+from taichi_ants.task.states import TASK_NAMES
 
 PAPER = observations.get("paper")
 SMALLEST_SIDE, LARGEST_SIDE = 64, 4096
@@ -52,12 +51,6 @@ def name_parts(observation: Observation, state: int) -> tuple[str, str, list[str
     letters = rest.split()
     one_each = len(letters) == len(observation.cells) and max(map(len, letters)) <= 2
     return task, rest, letters if one_each else []
-
-
-def possible_states(observation: Observation) -> Sequence[int]:
-    """Return the states that can occur: the reachable ones of the paper, otherwise all states."""
-    paper = observation.name == PAPER.name
-    return REACHABLE_STATES if paper else range(observation.n_states)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,10 +14,9 @@ from typing import Any
 from taichi_ants import files, learners
 from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
-from taichi_ants.measures.colonies import OF_STUDY
-from taichi_ants.measures.runs import MEASURES as OF_RUNS
+from taichi_ants.measures import finished
 from taichi_ants.settings import DeclaredSetting, declared, flat
-from taichi_ants.studies.sweep_file import declaration_of, measure_of
+from taichi_ants.studies.sweep_file import declaration_of
 from taichi_ants.task import observations
 
 Row = tuple[str, ...]
@@ -196,12 +195,10 @@ class Model:
 
     def measures(self) -> Iterator[Row]:
         """Yield the names and meanings of the measures."""
-        if "measures" not in self.settings:
-            several = OF_STUDY if self.of_colony else {n: one.words for n, one in OF_RUNS.items()}
-            yield from ((f"`{name}`", words) for name, words in several.items())
-        for name in _list_of(self.settings.get("measures", [])):
+        kind = "colony" if self.of_colony else "runs"
+        for name in _list_of(self.settings.get("measures", [*finished.FINISHED[kind]])):
             try:
-                words = measure_of("colony" if self.of_colony else "runs", name).words
+                words = finished.of_runs(kind, name).label
             except AntsError:
                 words = "of a plugin"
             yield f"`{name}`", words

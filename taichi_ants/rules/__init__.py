@@ -4,7 +4,9 @@ See `docs/rules.md`, and `register` for the form of a rule.
 """
 
 from taichi_ants.rules.functions import exp, log, pick, power
-from taichi_ants.rules.registry import KINDS, Parameters, Rule, get, names, register
+from taichi_ants.rules.inputs import KINDS
+from taichi_ants.rules.registry import get, names, register
+from taichi_ants.rules.rule import Parameters, Rule
 
 __all__ = ["KINDS", "Parameters", "Rule", "exp", "get", "log", "names", "pick", "power", "register"]
 __dir__ = __all__.copy  # completion lists only public names

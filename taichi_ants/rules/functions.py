@@ -62,12 +62,12 @@ def pick(weights: Sequence[float], random: float) -> int:
         weights: The weights of the entries.
         random: A random number from 0 to less than 1; the index never falls as it rises.
     """
-    counted, total = [min(one, 1e300) if one >= 1e-300 else 0.0 for one in weights], 0.0
-    for one in counted:
-        total += one  # not `sum`, whose rounding differs between versions of Python
+    counted, total = [min(weight, 1e300) if weight >= 1e-300 else 0.0 for weight in weights], 0.0
+    for weight in counted:
+        total += weight  # not `sum`, whose rounding differs between versions of Python
     index, below = -1, 0.0
-    for i, one in enumerate(counted):
-        if one and (index < 0 or below <= random * total):
+    for i, weight in enumerate(counted):
+        if weight and (index < 0 or below <= random * total):
             index = i
-        below += one
+        below += weight
     return index

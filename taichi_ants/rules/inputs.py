@@ -135,16 +135,16 @@ def drawn(inputs: Mapping[str, Input], n: int, seed: int = 0) -> Iterator[dict[s
     rng = np.random.default_rng(seed)
     for _ in range(n):
         yield {
-            name: Vector(_drawn(rng, name) for _ in range(one.length))
-            if one.length
+            name: Vector(_drawn(rng, name) for _ in range(read.length))
+            if read.length
             else _drawn(rng, name)
-            for name, one in inputs.items()
+            for name, read in inputs.items()
         }
 
 
 def values_shown(*values: Mapping[str, Any]) -> str:
     """Return the values of inputs and parameters for a message."""
-    return ", ".join(f"{name}={value}" for one in values for name, value in one.items())
+    return ", ".join(f"{name}={value}" for numbers in values for name, value in numbers.items())
 
 
 def _drawn(rng: np.random.Generator, name: str) -> float:

@@ -68,21 +68,21 @@ class _Translation:
         self._first_line = tree.lineno - len(tree.decorator_list)
         self._loops: list[tuple[str, int]] = []  # variables and repetitions of the present loops
         assigned = (
-            one.id
-            for one in ast.walk(tree)
-            if isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store)
+            node.id
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
         )
         self._vectors = {
-            ast.unparse(one.targets[0])
-            for one in ast.walk(tree)
-            if isinstance(one, ast.Assign) and isinstance(one.value, (ast.List, ast.ListComp))
+            ast.unparse(node.targets[0])
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Assign) and isinstance(node.value, (ast.List, ast.ListComp))
         }
         numbers = [*(n for n in lengths if not lengths[n]), *assigned]
         self._numbers = dict.fromkeys(n for n in numbers if n not in self._vectors)
         self._loop_variables = {
-            one.target.id
-            for one in ast.walk(tree)
-            if isinstance(one, (ast.For, ast.comprehension)) and isinstance(one.target, ast.Name)
+            node.target.id
+            for node in ast.walk(tree)
+            if isinstance(node, (ast.For, ast.comprehension)) and isinstance(node.target, ast.Name)
         }
 
     def source(self) -> str:
@@ -90,12 +90,12 @@ class _Translation:
         body = self._tree.body
         if ast.get_docstring(self._tree) is not None:
             body = body[1:]
-        returns = [one for one in ast.walk(self._tree) if isinstance(one, ast.Return)]
+        returns = [node for node in ast.walk(self._tree) if isinstance(node, ast.Return)]
         if not body or returns != body[-1:]:
             raise LanguageError("its last line, and no other, must be a return")
         if returns[0].value is None:
             raise LanguageError("its return has no value")
-        inner = [line for one in body[:-1] for line in self._statement(one, "    ")]
+        inner = [line for statement in body[:-1] for line in self._statement(statement, "    ")]
         inner += [f"    return ti.cast({self._number(returns[0].value)}, ti.f64)", ""]
         lines = [f"def rule({', '.join(f'a_{name}' for name in self._arguments)}):"]
         lines += [f"    u_{name} = ti.cast(a_{name}, ti.f64)" for name in self._arguments]
@@ -165,7 +165,7 @@ class _Translation:
                 over, "is not allowed; a loop must be over a range of literal numbers"
             )
         try:
-            repeats = range(*(ast.literal_eval(one) for one in over.args))  # type: ignore[attr-defined]
+            repeats = range(*(ast.literal_eval(bound) for bound in over.args))  # type: ignore[attr-defined]
         except (TypeError, ValueError):
             raise self._refuse(over, "must have literal whole numbers") from None
         self._loops.append((variable.id, len(repeats)))
@@ -173,7 +173,7 @@ class _Translation:
         return f"for u_{variable.id} in ti.static({ast.unparse(over)})"
 
     def _check_repeats(self, node: ast.expr, n: int = 1) -> None:
-        total = math.prod((max(1, one) for _, one in self._loops), start=n)
+        total = math.prod((max(1, repeats) for _, repeats in self._loops), start=n)
         if total > _MOST_REPEATS:
             raise self._refuse(node, f"repeats {total} times; at most {_MOST_REPEATS} are allowed")
 
@@ -186,9 +186,9 @@ class _Translation:
             length = len(node.elts)
             source = f"ti.Vector([{', '.join(map(self._cast, node.elts))}])"
         elif isinstance(node, ast.ListComp) and len(node.generators) == 1:
-            (one,) = node.generators
-            if not one.ifs and not one.is_async:
-                head = self._enter(one.iter, one.target)
+            (generator,) = node.generators
+            if not generator.ifs and not generator.is_async:
+                head = self._enter(generator.iter, generator.target)
                 source, length = f"ti.Vector([{self._cast(node.elt)} {head}])", self._loops.pop()[1]
         if not length:
             raise self._refuse(node, "is not a vector, for example `[0.2 * k for k in range(3)]`")
@@ -256,40 +256,40 @@ class _Translation:
 
     def _entry(self, node: ast.Subscript) -> str:
         name = node.value.id if isinstance(node.value, ast.Name) else ""
-        length, place = self._lengths.get(name, 0), node.slice
+        length, index = self._lengths.get(name, 0), node.slice
         if not length:
             raise self._refuse(node, "is not an entry of a vector")
-        if isinstance(place, ast.Constant):
-            if type(place.value) is not int or not 0 <= place.value < length:
+        if isinstance(index, ast.Constant):
+            if type(index.value) is not int or not 0 <= index.value < length:
                 raise self._refuse(node, f"must have an index from 0 to {length - 1}")
-            return f"u_{name}[{place.value}]"
-        if isinstance(place, ast.Name) and any(place.id == one for one, _ in self._loops):
-            return f"u_{name}[u_{place.id}]"
+            return f"u_{name}[{index.value}]"
+        if isinstance(index, ast.Name) and any(index.id == variable for variable, _ in self._loops):
+            return f"u_{name}[u_{index.id}]"
         if name in self._vectors:
             raise self._refuse(node, "must have a literal number or the name of a loop as index")
-        index = f"ti.cast({self._number(place)}, ti.i32)"
-        return f"u_{name}[ti.max(ti.min({index}, {length - 1}), 0)]"
+        number = f"ti.cast({self._number(index)}, ti.i32)"
+        return f"u_{name}[ti.max(ti.min({number}, {length - 1}), 0)]"
 
     def _call(self, node: ast.Call) -> str:
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS or name in self._numbers:
             raise self._refuse(node, f"calls another function than {', '.join(FUNCTIONS)}")
         wanted, of_vector = FUNCTIONS[name], name == "pick"
-        given = [self._vector(one)[0] for one in node.args[:of_vector]]
-        given += [self._number(one) for one in node.args[of_vector:]]
-        several = name in ("min", "max") and len(given) >= wanted
-        if node.keywords or not (len(given) == wanted or several):
+        arguments = [self._vector(argument)[0] for argument in node.args[:of_vector]]
+        arguments += [self._number(argument) for argument in node.args[of_vector:]]
+        is_folded = name in ("min", "max") and len(arguments) >= wanted
+        if node.keywords or not (len(arguments) == wanted or is_folded):
             raise self._refuse(node, f"must have {wanted} arguments")
-        result = given[0] if several else f"{name}_({', '.join(given)})"
-        for one in given[1:] if several else ():
-            result = f"{name}_({result}, {one})"
+        result = arguments[0] if is_folded else f"{name}_({', '.join(arguments)})"
+        for argument in arguments[1:] if is_folded else ():
+            result = f"{name}_({result}, {argument})"
         return result
 
     def _truth(self, node: ast.expr) -> str:
         """Return an expression of a truth value."""
         if isinstance(node, ast.BoolOp):
             sign = " & " if isinstance(node.op, ast.And) else " | "
-            return f"({sign.join(self._truth(one) for one in node.values)})"
+            return f"({sign.join(self._truth(operand) for operand in node.values)})"
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             return f"(not {self._truth(node.operand)})"
         if not isinstance(node, ast.Compare):

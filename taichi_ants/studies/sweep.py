@@ -20,8 +20,8 @@ from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.files import parquet
 from taichi_ants.files.results import REPORT, ROWS
-from taichi_ants.measures import colonies as of_colonies
-from taichi_ants.measures import runs as of_runs
+from taichi_ants.measures import Run, finished
+from taichi_ants.measures.measure import RUN
 from taichi_ants.measures.series import stops
 from taichi_ants.settings import flat
 from taichi_ants.studies import design
@@ -37,7 +37,6 @@ from taichi_ants.studies.sweep_file import (
     check_entries,
     check_training,
     contents,
-    measure_of,
 )
 
 FIGURES, RUNS, SUMMARY, FINDINGS = "figures", "runs.csv", "summary.csv", "findings.csv"
@@ -249,7 +248,7 @@ class Sweep:
         first, columns = next(iter(values)), sweeps.columns_of(self.settings)
         of_seeds = sweeps.seed_rows(self.settings, self.study.seeds, values)
         files.write_csv(folder / RUNS, of_seeds, [*columns, "seed", *values])
-        with_iqm = [name for name in values if measure_of(self.kind, name).uses_iqm]
+        with_iqm = [name for name in values if finished.of_runs(self.kind, name).uses_iqm]
         gaps = [name for name, array in values.items() if np.isnan(array).any()]
         rows = [
             {**one, "seeds": len(self.study.seeds), **sweeps.centre_columns(centres, gaps)}
@@ -303,7 +302,7 @@ class Sweep:
     ) -> None:
         """Draw the first measure, float64 (points, seeds), in a figure for each [vary] table."""
         files.check_writable_folder(folder)
-        words = measure_of(self.kind, first).words
+        words = finished.of_runs(self.kind, first).label
         for number, (some, axes) in enumerate(zip(self.grids, self.axes, strict=True), start=1):
             path = folder / f"{first}{f'-{number}' * (len(self.grids) > 1)}.png"
             if self.design.kind == GRID:
@@ -387,14 +386,14 @@ def _measured(
 ) -> Outcome:
     """Return the measures of a block as `VALUE` arrays, and the series if they are asked for."""
     if kind == "runs":
-        columns = of_runs.measures_of_runs(outcome, wanted)
+        columns = finished.values_of(Run.of_lone_ant(outcome), wanted)
         return {f"{VALUE}{name}": array for name, array in columns.items()}
     (point,) = points
-    arrays = {key: array[0] for key, array in outcome.items()}
-    found = of_colonies.measures_of(arrays, point.ants, point.ticks)
-    columns = {}
-    for name in wanted:
-        columns |= {name: found[name]} if name in found else _ends(arrays, name)
+    arrays, columns = {key: array[0] for key, array in outcome.items()}, {}
+    run = Run.of_colony(arrays, point.ants, point.ticks)
+    for measure in (finished.of_runs(kind, name) for name in wanted):
+        of_run = {measure.name: measure.computed(run)} if measure.of == RUN else {}
+        columns |= of_run or _ends(arrays, measure.name)
     kept = {f"{VALUE}{name}": array[None] for name, array in columns.items()}
     series = {name: array for name, array in outcome.items() if name.startswith(SERIES)}
     return {**kept, **series} if has_series else kept

@@ -23,8 +23,8 @@ from taichi_ants import (
 )
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.measures import colonies as of_colonies
-from taichi_ants.measures import runs as of_runs
+from taichi_ants.measures import finished
+from taichi_ants.measures.measure import RUN
 from taichi_ants.settings import (
     DeclaredSetting,
     all_of,
@@ -53,54 +53,6 @@ _BESIDE |= {f"return_{of}": f"deliveries_{of}" for of in ("first50", "second50",
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
 
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
-
-
-class Measure(NamedTuple):
-    """A number for each point and seed: its name for readers, and the fewest episodes it needs."""
-
-    words: str
-    episodes: int = 0
-    uses_iqm: bool = False
-
-
-MEASURES = {
-    "runs": {
-        # With fewer than 50 episodes, the comparison uses all of them; a sweep refuses.
-        name: Measure(
-            one.words, of_runs.WINDOW if name.endswith("_last50") else one.episodes, one.uses_iqm
-        )
-        for name, one in of_runs.MEASURES.items()
-    },
-    "colony": {name: Measure(words) for name, words in of_colonies.MEASURES.items()},
-}
-
-
-def measure_of(kind: str, name: str) -> Measure:
-    """Return a measure of this kind; for colonies also a registered one.
-
-    Raises:
-        AntsError: There is no such measure; the message lists all names.
-    """
-    known = MEASURES[kind]
-    if isinstance(name, str) and name in known:
-        return known[name]
-    if not isinstance(name, str) or name.partition(".")[0] not in _registered(kind):
-        raise AntsError(f"measures is {shown(name)}; it must be one of {_names_of(kind)}.")
-    one = measures.get(name)
-    words = one.summary or name.replace("_", " ")
-    return Measure(f"{words} ({one.unit})" if one.unit else words)
-
-
-def _registered(kind: str) -> set[str]:
-    """Return the names of registered measures that sweeps of this kind can have."""
-    return set(measures.names()) - set(measures.ARRAYS) if kind == "colony" else set()
-
-
-def _names_of(kind: str) -> str:
-    """Return the names of all measures of this kind, for a message."""
-    registered = _registered(kind)
-    names = ", ".join([*MEASURES[kind], *sorted(registered - MEASURES[kind].keys())])
-    return names + (", or the name of a measure of a plugin (--plugin FILE)" if registered else "")
 
 
 @contextmanager
@@ -145,9 +97,9 @@ class Base(NamedTuple):
         wanted = as_list(file.get("measures", []))
         if not wanted:
             what = "empty" if "measures" in file else "missing"
-            raise AntsError(f"measures is {what}; name one or more of {_names_of(kind)}.")
+            raise AntsError(f"measures is {what}; name one or more of {finished.names_of(kind)}.")
         for name in wanted:
-            measure_of(kind, name)
+            finished.of_runs(kind, name)
         _check_once("measures", wanted)
         beside = [_BESIDE[name] for name in wanted if name in _BESIDE]
         wanted = list(dict.fromkeys([*wanted, *beside]))
@@ -177,7 +129,9 @@ class Base(NamedTuple):
         """
         point = _point(self.kind, {**self.fixed, **row}, self.seeds, built, self.reading)
         for name in self.measures:
-            least = measure_of(self.kind, name).episodes
+            least = finished.of_runs(self.kind, name).episodes
+            # With fewer than 50 episodes, `compare` uses all of them; a sweep refuses.
+            least = finished.WINDOW if name.endswith("_last50") else least
             if point.episodes < least:
                 raise AntsError(
                     f"{name} needs {least} episodes; use more or choose another measure."
@@ -189,7 +143,11 @@ class Base(NamedTuple):
 
 def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
     """Return the arguments of points for the registered measures."""
-    registered = tuple(n for n in wanted if n.partition(".")[0] in measures.names())
+    registered = tuple(
+        name
+        for name in wanted
+        if name.partition(".")[0] in measures.names() and measures.get(name).of != RUN
+    )
     if kind != "colony":
         if every is not None:
             raise AntsError(
@@ -197,7 +155,7 @@ def _reading(kind: str, wanted: Sequence[str], every: Any) -> dict[str, Any]:
             )
         return {}
     if every is None:
-        return {"measures": tuple(name for name in registered if name not in MEASURES[kind])}
+        return {"measures": tuple(name for name in registered if name not in finished.COLONY)}
     if not registered:
         raise AntsError(
             f"measure_every is {shown(every)}, but no measure has a series; add one of "

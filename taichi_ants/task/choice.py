@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
-from taichi_ants.rules.registry import BUILT_IN, Rule, own, words
+from taichi_ants.rules.registry import registered, words
+from taichi_ants.rules.rule import BUILT_IN, Rule
 from taichi_ants.settings import Setting, Settings, Share
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ class Choice(Settings, path="task.choice"):
     @property
     def own_rule(self) -> Rule | None:
         """Your rule, if it is one."""
-        return own("choice", self.rule)
+        return registered("choice", self.rule)
 
     @property
     def needs_table(self) -> bool:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Annotated, Literal, TypeVar, get_args
 
-from taichi_ants.rules.registry import BUILT_IN, Rule, own, words
+from taichi_ants.rules.registry import registered, words
+from taichi_ants.rules.rule import BUILT_IN, Rule
 from taichi_ants.settings import Setting, Settings
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 
@@ -95,12 +96,12 @@ class Pheromone(Settings, path="task.pheromone"):
     @property
     def own_deposit(self) -> Rule | None:
         """Your rule of deposits, if it is one."""
-        return own("deposit", self.deposit)
+        return registered("deposit", self.deposit)
 
     @property
     def own_evaporation(self) -> Rule | None:
         """Your rule of evaporation, if it is one."""
-        return own("evaporation", self.evaporation)
+        return registered("evaporation", self.evaporation)
 
     @property
     def darkest(self) -> int:

@@ -11,7 +11,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, shown
 from taichi_ants.rules.inputs import LABOUR
-from taichi_ants.rules.registry import Parameters, Rule, own, words
+from taichi_ants.rules.registry import registered, words
+from taichi_ants.rules.rule import Parameters, Rule
 from taichi_ants.settings import Named, Setting, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
@@ -209,7 +210,7 @@ class Task(Settings, path="task"):
     @property
     def own_reward(self) -> Rule | None:
         """Your rule of rewards, if the task has one."""
-        return own("reward", self.reward)
+        return registered("reward", self.reward)
 
     @property
     def own_rules(self) -> tuple[Rule, ...]:

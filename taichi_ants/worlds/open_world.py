@@ -60,15 +60,15 @@ def open_world(
             f"rock_share {rock_share} and food_share {food_share} add up to more than {MAX_SHARE}; "
             "choose smaller shares, so that ants have space to walk."
         )
-    given = None if ranges is None else parse_ranges(ranges)
+    wanted = None if ranges is None else parse_ranges(ranges)
     for attempt in range(MAX_DRAWS):
         words = Stream(seed, _STREAM_RANGES, attempt).bits(3) >> np.uint64(32)
-        grid = AxialGrid(given or parse_ranges(10 + choose(words, 91)))  # from 10 to 100
+        grid = AxialGrid(wanted or parse_ranges(10 + choose(words, 91)))  # from 10 to 100
         world = _draw(grid, rock_share, food_share, piles, seed, attempt)
         if world.reachable_foods().any():
             return world
     raise AntsError(
-        f"in {MAX_DRAWS} open worlds of ranges {given or 'drawn at random'}, rock_share "
+        f"in {MAX_DRAWS} open worlds of ranges {wanted or 'drawn at random'}, rock_share "
         f"{rock_share} and food_share {food_share}, no food could be reached from the queen; "
         "choose larger ranges or other shares."
     )
@@ -102,12 +102,12 @@ def _draw(
 
     free = grid.exists & ~rocks & ~food
     free[clearing] = False
-    places = np.flatnonzero(free)
-    singles = min(round(food_share * grid.count), len(places))
+    free_cells = np.flatnonzero(free)
+    singles = min(round(food_share * grid.count), len(free_cells))
     # The places of the smallest random words are a sample without replacement.
     if singles:
-        words = Stream(seed, _STREAM_FOOD, attempt).bits(len(places))
-        food[places[np.argpartition(words, singles - 1)[:singles]]] = True
+        words = Stream(seed, _STREAM_FOOD, attempt).bits(len(free_cells))
+        food[free_cells[np.argpartition(words, singles - 1)[:singles]]] = True
     return World(
         grid.ranges,
         _QUEEN,
@@ -151,8 +151,8 @@ def _hexagons(
     sizes = 1 + 3 * radii * (radii + 1)
     hexagon = np.repeat(np.arange(len(radii)), sizes)
     # `disc` is sorted by distance, so a smaller hexagon is the beginning of a larger one.
-    place = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    cells = cube(axial(centres)[hexagon] + disc[place])
+    rank = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    cells = cube(axial(centres)[hexagon] + disc[rank])
     inside = (cells < np.array(grid.ranges)).all(axis=1)
     return hexagon[inside], grid.index(cells[inside])
 

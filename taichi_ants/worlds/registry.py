@@ -1,4 +1,4 @@
-"""The registry of worlds."""
+"""The registry of worlds: functions that return a `World`, by name."""
 
 from __future__ import annotations
 
@@ -9,33 +9,25 @@ from typing import Any
 
 from taichi_ants.errors import AntsError, expect, shown, whole
 from taichi_ants.files import inputs
+from taichi_ants.registry import Registry
 from taichi_ants.settings import DeclaredSetting, declared, not_a_setting
 from taichi_ants.worlds.double_bridge import double_bridge
 from taichi_ants.worlds.open_world import far_piles, open_world
+from taichi_ants.worlds.paper import paper
 from taichi_ants.worlds.text_map import load_map
 from taichi_ants.worlds.world import World
 
 Builder = Callable[..., World]
-
-
-def paper() -> World:
-    """Return the paper's world: 271 cells, one food item, and a trail along the whole x axis."""
-    return World(
-        ranges=(10, 10, 10),
-        queen=(0, 9, 9),
-        foods=[(9, 0, 0)],
-        trails=[((i, 0, 0), 25) for i in range(-8, 9)],
-        ants=[((0, 8, 8), 0)],
-    )
-
-
 BUILT_IN: dict[str, Builder] = {
-    "paper": paper,
-    "open": open_world,
-    "far_piles": far_piles,
     "double_bridge": double_bridge,
+    "far_piles": far_piles,
+    "open": open_world,
+    "paper": paper,
 }
-_BUILDERS = dict(BUILT_IN)
+WORLDS: Registry[Builder] = Registry(
+    "world", "taichi_ants.worlds.register", BUILT_IN, any_text=True
+)
+names = WORLDS.names
 
 
 def register(name: str, builder: Builder) -> None:
@@ -46,40 +38,32 @@ def register(name: str, builder: Builder) -> None:
     must return the same world for the same number. Raises AntsError if the name is not text or
     belongs to a built-in world, or if an argument has no default.
     """
-    if not isinstance(name, str) or not name.strip():
-        raise AntsError(f"the world name {shown(name)} is not allowed; it must be text.")
-    if name in BUILT_IN:
-        raise AntsError(
-            f"{name!r} is the name of a built-in world, which cannot be replaced; choose another "
-            "name."
-        )
+    WORLDS.check_new(name)
     if not callable(builder):
         raise AntsError(
             f"the builder of {shown(name)} is {shown(builder)}; it must be a function of a seed."
         )
-    for one in inspect.signature(builder).parameters.values():
-        if one.default is one.empty and one.name != "seed":
+    for argument in _arguments(builder).values():
+        if argument.default is argument.empty and argument.name != "seed":
             raise AntsError(
-                f"the argument {one.name} of the builder of {name!r} has no default; give it one, "
-                "or call it seed."
+                f"the argument {argument.name} of the builder of {name!r} has no default; give it "
+                "one, or call it seed."
             )
-    _BUILDERS[name] = builder
-
-
-def names() -> tuple[str, ...]:
-    """Return the registered names, sorted."""
-    return tuple(sorted(_BUILDERS))
+    WORLDS.add(name, builder)
 
 
 def is_drawn(name_or_path: str | os.PathLike[str]) -> bool:
     """Return whether a world depends on a seed; the paper's, bridges and map files do not."""
-    builder = _BUILDERS.get(name_or_path) if isinstance(name_or_path, str) else None
-    return builder is not None and "seed" in inspect.signature(builder).parameters
+    return name_or_path in names() and "seed" in _arguments(WORLDS.get(str(name_or_path)))
+
+
+def _arguments(builder: Builder) -> dict[str, inspect.Parameter]:
+    return dict(inspect.signature(builder).parameters)
 
 
 def settings_of(name: str) -> tuple[DeclaredSetting, ...]:
     """Return the declared settings of a registered world."""
-    return declared(_BUILDERS[name])
+    return declared(WORLDS.get(name))
 
 
 def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
@@ -92,29 +76,26 @@ def check_seed_counts(name_or_path: str, option: str = "--world.seed") -> None:
         )
 
 
-def build(name_or_path: str | os.PathLike[str], seed: int = 0, **given: Any) -> World:
+def build(name_or_path: str | os.PathLike[str], seed: int = 0, **settings: Any) -> World:
     """Return the world with a registered name or, if there is none, of a map file.
 
-    The seed is any whole number, which only some builders use; `given` are settings of the world.
+    The seed is any whole number, which only some builders use; `settings` are those of the world.
     Raises AntsError if neither the name nor the file exists, or the builder fails.
     """
     seed = whole("seed", seed)
     expect("the world", name_or_path, str, os.PathLike)
-    builder = _BUILDERS.get(name_or_path) if isinstance(name_or_path, str) else None
-    allowed = {*inspect.signature(builder).parameters} - {"seed"} if builder else set()
-    for name in given:
+    builder = WORLDS.get(name_or_path) if name_or_path in names() else None
+    allowed = _arguments(builder).keys() - {"seed"} if builder else set()
+    for name in settings:
         if name not in allowed:
             of = f"the world {shown(name_or_path)}"
             raise AntsError(f"`world.{name}` {not_a_setting(name, sorted(allowed), of)}")
     if builder is None:
         if os.path.exists(inputs.place_of(name_or_path)):
             return load_map(name_or_path)
-        raise AntsError(
-            f"there is no world named {shown(os.fspath(name_or_path))} and no such file; choose "
-            f"one of {', '.join(names())}, or give the path of a map file."
-        )
+        raise WORLDS.unknown(os.fspath(name_or_path), "give the path of a map file that exists, ")
     try:
-        world = builder(**given, **({"seed": seed} if is_drawn(name_or_path) else {}))
+        world = builder(**settings, **({"seed": seed} if is_drawn(name_or_path) else {}))
     except AntsError:
         raise
     except Exception as error:

@@ -72,14 +72,14 @@ def from_text(text: str, source: str = "the map") -> World:
     undrawn = grid.exists.copy()
     undrawn[grid.index(cells)] = False
 
-    names = dict.fromkeys(name for several in regions.values() for name in several.names)
+    names = dict.fromkeys(name for marks in regions.values() for name in marks.names)
     within = {
-        name: cells[[one.mark in regions and name in regions[one.mark].names for one in drawn]]
+        name: cells[[char.mark in regions and name in regions[char.mark].names for char in drawn]]
         for name in names
     }
-    drawn = [replace(one, mark=regions[one.mark].cell) if one.mark in regions else one
-             for one in drawn]  # fmt: skip
-    marks = np.array([one.mark for one in drawn])
+    drawn = [replace(char, mark=regions[char.mark].cell) if char.mark in regions else char
+             for char in drawn]  # fmt: skip
+    marks = np.array([char.mark for char in drawn])
     trails = cells[np.isin(marks, [TRAIL, *ANTS_ON_TRAIL])]
     is_food = np.isin(marks, [*FOODS])
     is_ant = np.isin(marks, [*ANTS, *ANTS_ON_TRAIL])
@@ -111,7 +111,7 @@ class _Drawn:
     row: int
     column: int
 
-    def found(self, source: str) -> str:
+    def described(self, source: str) -> str:
         return f"line {self.line}, column {self.column + 1} of {source} has {self.mark!r}"
 
 
@@ -149,26 +149,26 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn], dict[str, _Mark]]:
             if mark != " ":
                 drawn.append(_Drawn(mark, number, row, column))
                 if mark not in _CELLS and mark not in regions:
-                    raise AntsError(f"{drawn[-1].found(source)}; use only {_ALLOWED}.")
+                    raise AntsError(f"{drawn[-1].described(source)}; use only {_ALLOWED}.")
     if not drawn:
         raise AntsError(f"{source} has no cells; draw cells with {_ALLOWED}.")
-    for mark, several_names in regions.items():
-        if not any(one.mark == mark for one in drawn):
+    for mark, region in regions.items():
+        if not any(char.mark == mark for char in drawn):
             raise AntsError(
-                f"{source} has no cell {mark!r} of the region {', '.join(several_names.names)}; "
+                f"{source} has no cell {mark!r} of the region {', '.join(region.names)}; "
                 "draw one, or leave the line of the region out."
             )
-    cell_of = {mark: one.cell for mark, one in regions.items()}
-    queens = [replace(one, mark=cell_of.get(one.mark, one.mark)) for one in drawn]
-    queens = [one for one in queens if one.mark in QUEENS]
+    cell_of = {mark: region.cell for mark, region in regions.items()}
+    queens = [replace(char, mark=cell_of.get(char.mark, char.mark)) for char in drawn]
+    queens = [char for char in queens if char.mark in QUEENS]
     for nest, mark in enumerate(QUEENS):
-        several = [one for one in queens if one.mark == mark]
-        if not several and (nest == 0 or any(late.mark > mark for late in queens)):
+        alike = [char for char in queens if char.mark == mark]
+        if not alike and (nest == 0 or any(late.mark > mark for late in queens)):
             missing = "queen" if nest == 0 else f"queen {mark}"
             raise AntsError(f"{source} has no {missing}; draw one cell as {mark}.")
-        if len(several) > 1:
+        if len(alike) > 1:
             raise AntsError(
-                f"{several[1].found(source)} a second time; draw the queen of each nest once, as "
+                f"{alike[1].described(source)} a second time; draw the queen of each nest once, as "
                 f"{', '.join(QUEENS)}."
             )
     return DEFAULT_TRAIL_LEVEL if level is None else level, drawn, regions
@@ -177,24 +177,24 @@ def _read(text: str, source: str) -> tuple[int, list[_Drawn], dict[str, _Mark]]:
 def _read_region(where: str, line: str, regions: dict[str, _Mark]) -> None:
     """Add the mark of a line such as `region gate = % #`."""
     form = "write a name and a mark, such as `region gate = %` or `region gate = % #`"
-    found = _REGION.fullmatch(line)
-    if found is None:
+    matched = _REGION.fullmatch(line)
+    if matched is None:
         raise AntsError(f"{where} is {shown(line.strip())}; {form}.")
-    names, mark, cell = found.groups()
+    names, mark, cell = matched.groups()
     if mark in _CELLS or mark in regions or mark in "=;":
         why = "is used already" if mark in regions else "has a meaning in maps"
-        free = " ".join(one for one in _MARKS[:10] if one not in regions)
+        free = " ".join(free_mark for free_mark in _MARKS[:10] if free_mark not in regions)
         raise AntsError(f"{where} has the mark {mark!r}, which {why}; choose one of {free}.")
     if cell is not None and cell not in _CELLS:
         raise AntsError(f"{where} draws cells as {cell!r}; use only {_ALLOWED}.")
-    several = tuple(one.strip() for one in names.split(","))
-    for name in several:
+    region_names = tuple(name.strip() for name in names.split(","))
+    for name in region_names:
         if not name.isidentifier():
             raise AntsError(
                 f"{where} has a region {name!r}; a name has letters, digits and _, and does not "
                 "begin with a digit."
             )
-    regions[mark] = _Mark(cell or EMPTY, several)
+    regions[mark] = _Mark(cell or EMPTY, region_names)
 
 
 def _read_level(where: str, name: str, value: str) -> int:
@@ -213,8 +213,8 @@ def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
     """Return the axial coordinates (q, r) of the characters, up to a shift: int64 (n, 2)."""
     # A column is 2 r and a row r - 2 q, both up to a shift. So all cells have the same parity of
     # the column and of row - r; the majority of the characters determines it.
-    rows = np.array([one.row for one in drawn])
-    columns = np.array([one.column for one in drawn])
+    rows = np.array([char.row for char in drawn])
+    columns = np.array([char.column for char in drawn])
     odd = columns % 2
     r = (columns - odd) // 2
     grids = 2 * odd + (rows - r) % 2
@@ -222,8 +222,8 @@ def _axials(drawn: list[_Drawn], source: str) -> np.ndarray:
     stray = np.flatnonzero(grids != grid)
     if len(stray):
         raise AntsError(
-            f"{drawn[stray[0]].found(source)}, which is between two cells; place the cells of a "
-            "line four columns apart, and offset neighbouring lines by two columns."
+            f"{drawn[stray[0]].described(source)}, which is between two cells; place the cells of "
+            "a line four columns apart, and offset neighbouring lines by two columns."
         )
     return np.stack([(r - rows + grid % 2) // 2, r], axis=1)
 
@@ -255,8 +255,8 @@ def smallest_world(axials: np.ndarray) -> tuple[tuple[int, int, int], tuple[int,
     fits = []
     for order in permutations(range(3)):
         sizes = [0, 0, 0]
-        for place in order:
-            sizes[place] = min(most[place], total - sum(sizes))
+        for axis in order:
+            sizes[axis] = min(most[axis], total - sum(sizes))
         fits.append(sizes)
     a, b, c = max(fits, key=lambda fit: (sum(n * n for n in fit), fit))
 

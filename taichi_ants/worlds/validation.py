@@ -82,7 +82,7 @@ def parse_regions(grid: AxialGrid, regions: object) -> Mapping[str, np.ndarray]:
         raise AntsError(
             f"regions are {shown(regions)}; they must be cells by the names of regions."
         )
-    found: dict[str, np.ndarray] = {}
+    cells_of: dict[str, np.ndarray] = {}
     for name, cells in regions.items():
         if not isinstance(name, str) or not name.isidentifier():
             raise AntsError(
@@ -93,22 +93,22 @@ def parse_regions(grid: AxialGrid, regions: object) -> Mapping[str, np.ndarray]:
         rows = _disc(path, cells, grid) if isinstance(cells, Mapping) else _parse(path, cells, grid)
         if not len(rows):
             raise AntsError(f"{path} is empty; give at least one cell.")
-        found[name] = np.unique(rows, axis=0)
-        found[name].setflags(write=False)
-    return MappingProxyType(dict(sorted(found.items())))
+        cells_of[name] = np.unique(rows, axis=0)
+        cells_of[name].setflags(write=False)
+    return MappingProxyType(dict(sorted(cells_of.items())))
 
 
-def _disc(path: str, given: Mapping, grid: AxialGrid) -> np.ndarray:
+def _disc(path: str, disc: Mapping, grid: AxialGrid) -> np.ndarray:
     """Return the cells of the world within a number of steps from a cell."""
-    if set(given) != {"centre", "radius"}:
+    if set(disc) != {"centre", "radius"}:
         raise AntsError(
-            f"{path} has the settings {', '.join(map(str, given)) or 'of nothing'}; give centre "
+            f"{path} has the settings {', '.join(map(str, disc)) or 'of nothing'}; give centre "
             "(x, y, z) and radius, or a list of cells."
         )
-    radius = whole(f"{path}.radius", given["radius"])
+    radius = whole(f"{path}.radius", disc["radius"])
     if radius < 0:
         raise AntsError(f"{path}.radius is {radius}; it must be at least 0.")
-    row = np.array([_row(f"{path}.centre", given["centre"], "(x, y, z)", 3)])
+    row = np.array([_row(f"{path}.centre", disc["centre"], "(x, y, z)", 3)])
     ((x, y, z),) = _inside(f"{path}.centre", row, grid).tolist()
     return grid.cells(np.flatnonzero(grid.exists & (grid.distances((x, y, z)) <= radius)))
 
@@ -116,8 +116,8 @@ def _disc(path: str, given: Mapping, grid: AxialGrid) -> np.ndarray:
 def _queens(values: object, grid: AxialGrid) -> np.ndarray:
     """Return the cells of the queens, int32 (N, 3), from one cell or a sequence of cells."""
     entries = entries_of(values) or []
-    several = bool(entries) and all(entries_of(one) is not None for one in entries)
-    if not several:
+    is_list = bool(entries) and all(entries_of(entry) is not None for entry in entries)
+    if not is_list:
         return _inside(
             "queen",
             np.array([_row("queen", values, "one cell (x, y, z), or a list of cells", 3)]),
@@ -135,25 +135,25 @@ def _foods_and_kinds(foods: object, kinds: object) -> tuple[object, object]:
     if isinstance(foods, np.ndarray):
         together = foods.ndim == 2 and foods.shape[1] == 4
         return (foods[:, :3], foods[:, 3]) if together else (foods, kinds)
-    entries = [entries_of(one) or [] for one in entries_of(foods) or []]
-    paired = [len(one) == 2 and entries_of(one[0]) is not None for one in entries]
+    entries = [entries_of(entry) or [] for entry in entries_of(foods) or []]
+    paired = [len(entry) == 2 and entries_of(entry[0]) is not None for entry in entries]
     if not any(paired):
         return foods, kinds
-    pairs = [one if pair else [one, 0] for one, pair in zip(entries, paired, strict=True)]
+    pairs = [entry if pair else [entry, 0] for entry, pair in zip(entries, paired, strict=True)]
     return [cell for cell, _ in pairs], [kind for _, kind in pairs]
 
 
 def _kinds(values: object, foods: np.ndarray) -> np.ndarray:
     """Return the kind of each food item, int32 (n, 1); without kinds, all are of the first."""
-    given = entries_of(values)
-    if not given:
+    entries = entries_of(values)
+    if not entries:
         return np.zeros((len(foods), 1), np.int32)
-    if len(given) != len(foods):
+    if len(entries) != len(foods):
         raise AntsError(
-            f"food_kinds has {count(len(given), 'entry')} for {count(len(foods), 'food item')}; "
+            f"food_kinds has {count(len(entries), 'entry')} for {count(len(foods), 'food item')}; "
             "give one kind for each."
         )
-    kinds = [whole(f"food_kinds[{i}]", kind) for i, kind in enumerate(given)]
+    kinds = [whole(f"food_kinds[{i}]", kind) for i, kind in enumerate(entries)]
     wrong = [kind for kind in kinds if not 0 <= kind < MAX_FOOD_KINDS]
     if wrong:
         raise AntsError(
@@ -167,25 +167,25 @@ def _parse(
 ) -> np.ndarray:
     """Return entries as int32 (n, 3), or (n, 4) with a fourth column from 0 to `most`."""
     form, columns = (f"((x, y, z), {number})", 4) if number else ("(x, y, z)", 3)
-    given = _rows(name, values, form, columns)
-    (bad,) = np.nonzero(((given[:, 3:] < 0) | (given[:, 3:] > most)).any(axis=1))
+    rows = _rows(name, values, form, columns)
+    (bad,) = np.nonzero(((rows[:, 3:] < 0) | (rows[:, 3:] > most)).any(axis=1))
     if len(bad):
         raise AntsError(
-            f"{name}[{bad[0]}] is {tuple(given[bad[0]].tolist())}, but the {number} (the last "
+            f"{name}[{bad[0]}] is {tuple(rows[bad[0]].tolist())}, but the {number} (the last "
             f"number) must lie between 0 and {most}."
         )
-    return _inside(name, given, grid)
+    return _inside(name, rows, grid)
 
 
-def _inside(name: str, given: np.ndarray, grid: AxialGrid) -> np.ndarray:
+def _inside(name: str, entries: np.ndarray, grid: AxialGrid) -> np.ndarray:
     """Return rows of int64 (n, 3 or more) in normal form, int32; AntsError if outside the world."""
-    rows = given.copy()
-    rows[:, :3] -= given[:, :3].min(axis=1, keepdims=True, initial=FAR)
+    rows = entries.copy()
+    rows[:, :3] -= entries[:, :3].min(axis=1, keepdims=True, initial=FAR)
     (outside,) = np.nonzero((rows[:, :3] >= np.array(grid.ranges)).any(axis=1))
     if len(outside):
-        place = name if name == "queen" or name.endswith(".centre") else f"{name}[{outside[0]}]"
+        entry = name if name == "queen" or name.endswith(".centre") else f"{name}[{outside[0]}]"
         raise AntsError(
-            f"{place} is {tuple(given[outside[0]].tolist())}, outside the world; after the "
+            f"{entry} is {tuple(entries[outside[0]].tolist())}, outside the world; after the "
             f"smallest coordinate is subtracted from all, x, y, z must be below {grid.ranges}."
         )
     return rows.astype(np.int32)

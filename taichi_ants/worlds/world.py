@@ -189,8 +189,8 @@ class World:
     def reachable_foods(self) -> np.ndarray:
         """Return for each food item whether an ant can walk to it from a queen, bool (F,)."""
         around = self.grid.index(self.queens)[:, None] + self.grid.offsets
-        found = self.walkable(around.reshape(-1))
-        return found[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
+        is_walkable = self.walkable(around.reshape(-1))
+        return is_walkable[self.grid.index(self.foods)[:, None] + self.grid.offsets].any(axis=1)
 
     def start(self, seed: int, n: int = 1, where: str = "nest") -> tuple[np.ndarray, np.ndarray]:
         """Return flat indices and headings, int32 (n,), of n ants at the start, listed ants first.
@@ -228,7 +228,7 @@ class World:
         """Return `start` of one ant in the nest for each seed, uint64 (n,)."""
         if len(self.ants) or not len(seeds):
             listed = self.grid.index(self.ants[:1, :3]), self.ants[:1, 3]
-            cells, headings = (np.broadcast_to(one, len(seeds)) for one in listed)
+            cells, headings = (np.broadcast_to(numbers, len(seeds)) for numbers in listed)
             return cells.astype(np.int32), headings.astype(np.int32)
         free = np.flatnonzero(self.ground() == EMPTY)
         if not len(free):
@@ -269,7 +269,7 @@ class World:
         free, (index,) = free.copy(), np.nonzero(free)
         words = stream_state(seed, STREAM_START_CELL, self.grid.number(self.grid.cells(index)))
         far = (self._far(nest)[index] for nest in range(self.n_nests))
-        queues = [iter(index[np.lexsort((words, one))].tolist()) for one in far]
+        queues = [iter(index[np.lexsort((words, distance))].tolist()) for distance in far]
         cells = np.empty(n, np.int64)
         for i, nest in enumerate(self.nests_of(n_taken + n)[n_taken:].tolist()):
             cells[i] = next(cell for cell in queues[nest] if free[cell])
@@ -303,7 +303,7 @@ class World:
     @cached_property
     def _key(self) -> tuple:
         arrays = (getattr(self, name).tobytes() for name in (*_PARTS, *_MORE))
-        regions = (part for name, one in self.regions.items() for part in (name, one.tobytes()))
+        regions = (part for name, cells in self.regions.items() for part in (name, cells.tobytes()))
         return (self.ranges, self.queen, *arrays, *regions)
 
     def __reduce__(self) -> tuple:

@@ -8,7 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, TrainingConfig, compare, evaluate, plot, train, worlds
+from taichi_ants import (
+    AntsError,
+    Colony,
+    TrainingConfig,
+    compare,
+    evaluate,
+    plot,
+    summary,
+    train,
+    worlds,
+)
 from taichi_ants.analysis.results import curves, of_seeds
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
@@ -119,14 +129,14 @@ def test_results_are_equal_by_content(series):
 
 
 def test_summaries_are_means_over_seeds(series, trained):
-    rows = {row["measure"]: row for row in series.summary().rows}
+    rows = {row["measure"]: row for row in summary(series).rows}
     means = series.deliveries.mean(axis=0)
     assert rows["deliveries"]["mean"] == means.mean()
     low, high = bootstrap_interval(means[None])
     assert (rows["deliveries"]["low"], rows["deliveries"]["high"]) == (low[0], high[0])
     assert rows["deliveries"]["unit"] == "food items"
-    assert "path_length (ticks)" in repr(series.summary())
-    steps = [row for row in trained.summary(last=3).rows if row["measure"] == "steps"]
+    assert "path_length (ticks)" in repr(summary(series))
+    steps = [row for row in summary(trained, last=3).rows if row["measure"] == "steps"]
     assert [row["configuration"] for row in steps] == ["epsilon 0.1", "epsilon 0.5"]
     means = trained.steps[:, :, -3:].mean(axis=(1, 2))
     assert [row["mean"] for row in steps] == pytest.approx(means.tolist(), rel=1e-12)
@@ -175,13 +185,13 @@ def test_comparisons_are_paired(series, trained):
 
 def test_figures_are_drawn(series, trained, tmp_path):
     path = tmp_path / "series.png"
-    figure = series.plot("deliveries", "entropy.trail", path=path)
+    figure = plot(series, "deliveries", "entropy.trail", path=path)
     assert path.stat().st_size > 10_000
     assert [axes.get_ylabel() for axes in figure.axes] == [
         "Deliveries,\nfood items", "Entropy (trail)"
     ]  # fmt: skip
     assert figure.axes[-1].get_xlabel() == "Tick"
-    assert [len(axes.lines) for axes in trained.plot().axes] == [2, 2, 2]
+    assert [len(axes.lines) for axes in plot(trained).axes] == [2, 2, 2]
 
 
 def test_several_results_are_drawn_together(series, trained):
@@ -190,7 +200,7 @@ def test_several_results_are_drawn_together(series, trained):
     assert [axes.get_ylabel() for axes in figure.axes] == ["Deliveries,\nfood items"]
     (axes,) = figure.axes
     assert [line.get_label() for line in axes.lines] == ["few", "many"]
-    alone = [one.plot("deliveries").axes[0].lines[0] for one in (series, other)]
+    alone = [plot(one, "deliveries").axes[0].lines[0] for one in (series, other)]
     for line, single in zip(axes.lines, alone, strict=True):
         assert np.array_equal(line.get_xydata(), single.get_xydata())
     both = plot({"first": trained, "again": trained}, "steps").axes[0]
@@ -201,7 +211,7 @@ def test_several_results_are_drawn_together(series, trained):
 
 def test_names_of_measures_are_those_of_run(series, tmp_path):
     """A measure with parts stands for all of them in figures, and for its only one elsewhere."""
-    whole, part = series.plot("entropy"), series.plot("entropy.trail")
+    whole, part = plot(series, "entropy"), plot(series, "entropy.trail")
     assert [axes.get_ylabel() for axes in whole.axes] == [axes.get_ylabel() for axes in part.axes]
     assert "too few for these: use 10" in " ".join(text.get_text() for text in whole.texts)
     found = compare(series, run(ants=3, measures=ASKED), "entropy")
@@ -213,9 +223,9 @@ def test_names_of_measures_are_those_of_run(series, tmp_path):
 
 def test_results_without_numbers_are_refused():
     arrays = run(measures=["occupancy"])
-    for attempt in (arrays.summary, arrays.plot, lambda: arrays.plot("occupancy")):
+    for attempt in (summary, plot, lambda result: plot(result, "occupancy")):
         with pytest.raises(AntsError, match=r"numbers?; run the colony with"):
-            attempt()
+            attempt(arrays)
 
 
 @pytest.mark.parametrize(
@@ -227,10 +237,10 @@ def test_results_without_numbers_are_refused():
         (lambda one: compare(one, one, configurations=(0, 1)), "configuration is 1"),
         (lambda one: compare(one, one, level=95), "level is 95"),
         (lambda one: compare(one, one, last=3), "last is 3"),
-        (lambda one: one.plot("nothing"), "choose one of deliveries, entropy.trail"),
-        (lambda one: one.plot(path="plot.jpg"), "must be one of .png"),
-        (lambda one: one.summary(last=0), "last is 0"),
-        (lambda one: plot({"a": one, "b": 3}), r"a result \(b\) is 3; give results of Colony.run"),
+        (lambda one: plot(one, "nothing"), "choose one of deliveries, entropy.trail"),
+        (lambda one: plot(one, path="plot.jpg"), "must be one of .png"),
+        (lambda one: summary(one, last=0), "last is 0"),
+        (lambda one: plot({"a": one, "b": 3}), "b is 3; give a result of Colony.run"),
         (lambda one: plot({}), "there are no results"),
         (lambda one: plot({"a": one, "b": run(seeds=range(1, 6))}), "the seeds of 'b' are"),
         (lambda one: plot({"a": one, "b": one}, "nothing"), "no measure 'nothing'"),

@@ -99,7 +99,7 @@ def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are
             ["live", "--world", "paper", "--world.ranges", 9, 9, 9],
             "`world.ranges` is not a setting of the world 'paper'",
         ),
-        (["live", "--world", "nowhere"], "there is no world named 'nowhere'"),
+        (["live", "--world", "nowhere"], "there is no world 'nowhere'"),
         (["live", "--task.life.births", "--capacity", 5], "capacity is 5, but 80 ants start"),
         (["live", "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
         (["live", "--save", "/proc/x/y"], "cannot write '/proc/x/y'"),
@@ -170,7 +170,7 @@ def test_ants_that_choose_without_a_table_need_no_policy(capsys, tmp_path):
 
 def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
+    monkeypatch.setattr(registry.LEARNERS, "yours", dict(registry.LEARNERS.yours))
     lines = [
         "import taichi as ti",
         "from taichi_ants.learners import register, td_learner",
@@ -188,9 +188,9 @@ def test_a_learner_that_makes_no_numbers_is_named(capsys, tmp_path, monkeypatch)
         assert_one_sentence(err)
         assert "learner 'lost' computed action values that are not finite" in err
         monkeypatch.setattr(
-            registry,
-            "_LEARNERS",
-            {name: one for name, one in registry._LEARNERS.items() if name != "lost"},
+            registry.LEARNERS,
+            "yours",
+            {name: one for name, one in registry.LEARNERS.yours.items() if name != "lost"},
         )
     assert not Path("lost.npz").exists()
 

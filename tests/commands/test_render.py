@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import gallery
 import numpy as np
 import pytest
 from command_lines import EXPERIMENTS, ROOT, assert_one_sentence, call, environment, start
@@ -18,14 +19,8 @@ from PIL import Image
 from taichi_ants import AntsError, commands
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
-from taichi_ants.rendering import learning_frames, text
 from taichi_ants.studies.command_line import Parser
 from taichi_ants.worlds import paper
-
-sys.path.insert(0, str(EXPERIMENTS))
-import gallery
-
-sys.path.remove(str(EXPERIMENTS))
 
 
 @pytest.fixture
@@ -66,23 +61,21 @@ def test_training_on_the_spot(tmp_path, run) -> None:
     assert 5 <= len(files_in(tmp_path / "frames")) <= 17
 
 
-def test_a_still_and_a_sheet(tmp_path, policy, run) -> None:
+def test_a_still(tmp_path, policy, run) -> None:
     path = tmp_path / "a.png"
     _, out, _ = run("episode", "--policy", policy, "--max-steps", 3, "--out", path)
     assert out.endswith("3 steps, return 3, not delivered\n")
     _, out, _ = run("episode", "--policy", policy, "--max-steps", 1, "--out", path)
     assert ": 1 step, return" in out
     assert Image.open(path).size == (1280, 720)
-    assert run("sheet", "--policy", policy, "--out", tmp_path / "sheet.png")[0] == 0
-    assert Image.open(tmp_path / "sheet.png").width == 1280
-    assert files_in(tmp_path) == ["a.png", "sheet.png"]
+    assert files_in(tmp_path) == ["a.png"]
 
 
-@pytest.mark.parametrize("shown", ["episode", "colony", "sheet"])
+@pytest.mark.parametrize("shown", ["episode", "colony"])
 def test_a_policy_of_another_observation_is_shown_as_such(tmp_path, shown, run) -> None:
     path = tmp_path / "five.npz"
     save_policy(path, np.eye(2048, 5), {}, "five_cells")
-    length = {"episode": ["--max-steps", "2"], "colony": ["--ticks", "2"], "sheet": []}[shown]
+    length = {"episode": ["--max-steps", "2"], "colony": ["--ticks", "2"]}[shown]
     assert run(shown, "--policy", path, *length, "--out", tmp_path / "a.png")[0] == 0
     assert files_in(tmp_path) == ["a.png", "five.npz"]
 
@@ -106,32 +99,19 @@ def test_a_wrong_size_is_refused_before_the_training(tmp_path, monkeypatch) -> N
         render.show(render.parse_arguments(wrong))
 
 
-@pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
+@pytest.mark.parametrize("shown", ["episode", "colony"])
 def test_what_is_trained_on_the_spot_sees_what_is_asked_for(shown, monkeypatch) -> None:
-    more = ["--checkpoints", "1"] if shown == "learning" else ["--episodes", "1"]
-    chosen = ["--task.observation", "ants_seen", "--training.learner", "dyna_q"]
+    chosen = ["--episodes", "1", "--task.observation", "ants_seen", "--training.learner", "dyna_q"]
     chosen += ["--training.planning-steps", "2"]
     length = ["--ticks", "5"] if shown == "colony" else []
-    settings = render.parse_arguments([shown, *more, *chosen, *length])
+    settings = render.parse_arguments([shown, *chosen, *length])
     assert render.training_config(settings).planning_steps == 2
-    if shown == "learning":
-        _, (checkpoint,) = render.noted_checkpoints(settings, paper())
-        table, task = checkpoint.episode.made.q_values, checkpoint.episode.made.task
-    else:
-        table, task, title = render.find_policy(settings, paper())
-        assert title == "Dyna-Q after 1 episode"
+    table, task, title = render.find_policy(settings, paper())
+    assert title == "Dyna-Q after 1 episode"
     assert (table.shape, task.observation) == ((250, 5), "ants_seen")
 
 
-def test_learning_and_a_colony(tmp_path, run) -> None:
-    status, out, err = run(
-        *("learning", "--seed", 5, "--checkpoints", 0, 2, "--max-steps", 9, "--size", "300x200"),
-        *("--out", tmp_path / "a.gif"),
-    )
-    assert (status, err) == (0, "")
-    assert out.endswith("a.gif: seed 5, before learning, after 2 episodes\n")
-    with Image.open(tmp_path / "a.gif") as image:
-        assert image.n_frames >= 5
+def test_a_colony(tmp_path, run) -> None:
     _, out, _ = run(
         *("colony", "--world", "open", "--ants", 7, "--episodes", 2, "--ticks", 9),
         *("--frame-interval", 3, "--size", "300x200", "--out", tmp_path / "b.gif"),
@@ -142,42 +122,31 @@ def test_learning_and_a_colony(tmp_path, run) -> None:
 
 
 WRONG = {
-    "nothing to show": ([], "episode|colony|learning|sheet"),
+    "nothing to show": ([], "episode|colony"),
     "something else": (["movie"], "'movie'"),
     "ending": (["episode", "--out", "{}/a.avi"], ".gif or .mp4"),
-    "ending of a sheet": (["sheet", "--out", "{}/a.gif"], ".png"),
-    "ending of learning": (["learning", "--out", "{}/a.png"], ".gif"),
     "place": (["episode", "--out", "/proc/nope/a.gif"], "cannot write"),
     "size": (["episode", "--size", "63x63", "--out", "{}/a.gif"], "64 and 4096"),
     "large size": (["colony", "--size", "5000x100", "--out", "{}/a.gif"], "64 and 4096"),
-    "size of a sheet": (["sheet", "--size", "400x300"], "--size"),
     "form of a size": (["episode", "--size", "1280*720"], "1280x720"),
     "speed": (["episode", "--fps", "0", "--out", "{}/a.gif"], "fps"),
     "no number": (["episode", "--fps", "fast"], "'fast' is not a number"),
     "world": (["episode", "--world", "mars", "--out", "{}/a.gif"], "mars"),
     "policy": (["episode", "--policy", "nope.npz", "--out", "{}/a.gif"], "nope.npz"),
-    "policy and learning": (["learning", "--policy", "a.npz"], "--policy"),
-    "episodes of learning": (["learning", "--episodes", "500"], "--episodes"),
     "world seed of the paper": (
         ["episode", "--world.seed", "3"],
         "--world.seed has no effect on",
     ),
     "ants of an episode": (["episode", "--ants", "80"], "--ants"),
-    "plain learning": (["learning", "--no-overlay"], "--no-overlay"),
     "checkpoints of an episode": (["episode", "--checkpoints", "1"], "--checkpoints"),
     "epsilon": (
         ["episode", "--policy", "{policy}", "--epsilon", "2", "--out", "{}/a.gif"],
         "epsilon",
     ),
     "learner": (["episode", "--training.learner", "magic", "--out", "{}/a.gif"], "magic"),
-    "checkpoints": (["learning", "--checkpoints", "5", "1", "--out", "{}/a.gif"], "ascend"),
-    "order of checkpoints": (
-        ["learning", "--checkpoints", "5", "2", "--out", "{}/a.gif"],
-        "checkpoints is (5, 2); it must be ascending numbers",
-    ),
     "steps": (["episode", "--max-steps", "0"], "from 1 to"),
     "training of a policy": (
-        ["sheet", "--policy", "a.npz", "--episodes", "5"],
+        ["colony", "--policy", "a.npz", "--episodes", "5"],
         "--episodes configures",
     ),
     "learner of a policy": (
@@ -197,7 +166,7 @@ WRONG = {
         "--title has no effect",
     ),
     "wrong number": (
-        ["sheet", "--training.discount", "y", "--out", "{}/a.png"],
+        ["episode", "--training.discount", "y", "--out", "{}/a.png"],
         "is 'y'; it must be",
     ),
     "hyperparameter of another": (
@@ -258,7 +227,6 @@ def test_default_worlds(arguments, world) -> None:
     ("arguments", "size"),
     [
         (["episode"], (1280, 720)),
-        (["learning"], (1280, 520)),
         (["colony"], (960, 540)),
         (["colony", "--size", "320x200"], (320, 200)),
     ],
@@ -278,12 +246,12 @@ def test_the_command_names_itself_as_it_is_called(capsys, monkeypatch) -> None:
 
 
 def test_help_needs_little(run, kernels) -> None:
-    for kind in ("episode", "colony", "learning", "sheet"):
+    for kind in ("episode", "colony"):
         _, out, _ = run(kind, "--help")
         assert "--training.learner" in out
         example = re.search(rf"Example: .*?\b({kind}\b.*)", out)[1].split()
         assert render.parse_arguments(example).kind == kind
-    heavy = "import sys; sys.path.insert(0, sys.argv[1]); import render, gallery; "
+    heavy = "import sys; sys.path.insert(0, sys.argv[1]); import render; "
     heavy += "print({'taichi', 'matplotlib', 'PIL', 'av', 'numpy'} & set(sys.modules))"
     loaded = subprocess.run(
         [sys.executable, "-c", heavy, str(EXPERIMENTS)],
@@ -295,68 +263,14 @@ def test_help_needs_little(run, kernels) -> None:
     assert loaded.stdout == "set()\n"
 
 
-def test_a_seed_that_is_named_is_not_chosen(capsys) -> None:
-    with pytest.raises(SystemExit):
-        render.parse_arguments(["learning", "--seed", "7", "--seeds", "20"])
-    assert "--seeds selects the seed to show, but --seed sets it" in capsys.readouterr().err
-
-
-def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many_ants(
-    monkeypatch,
-) -> None:
-    """docs/paper.md says of it what the picture shows, and how many of 200 ants do so."""
-    arguments = render.parse_arguments(gallery.GALLERY["learning.gif"])
-    assert render.parse_arguments(["learning"]).checkpoints == arguments.checkpoints
-    _, checkpoints = render.noted_checkpoints(arguments, paper())
-    steps = [len(checkpoint.episode.trace) for checkpoint in checkpoints]
-    assert len(
-        {(n, checkpoint.note) for n, checkpoint in zip(steps, checkpoints, strict=True)}
-    ) == len(checkpoints)
-    page = " ".join((ROOT / "docs" / "paper.md").read_text(encoding="utf-8").lower().split())
-    for n, checkpoint in zip(steps[1:], checkpoints[1:], strict=True):
-        assert checkpoint.note == "delivered"
-        number, _, seeds = checkpoint.among.split()[:3]
-        assert f"{checkpoint.title} it delivers in {n} steps ({number} of {seeds} ants" in page
-    lines = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    list(learning_frames(checkpoints, arguments.size))
-    assert {checkpoint.among for checkpoint in checkpoints} < set(lines)
-    assert f"step {steps[-1]}, return 45: delivered" in lines
-
-
-def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why(
-    monkeypatch,
-) -> None:
-    """docs/rendering.md says so of this seed."""
-    arguments = render.parse_arguments(
-        ["learning", "--seed", "7", "--checkpoints", "0", "10", "20"]
-    )
-    seed, checkpoints = render.noted_checkpoints(arguments, paper())
-    assert seed == 7
-    assert [(checkpoint.note, checkpoint.among) for checkpoint in checkpoints] == [
-        *(("", ""), ("circles with food", ""), ("delivered", "")),
-    ]
-    returns = [int(checkpoint.episode.trace.rewards.sum()) for checkpoint in checkpoints]
-    assert returns[1] > returns[2] == 45
-    told = (ROOT / "docs" / "rendering.md").read_text(encoding="utf-8")
-    assert f"returns {returns[1]} after 10 episodes" in told
-    lines = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    list(learning_frames(checkpoints, (1200, 480)))
-    assert f"step 150, return {returns[1]}: circles with food" in lines
-    assert "= T 16 + S 16 + F 3 + Q 10" in lines
-    assert "S nearer to the queen +1" in lines  # the legend
-
-
 def test_the_gallery_is_there_and_small() -> None:
     sizes = []
     for name, arguments in gallery.GALLERY.items():
-        settings = render.parse_arguments([*arguments, "--out", name])
+        _, settings = gallery.drawing([*arguments, "--out", name])
         path = ROOT / "renders" / name
         sizes.append(path.stat().st_size)
         with Image.open(path) as image:
-            if settings.kind != "sheet":
-                assert image.size == settings.size
+            assert image.size == getattr(settings, "size", image.size)
             frames = getattr(image, "n_frames", 1)
             assert (frames > 1) == name.endswith(".gif")
             assert np.asarray(image.convert("RGB")).std() > 5
@@ -391,9 +305,9 @@ def test_the_tracked_pictures_are_those_of_the_gallery() -> None:
     assert pictures == figures | {f"renders/{name}" for name in gallery.GALLERY} | findings
 
 
-@pytest.mark.parametrize("shown", ["episode", "colony", "learning", "sheet"])
+@pytest.mark.parametrize("shown", ["episode", "colony", "learning", "policy_sheet"])
 def test_by_default_no_tracked_picture_is_replaced(shown) -> None:
-    place = render.parse_arguments([shown]).out
+    place = gallery.drawing([shown])[1].out
     ignored = subprocess.run(
         ["git", "check-ignore", "--no-index", "-q", place],
         cwd=ROOT,

@@ -410,7 +410,7 @@ def test_a_learner_that_cannot_share_is_refused_before_the_work(sweep):
 
 
 def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(registry, "_BUILDERS", dict(registry._BUILDERS))
+    monkeypatch.setattr(registry.WORLDS, "yours", dict(registry.WORLDS.yours))
 
     def line(seed, length=3):
         return worlds.World((length, 2, 2), (0, 0, 0), foods=[(length - 1, 0, 0)])

@@ -13,10 +13,12 @@ from taichi_ants import (
     AntsError,
     Colony,
     TrainingConfig,
+    evaluate,
     files,
     measures,
     rules,
     save_policy,
+    train,
     worlds,
 )
 from taichi_ants.learners.policies import random_policy, trail_follower
@@ -47,7 +49,7 @@ FROZEN = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
 def sweep(tmp_path, capsys, monkeypatch):
     """Calls the command on a file of this text, in a folder of its own."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(registry, "_YOURS", {})
+    monkeypatch.setattr(registry.MEASURES, "yours", {})
 
     def called(text, *more):
         Path("my.toml").write_text(text, "utf-8")
@@ -176,7 +178,7 @@ def test_policies_can_vary(sweep):
 
 
 def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
-    monkeypatch.setattr(rules.registry, "_RULES", dict(rules.registry._RULES))
+    monkeypatch.setattr(rules.registry.RULES, "yours", dict(rules.registry.RULES.yours))
     rules.register("evaporation")(weaker)
     text = FILE.replace("[vary]", '[task]\npheromone.evaporation = "weaker"\n\n[vary]')
     text += "task.rules.weaker.rate = [0.1, 0.5]\n"
@@ -202,6 +204,49 @@ def test_a_plugin_can_register_a_measure(sweep):
     assert (status, err) == (0, "")
     assert "north" in out
     assert measures.get("north").summary == "north"
+
+
+def test_measures_of_a_plugin_work_for_lone_ants_and_for_colonies(sweep):
+    """A measure of counts for the windows of lone ants, and one of finished runs of both kinds."""
+    Path("yours.py").write_text(
+        "from taichi_ants import measures\n"
+        "measures.register('pace', lambda c: c['deliveries'] / c['ticks'], of='counts')\n"
+        "measures.register('worst', lambda r: r.evaluation['returns'].min(-1), of='run')\n"
+    )
+    text = FILE.replace('"entropy", "deliveries", "path_length"', '"pace", "worst"')
+    assert sweep(text, "--plugin", "yours.py", "--no-figures")[0] == 0
+    rows = [row for row in read_csv("runs.csv") if row["task.pheromone.level"] == "250"]
+    result = run()
+    pace = (result.deliveries / 60).mean(axis=0)
+    assert [float(row["pace"]) for row in rows] == pytest.approx(pace)
+    assert [float(row["worst"]) for row in rows] == result.returns.min(axis=0).tolist()
+    assert {row["measure"] for row in read_csv("series.csv")} == {"pace"}
+    asked = '"pace_all", "greedy_pace", "pace_fluctuation_all", "worst"'
+    lone = f"""
+kind = "runs"
+measures = [{asked}]
+seeds = 2
+episodes = 5
+rollouts = 3
+max_steps = 80
+training = {{learner = "sarsa", discount = 0.9, epsilon = 0.3, epsilon_decay = 1.0}}
+
+[vary]
+training.learning_rate = [0.1, 0.2]
+"""
+    assert sweep(lone, "--plugin", "yours.py", "--no-figures", "--force")[0] == 0
+    config = TrainingConfig("sarsa", 0.2, 0.9, 0.3, 1.0)
+    trained = train(worlds.paper(), config, (0, 1), 5, 80)
+    greedy = evaluate(worlds.paper(), trained.q_values, 3, (0, 1), 80)
+    rows = read_csv("runs.csv")[2:]
+    for row, steps, delivered in zip(rows, trained.steps[0], trained.deliveries[0], strict=True):
+        assert float(row["pace_all"]) == pytest.approx((delivered / steps).mean())
+    assert [float(row["worst"]) for row in rows] == greedy.returns[0].min(axis=1).tolist()
+    paces = (greedy.deliveries / greedy.steps)[0].mean(axis=1)
+    assert [float(row["greedy_pace"]) for row in rows] == pytest.approx(paces)
+    status, _, err = sweep(lone.replace("pace_all", "blocked_share_all"), "--plugin", "yours.py")
+    assert status == 2
+    assert "of lone ants must compute with arrays of the counts returns, ticks, deliveries" in err
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ def test_the_example_prints_what_the_guide_shows(capsys, tmp_path, monkeypatch):
 
 
 def test_your_own_measures_work_as_the_guide_writes_them(monkeypatch):
-    monkeypatch.setattr(registry, "_YOURS", {})
+    monkeypatch.setattr(registry.MEASURES, "yours", {})
     follows = {"sharing": "frozen", "q_values": trail_follower()}
     rule = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
     colony = Colony(worlds.build("double_bridge"), None, rule, ants=9, **follows)
@@ -37,7 +37,8 @@ def test_your_own_measures_work_as_the_guide_writes_them(monkeypatch):
     for kind, code in re.findall(r"```(\w*)\n(.*?)```", GUIDE, re.DOTALL):
         if not kind and "measures" in code:
             exec(compile(code.replace("2000", "200"), "measures.md", "exec"), names)
-    assert set(measures.names()) - measures.BUILT_IN.keys() == {"outside", "branch", "most_active"}
+    yours = {"outside", "most_active", "wasted", "worst"}
+    assert set(measures.names()) - measures.BUILT_IN.keys() == yours
     assert {"regions.short", "regions.long"} == names["result"].series.values.keys()
     found = colony.run(1, 40, measures=["outside", "most_active"], every=20).series.values
     assert len(found) == 2

@@ -305,7 +305,7 @@ def test_steps_in_the_wrong_order_and_wrong_actions():
             "autoreset_mode is 'NextStep', but the next episode of an ant",
         ),
         ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
-        ({"world": "nowhere"}, "there is no world named 'nowhere'"),
+        ({"world": "nowhere"}, "there is no world 'nowhere'"),
         ({"world": []}, "world is .*; give the name of a world"),
         ({"world": 3}, "world is 3; give the name of a world"),
         ({"start": "there"}, "start is 'there'; "),

@@ -88,7 +88,7 @@ def test_a_network_is_rendered_put_into_a_colony_and_compared(
     """All that takes policy files takes it."""
     path = tmp_path / "network.npz"
     save_policy(path, tabulate(network), {"made by": "a test"})
-    sheet = run("render", ["sheet", "--policy", path, "--out", "sheet.png"], kernels, tmp_path)
+    sheet = run("policy_sheet", ["--policy", path, "--out", "sheet.png"], kernels, tmp_path)
     assert sheet.returncode == 0, sheet.stderr
     assert (tmp_path / "sheet.png").stat().st_size > 10_000
     shared = ["--sharing", "frozen", "--ants", 4, "--ticks", 50]

@@ -97,7 +97,7 @@ def test_torchrl_reads_each_info_and_trains_a_dqn() -> None:
 def sb3_envs(name: str = ID, n: int = 4, **more: object):
     """A vector environment of this package, as Stable-Baselines3 takes it."""
     pytest.importorskip("stable_baselines3")
-    from taichi_ants.envs.sb3 import SB3VecEnv
+    from examples.sb3_vec_env import SB3VecEnv
 
     envs = gymnasium.make_vec(name, num_envs=n, autoreset_mode="SameStep", **HOW, **more)
     return SB3VecEnv(envs)

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ant_system import Search, search
 from bridge import crossings
 from command_lines import EXPERIMENTS
+from goss import choices
 from matplotlib.figure import Figure
+from utility import Foraging
 
 from taichi_ants import Colony, TrainingConfig, World, task, train
-from taichi_ants.baselines.ant_system import Search, search
-from taichi_ants.baselines.goss import choices
-from taichi_ants.baselines.utility import Foraging
 from taichi_ants.learners import registry as learners
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.task import Caste, Noise, Threshold
@@ -33,7 +33,7 @@ CENTRE, RING = (0, 0, 0), [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)
 @pytest.fixture
 def script(monkeypatch):
     """Load a script, and return its names; changes to them hold for its functions."""
-    monkeypatch.setattr(learners, "_LEARNERS", dict(learners._LEARNERS))
+    monkeypatch.setattr(learners.LEARNERS, "yours", dict(learners.LEARNERS.yours))
 
     def load(name: str, **changes: Any) -> dict[str, Any]:
         names = runpy.run_path(str(EXPERIMENTS / f"{name}.py"))

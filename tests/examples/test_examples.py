@@ -15,10 +15,8 @@ from taichi_ants import load_policy, task
 
 EXAMPLES = ROOT / "examples"
 NEEDS = {
-    "ppo": "torch",
-    "shared_policy": "torch",
-    "sb3_ppo": "stable_baselines3",
-    "search": "optuna",
+    **{"ppo": "torch", "shared_policy": "torch", "search": "optuna"},
+    **{"sb3_ppo": "stable_baselines3", "minari_data": "minari"},
 }
 
 
@@ -41,7 +39,7 @@ def run(name: str, arguments: list[object], kernels: Path, folder: Path) -> str:
 
 def test_every_example_is_here() -> None:
     names = {path.stem for path in EXAMPLES.glob("*.py")}
-    assert names == {"q_learning", *NEEDS}
+    assert names == {"q_learning", "sb3_vec_env", *NEEDS}
 
 
 @pytest.mark.slow
@@ -49,6 +47,15 @@ def test_q_learning_delivers_in_40_lines(kernels: Path, tmp_path: Path) -> None:
     said = run("q_learning", ["--seeds", 3], kernels, tmp_path)
     assert said == "seed 3: 50 of 50 rollouts deliver, 13.0 in 35.0 steps\n"
     assert len((EXAMPLES / "q_learning.py").read_text().splitlines()) <= 40
+
+
+@pytest.mark.slow
+def test_minari_data_learns_from_what_it_has_written(
+    kernels: Path, tmp_path: Path, monkeypatch
+) -> None:
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "data"))
+    said = run("minari_data", [], kernels, tmp_path)
+    assert said == "58652 transitions; 20 of 20 rollouts deliver\n"
 
 
 @pytest.mark.slow

@@ -98,7 +98,7 @@ def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
 @pytest.fixture
 def rules_of_scripts(monkeypatch):
     """Forget the rules that a script registers."""
-    monkeypatch.setattr(registry, "_RULES", dict(registry._RULES))
+    monkeypatch.setattr(registry.RULES, "yours", dict(registry.RULES.yours))
 
 
 def test_rules_of_the_no_entry_model(rules_of_scripts):

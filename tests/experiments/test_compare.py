@@ -40,7 +40,7 @@ from taichi_ants import (
 )
 from taichi_ants.analysis.behaviour import DELIVERS
 from taichi_ants.files import archives
-from taichi_ants.measures.runs import measures_of_runs
+from taichi_ants.measures.finished import Run, values_of
 from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 
 GARDEN = EXPERIMENTS / "maps" / "garden.txt"
@@ -179,7 +179,7 @@ def test_runs_are_what_the_library_gives_in_the_order_of_the_summary(finished):
     greedy = evaluate(worlds.paper(), trained["q_values"], ROLLOUTS, SEEDS, MAX_STEPS)
     names = ("returns", "steps", "deliveries")
     outcome = trained | {f"greedy_{name}": getattr(greedy, name) for name in names}
-    expected = measures_of_runs(outcome)
+    expected = values_of(Run.of_lone_ant(outcome))
     assert arrays["return_all"].shape == (len(rows), len(SEEDS))
     for name, values in expected.items():
         np.testing.assert_array_equal(arrays[name], values, err_msg=name)

@@ -49,7 +49,7 @@ CLIPPED = td_learner("clipped_sarsa", clipped_td_error, draws_next_action=True)
 @pytest.fixture(autouse=True)
 def _clipped_sarsa(monkeypatch):
     """A learner from outside of the package, known during these tests only."""
-    monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
+    monkeypatch.setattr(registry.LEARNERS, "yours", dict(registry.LEARNERS.yours))
     learners.register(CLIPPED)
     monkeypatch.setitem(reference.LEARNERS, "clipped_sarsa", ClippedSarsa)
 

@@ -34,7 +34,7 @@ NUMBERS = np.arange(5, dtype=np.float32)
 
 @pytest.fixture(autouse=True)
 def _no_learner_stays(monkeypatch):
-    monkeypatch.setattr(registry, "_LEARNERS", dict(registry._LEARNERS))
+    monkeypatch.setattr(registry.LEARNERS, "yours", dict(registry.LEARNERS.yours))
 
 
 def config(name="mine"):
@@ -436,7 +436,7 @@ def test_learners_that_are_refused_when_they_are_registered(changes, says):
 def test_a_learner_that_has_come_to_need_more_memory(tmp_path):
     register(with_memory())
     train(paper(), with_momentum(0.5), 0, 2, 50).save(tmp_path / "x.npz")
-    registry._LEARNERS.clear()
+    registry.LEARNERS.yours.clear()
     register(with_memory(memory=lambda settings, n_states: Memory(floats=9, integers=1)))
     with pytest.raises(AntsError, match="'mine' needs more memory than when"):
         continue_training(TrainingResult.load(tmp_path / "x.npz"), 1)

@@ -19,7 +19,8 @@ from taichi_ants.reference.measures import (
 from taichi_ants.task import foraging
 
 EVERY, EPISODES, TICKS = 3, 2, 20
-READ = (*MEASURES, "regions.a", "regions.b")
+PARTS = ("regions.a", "regions.b", "deliveries_by.nest_0", "deliveries_by.food_0")
+READ = (*MEASURES, *PARTS, "deliveries_by.caste_0")
 
 
 def same(one: float, other: float) -> bool:

@@ -7,10 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from taichi_ants import AntsError, Colony, TrainingConfig, measures, worlds
+from taichi_ants import AntsError, Colony, TrainingConfig, When, measures, summary, train, worlds
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.measures import registry
-from taichi_ants.worlds.double_bridge import branch_cells
+from taichi_ants.measures import Measure, registry
 
 FROZEN = {"sharing": "frozen", "q_values": trail_follower()}
 TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
@@ -18,7 +17,7 @@ TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.1, 1.0)
 
 @pytest.fixture(autouse=True)
 def forget_others(monkeypatch):
-    monkeypatch.setattr(registry, "_YOURS", {})
+    monkeypatch.setattr(registry.MEASURES, "yours", {})
 
 
 def colony(world=None, ants=5, seeds=(0, 1, 2)) -> Colony:
@@ -57,22 +56,19 @@ def test_your_own_measure_is_read_as_the_others():
     assert "growth" in measures.names()
 
 
-def test_shares_in_regions():
-    """The two branches of a bridge, and all other cells."""
-    short, long = branch_cells()
-    bridge = worlds.build("double_bridge")
-    rest = [cell for cell in bridge.grid.cells(np.flatnonzero(bridge.grid.exists)).tolist()
-            if cell not in [*short.tolist(), *long.tolist()]]  # fmt: skip
-    shares = measures.share_in({"short": short, "long": long, "rest": rest})
-    measures.register("branch", shares)
-    series = colony(bridge, 40).run(1, 80, measures="branch", every=40).series
-    values = np.array([*series.values.values()])
-    assert list(series.values) == ["branch.short", "branch.long", "branch.rest"]
-    assert np.allclose(values.sum(axis=0), 1)
-    assert values[:2].max() > 0
-    lone = measures.share_in({"here": [(99, 0, 0)]})
-    with pytest.raises(AntsError, match="outside"):
-        colony().run(1, 1, measures=measures.Measure("there", lone))
+def test_a_measure_of_counts_works_for_colonies_and_lone_ants():
+    """In series, in conditions, and in summaries of lone ants, whose episodes are arrays."""
+    measures.register("fruitless", lambda c: c["ticks"] - c["deliveries"], "ticks", of="counts")
+    result = colony().run(1, 30, measures="fruitless", every=10)
+    last = result.series.values["fruitless"][-3:]
+    assert last.tolist() == (30 - result.deliveries[0]).tolist()
+    protocol = [When("fruitless", above=14, interval=5, remove_ants=1.0)]
+    assert not colony().run(1, 30, protocol=protocol).living.any()
+    trained = train(worlds.paper(), [TRAINING], (0, 1), 4, 50)
+    (row,) = (row for row in summary(trained).rows if row["measure"] == "fruitless")
+    assert row["mean"] == (trained.steps - trained.deliveries).mean()
+    measures.register("stuck", lambda c: c["blocked"], of="counts")  # lone ants do not count it
+    assert "stuck" not in {row["measure"] for row in summary(trained).rows}
 
 
 @pytest.mark.parametrize(
@@ -83,7 +79,9 @@ def test_shares_in_regions():
         ("mine", 3, {}, r"must be a function of \(snapshot\)"),
         ("mine", lambda: 1, {}, r"must be a function of \(snapshot\)"),
         ("mine", lambda s: 1, {"of": "living"}, r"function of \(values, snapshot\)"),
-        ("mine", lambda v, s: 1, {"of": "synchrony"}, "reads a series itself"),
+        ("mine", lambda: 1, {"of": "counts"}, r"must be a function of \(counts\)"),
+        ("counts", len, {}, "built-in measure"),
+        ("mine", lambda v, s: 1, {"of": "synchrony"}, "of is 'synchrony', which needs the series"),
         ("mine", lambda v, s: 1, {"of": "nothing"}, "there is no measure 'nothing'"),
         ("mine", len, {"unit": 3}, "unit is 3; it must be text"),
     ],
@@ -98,8 +96,9 @@ def test_wrong_measures_are_refused(name, function, more, message):
     [
         ({"measures": ["deliveries", "deliverys"]}, "there is no measure 'deliverys'"),
         ({"measures": 3}, "give a list of names"),
-        ({"measures": [3]}, "the measure is 3"),
+        ({"measures": [3]}, "there is no measure 3"),
         ({"measures": ["living", "living"]}, "'living' more than once"),
+        ({"measures": Measure("late", len, of="run")}, "measures is 'late', which needs finished"),
         ({"measures": ["living"], "every": 0}, "every is 0"),
         ({"every": 10}, "measures is empty"),
     ],

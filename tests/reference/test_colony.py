@@ -4,70 +4,12 @@ from __future__ import annotations
 
 import pytest
 from colonies import act, begun, load, training
-from plain_runs import train
-from random_worlds import random_world
 
-from taichi_ants import TrainingConfig
-from taichi_ants.reference import LEARNERS, ReferenceColony
-from taichi_ants.task import Life, Task
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.task import Task
 from taichi_ants.task.constants import FORWARD, GIVE
 from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
-
-# Food ahead, the queen behind, as in the training of one ant: 2 ticks at best.
-TWO_STEPS = World((3, 3, 3), (0, 0, 1), foods=[(1, 1, 0)], ants=[((0, 0, 0), 1)])
-SHARING = [name for name in LEARNERS if LEARNERS[name].shares]
-
-
-@pytest.mark.parametrize("delivery", ["terminates", "truncates"])
-@pytest.mark.parametrize("learner", SHARING)
-def test_one_ant_learns_into_a_shared_table_what_it_learns_into_its_own(learner, delivery):
-    learning = TrainingConfig(learner, 0.37, 0.9, 0.6, 0.9, 0.05)
-    n_deliveries = 0
-    for seed in range(12):
-        world, task = random_world(seed), Task(delivery=delivery)
-        alone = train(world, learning, seed, 3, 40, task)
-        colony = ReferenceColony(world, task, learning, seed, ends_at_delivery=True)
-        assert colony.run(3, 40) == alone.trace
-        assert colony.minds.tables[0].rows == alone.learner.rows
-        assert list(colony.minds.tables[0].model.items()) == list(alone.model.items())
-        n_deliveries += sum(alone.deliveries)
-    assert n_deliveries >= 3
-
-
-def test_run_stops_at_the_delivery_and_decays_epsilon():
-    learning = TrainingConfig("sarsa", 0.1, 0.9, 0.8, 0.5, 0.3)
-    colony = ReferenceColony(TWO_STEPS, None, learning, 7, ends_at_delivery=True)
-    colony.run(3, 100)
-    assert len(colony.records) == 3
-    assert colony.epsilon == 0.3
-    for record in colony.records:
-        assert record.deliveries == (record.ticks < 100)
-        assert record.first_delivery == (record.ticks if record.deliveries else -1)
-    assert min(record.ticks for record in colony.records) < 100
-
-
-def test_a_delivery_does_not_end_the_episode_of_a_colony():
-    learning = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)
-    colony = ReferenceColony(TWO_STEPS, Task(life=Life(regrowth=0)), learning, 7)
-    trace = colony.run(1, 2000)
-    [record] = colony.records
-    assert record.ticks == len(trace) == 2000
-    assert record.deliveries > 1
-    gives = [step.step for step in trace if step.event is Event.DELIVERED]
-    assert len(gives) == record.deliveries
-    assert gives[0] == record.first_delivery - 1
-
-
-def test_after_the_end_there_is_no_tick():
-    learning = TrainingConfig("q_learning", 0.1, 0.9, 1.0, 1.0)
-    colony = ReferenceColony(TWO_STEPS, None, learning, 7, ends_at_delivery=True)
-    with pytest.raises(AssertionError, match="no episode"):
-        colony.tick()
-    colony.run(1, 10_000)
-    assert colony.over
-    with pytest.raises(AssertionError, match="no episode"):
-        colony.tick()
 
 
 def test_the_last_tick_of_a_run_truncates_for_all():

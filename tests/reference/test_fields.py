@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pytest
 from colonies import act, begun, cells_of, load
 
-from taichi_ants import Colony, TrainingConfig
-from taichi_ants.reference import ReferenceColony
-from taichi_ants.task import Field, Pheromone, Task
+from taichi_ants.task import Field, Pheromone
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
 
@@ -102,38 +98,3 @@ def test_an_ant_without_food_sees_the_outbound_field_in_place_of_the_trail():
     colony.world.fields["scout"].lay((3, 3, 0), 1)
     colony.observe(colony.ants[0])
     assert colony.ants[0].paper_state == 4 * 2
-
-
-def test_fields_of_kernels_are_stored_and_shown_by_name(tmp_path):
-    task = Task(
-        fields={"home": Field(deposited_when="without_food"), "wide": Field(diffusion=0.5)},
-        evaporation_in_training=True,
-    )
-    training = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)
-    colony, plain = Colony(OPEN, task, training, 3, 9), ReferenceColony(OPEN, task, training, 3, 9)
-    colony.begin_episode()
-    colony.tick(30)
-    plain.begin_episode()
-    for _ in range(30):
-        plain.tick()
-    stored, clock = colony.stored_trail(field="home")
-    assert clock == 30
-    now = colony.snapshot()
-    assert np.array_equal(now.fields["home"], np.maximum(stored - clock, 0))
-    assert int(now.fields["home"].sum()) == sum(levels(plain, "home").values()) > 0
-    assert now.fields["wide"].dtype == np.float32
-    assert now == colony.snapshot()
-    colony.save(tmp_path / "x.npz")
-    loaded = Colony.load(tmp_path / "x.npz")
-    assert loaded == colony
-    for one in (loaded, colony):
-        one.tick(5)
-    assert loaded.snapshot() == colony.snapshot() != now
-
-
-@pytest.mark.parametrize("training", [True, False])
-def test_evaporation_in_training_and_in_evaluation_is_that_of_all_fields(training):
-    flags = {"evaporation_in_training": training, "evaporation_in_evaluation": not training}
-    task = Task(fields={"home": Field()}, **flags)
-    assert task.fields_while(training)["home"] == Field()
-    assert task.fields_while(not training)["home"] == Field("none")

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import pytest
-from colonies import act, begun, cells_of, foods_of, load, n_draws, training
+from colonies import act, begun, cells_of, foods_of, load, n_draws
 
-from taichi_ants.grid.constants import STREAM_ANT, STREAM_BORN, STREAM_QUEEN
+from taichi_ants.grid.constants import STREAM_BORN, STREAM_QUEEN
 from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.observations import observe
 from taichi_ants.reference.random_stream import RandomStream, stream_state
@@ -58,42 +56,12 @@ def test_a_food_given_becomes_an_ant_that_faces_away(seed):
     assert n_draws(born.stream.state, stream_state(seed, STREAM_BORN, 1)) == 1
 
 
-def test_seeds_put_the_newborn_in_all_directions():
-    assert {queens_choice(seed, 0, 1, 2, 4, 5)[0] for seed in range(40)} == {0, 1, 2, 4, 5}
-
-
-def test_without_births_the_food_is_just_received():
-    colony = begun(around(3), births=False, capacity=5)
-    load(colony, 0)
-    act(colony, GIVE)
-    assert (len(colony.ants), colony.stores[0], colony.record.births) == (1, 0, 0)
-    assert colony.queen_stream.state == stream_state(0, STREAM_QUEEN, 0)
-
-
-def test_several_are_born_one_after_the_other():
-    colony = begun(around(1, 4), births=True, seed=3)
-    load(colony, 0, 1)
-    act(colony, GIVE, GIVE)
-    chosen = queens_choice(3, 0, 2, 3, 5)[:2]
-    assert [colony.ants[slot].heading for slot in (2, 3)] == chosen
-    assert [colony.ants[slot].number for slot in (2, 3)] == [2, 3]
-    states = [stream_state(3, STREAM_BORN, number) for number in (2, 3)]
-    assert [colony.ants[slot].stream.state for slot in (2, 3)] == states
-
-
 def test_the_one_free_neighbour_takes_a_draw_too():
     colony = begun(around(0, 1, 2, 3, 4), births=True)
     load(colony, 0)
     act(colony, *[GIVE] * 5)
     assert colony.ants[5].cell == neighbour(QUEEN, 5)
     assert n_draws(colony.queen_stream.state, stream_state(0, STREAM_QUEEN, 0)) == 1
-
-
-def test_food_around_the_queen_is_no_free_place():
-    colony = begun(around(0, foods=[neighbour(QUEEN, h) for h in (1, 2, 3, 5)]), births=True)
-    load(colony, 0)
-    act(colony, GIVE)
-    assert colony.ants[1].cell == neighbour(QUEEN, 4)
 
 
 def test_the_food_waits_while_no_neighbour_is_free():
@@ -126,36 +94,6 @@ def test_the_food_waits_while_the_colony_is_full_and_slots_are_free_a_tick_after
     assert colony.stores[0] == 0
     record = colony.record
     assert (record.births, record.deaths) == (2, 3)
-
-
-def test_born_ants_of_another_episode_have_other_streams():
-    colony = begun(around(3), births=True)
-    for episode in range(2):
-        load(colony, 0)
-        act(colony, GIVE)
-        born = colony.ants[1]
-        assert born.stream.state == stream_state(0, STREAM_BORN, episode * 2**32 + 1)
-        colony.end_episode()
-        colony.begin_episode()
-        assert sorted(colony.ants) == [0]
-
-
-def test_the_queens_stream_runs_on_and_her_store_does_not():
-    colony = begun(around(*range(6), ranges=(2, 2, 2)), births=True)
-    load(colony, 0)
-    act(colony, *[GIVE] * 6)
-    assert colony.stores[0] == 1
-    colony.end_episode()
-    colony.begin_episode()
-    assert colony.stores[0] == 0
-    colony = begun(around(3), births=True)
-    for n_births in (1, 2):
-        load(colony, 0)
-        act(colony, GIVE)
-        start = stream_state(0, STREAM_QUEEN, 0)
-        assert n_draws(colony.queen_stream.state, start) == n_births
-        colony.end_episode()
-        colony.begin_episode()
 
 
 # Ant 0 heads up to ant 1, who looks at the queen.
@@ -191,12 +129,6 @@ def test_an_ant_dies_at_its_lifespan():
     assert colony.transitions == []
 
 
-def test_without_a_lifespan_ants_do_not_age():
-    colony = begun(COLUMN)
-    act(colony, GIVE, GIVE)
-    assert [ant.age for ant in colony.ants.values()] == [0, 0]
-
-
 def test_a_carrying_ant_leaves_its_food_where_it_dies():
     colony = begun(COLUMN, lifespan=2)
     load(colony, 0)
@@ -213,14 +145,6 @@ def test_a_carrying_ant_leaves_its_food_where_it_dies():
     assert last.truncated
 
 
-def test_an_ant_that_gives_in_its_last_tick_leaves_nothing():
-    colony = begun(COLUMN, lifespan=1)
-    load(colony, 0)
-    act(colony, GIVE, GIVE)
-    assert foods_of(colony) == set()
-    assert (colony.record.deliveries, colony.record.deaths) == (1, 2)
-
-
 def test_a_dying_ant_learns_from_what_it_sees_last_as_if_it_lived_on():
     # Forward onto an empty cell, from where it sees a rock ahead, E O E. Q(E O E, left) = 4, so the
     # target is 0 + 0.5 * 4 and the value of forward 0 + 0.5 * 2.
@@ -235,46 +159,3 @@ def test_a_dying_ant_learns_from_what_it_sees_last_as_if_it_lived_on():
     assert (step.terminated, step.truncated) == (False, True)
     assert step.td_error == 2
     assert colony.q_values[0, FORWARD] == 1
-
-
-def test_a_dying_ant_draws_its_next_action_for_the_target():
-    world = World((5, 5, 5), (0, 0, 4), ants=[((0, 0, 0), 0)])
-    colony = begun(world, training("sarsa"), sharing="shared", lifespan=1)
-    stream = colony.ants[0].stream
-    act(colony, FORWARD)
-    assert colony.transitions[0].next_action is not None
-    assert n_draws(stream.state, stream_state(0, STREAM_ANT, 0)) == 1
-
-
-def test_the_stream_of_an_ant_goes_on_in_the_next_episode_though_it_died():
-    colony = begun(around(1, 4), training(epsilon=1.0), births=True, capacity=2, lifespan=2)
-    load(colony, 0)
-    act(colony, GIVE, GIVE)
-    colony.tick()  # one draw each, and both die
-    assert colony.ants == {}
-    colony.tick()
-    assert {slot: ant.number for slot, ant in colony.ants.items()} == {0: 2}
-    colony.tick()  # the born ant draws from its own stream
-    colony.end_episode()
-    colony.begin_episode()
-    for number in range(2):
-        state = colony.ants[number].stream.state
-        assert n_draws(state, stream_state(0, STREAM_ANT, number)) == 1
-
-
-def test_every_episode_starts_with_the_same_ants_in_the_same_places():
-    world = around(1, 4)
-    colony = begun(world, training(epsilon=1.0), ants=5, lifespan=7, births=True, seed=9)
-    first, ground, trail = copy.deepcopy((colony.ants, colony.world.ground, colony.world.trail))
-    for _ in range(10):
-        colony.tick()
-    assert colony.ants.keys() != first.keys()
-    colony.end_episode()
-    colony.begin_episode()
-    assert len(first) == 5
-    for slot, ant in first.items():
-        again = colony.ants[slot]
-        assert (again.number, again.cell, again.heading) == (ant.number, ant.cell, ant.heading)
-        assert (again.age, again.action, again.state) == (0, -1, ant.state)
-    assert colony.world.ground == ground
-    assert all(colony.world.trail.level(cell) == trail.level(cell) for cell in ground)

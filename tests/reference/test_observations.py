@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from colonies import act, begun, load, training
+from colonies import begun, load, training
 from random_worlds import random_world
 
-from taichi_ants.errors import AntsError
 from taichi_ants.reference import OBSERVATIONS, ReferenceColony
 from taichi_ants.reference.geometry import neighbour
-from taichi_ants.task import Pheromone, Task, observations
-from taichi_ants.task.constants import GIVE, LEFT
+from taichi_ants.task import Pheromone, observations
+from taichi_ants.task.constants import LEFT
 from taichi_ants.worlds import World
 
 # Around the ant from behind left on: a rock, a trail, food, nothing, a trail; behind it the queen.
@@ -106,12 +105,6 @@ def test_with_food_the_cells_behind_lure_if_they_are_nearer_to_the_queen(observa
     assert state_of(HOMEWARDS, observation, carries=True) == row
 
 
-def test_with_food_a_nearer_cell_is_a_strong_trail_and_the_queen_a_goal():
-    facing = HOMEWARDS.replace("0", "3")  # ahead down; to the right down left, to the left the rock
-    assert state_of(facing, "trail_levels", carries=True) == digits(6, 1, 1, 4, 4)
-    assert state_of(AROUND.replace("0", "3"), "trail_levels", carries=True) == digits(6, 1, 0, 5, 1)
-
-
 A = (0, 0, 0)
 FAR = (0, 0, 4)
 
@@ -155,13 +148,6 @@ def test_trails_in_thirds_of_the_strongest(levels, codes, pheromone):
         codes = (4, 3, 4)  # in float32 a third
     row = with_trails("trail_levels", (900, *levels), pheromone)
     assert row == digits(6, 0, *codes)
-
-
-def test_a_trail_on_food_is_food_and_counts_for_nothing():
-    foods = [neighbour(A, 0)]
-    trails = [(foods[0], 900), (neighbour(A, 1), 9), (neighbour(A, 2), 3)]
-    world = World((5, 5, 5), FAR, foods=foods, trails=trails, ants=[(A, 1)])
-    assert state_of(world, "trail_levels") == digits(6, 0, 5, 4, 3)
 
 
 # Ant 0 looks up at another one; beside that a rock and the end of the world.
@@ -222,14 +208,6 @@ def test_without_food_a_better_cell_has_a_stronger_trail_than_the_ants_own(level
     assert colony.ants[0].paper_state == 4  # what it can do goes by the paper's state
 
 
-def test_an_ant_that_has_just_died_is_not_seen():
-    colony = begun(CROWD, observation="ants_seen", lifespan=5)
-    colony.ants[0].age = 4
-    act(colony, GIVE, GIVE)
-    assert sorted(colony.ants) == [1]
-    assert colony.ants[1].state == digits(5, 0, 1, 0, 1)
-
-
 @pytest.mark.parametrize("name", OBSERVATIONS)
 def test_ants_choose_and_learn_by_the_row_and_act_by_the_paper_state(name):
     # Left is a trail. Greedy, the ant goes there by a table with one best value, in the row that
@@ -248,19 +226,6 @@ def test_ants_choose_and_learn_by_the_row_and_act_by_the_paper_state(name):
     assert learnt[step.state, LEFT] == 2.5  # 4 + 0.5 * (1 - 4)
 
 
-@pytest.mark.parametrize("sharing", ["shared", "independent", "frozen"])
-@pytest.mark.parametrize("name", OBSERVATIONS)
-def test_tables_have_as_many_rows_as_the_observation(name, sharing):
-    n_states = observations.get(name).n_states
-    for seed in range(6):
-        colony = ReferenceColony(
-            random_world(seed), Task(observation=name), training(epsilon=1.0), seed, sharing=sharing
-        )
-        assert colony.q_values.shape[-2:] == (n_states, 5)
-        rows = {step.next_state for [step] in colony.run_episode(30)}
-        assert max(rows) < n_states
-
-
 def test_each_observation_has_a_twin():
     own = [
         name
@@ -268,9 +233,3 @@ def test_each_observation_has_a_twin():
         if observations.get(name).encode.__module__.startswith("taichi_ants.")
     ]
     assert list(OBSERVATIONS) == own
-
-
-def test_an_observation_without_a_twin_is_refused(monkeypatch):
-    monkeypatch.delitem(OBSERVATIONS, "ants_seen")
-    with pytest.raises(AntsError, match=r"observation is 'ants_seen'.*paper, five_cells"):
-        state_of(AROUND, "ants_seen")

@@ -5,7 +5,6 @@ Learning rate and discount are 1/2 throughout.
 
 from __future__ import annotations
 
-import itertools
 from functools import partial
 
 import numpy as np
@@ -13,12 +12,11 @@ import pytest
 from colonies import GAMMA, act, begun, load, n_draws, training
 from transitions import transition
 
-from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.learners.config import update_weights
-from taichi_ants.reference import LEARNERS, ReferenceColony
+from taichi_ants.reference import LEARNERS
 from taichi_ants.reference.random_stream import RandomStream, stream_state
-from taichi_ants.reference.sharing import IndependentTables, SharedTable, mean_error
+from taichi_ants.reference.sharing import SharedTable, mean_error
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
 
@@ -54,21 +52,6 @@ def changed(minds):
     return {(int(s), int(a)): float(q_values[s, a]) for s, a in np.argwhere(q_values)}
 
 
-def test_one_error_counts_as_for_a_single_ant():
-    minds = shared()
-    step = transition(0, 1, 3, 5)
-    minds.learn([step], streams(1), 0.0)
-    assert step.td_error == 3
-    assert changed(minds) == {(0, 1): 1.5}
-
-
-def test_two_errors_of_one_pair():
-    # Errors 3 and -1: the mean 1, times 1 - 1/4.
-    minds = shared()
-    minds.learn([transition(0, 1, 3, 5), transition(0, 1, -1, 6, number=1)], streams(2), 0.0)
-    assert changed(minds) == {(0, 1): 0.75}
-
-
 def test_three_errors_of_one_pair_and_one_of_another():
     # Errors by the table as it was before: 3 + 4/2 - 2 = 3, -1 + 0 - 2 = -3, 10 - 2 = 8 (ended);
     # the mean 8/3 times 1 - 1/8; both in float32. The other pair: 1 + 2/2 - 4 = -2.
@@ -84,31 +67,6 @@ def test_three_errors_of_one_pair_and_one_of_another():
     mean = np.float32(8 / 3)
     value = np.float32(2) + np.float32(0.875) * mean
     assert changed(minds) == {(0, 1): float(value), (5, 0): 3.0}
-
-
-@pytest.mark.parametrize("n", [2, 3, 5, 8])
-def test_equal_errors_go_as_far_as_so_many_updates_in_turn(n):
-    # All towards one target that does not depend on the table: a terminal reward of 8.
-    minds = shared()
-    minds.learn(
-        [transition(0, 1, 8, 5, number=k, terminated=True) for k in range(n)], streams(n), 0.0
-    )
-    value = 0.0
-    for _ in range(n):
-        value += 0.5 * (8 - value)
-    assert changed(minds) == {(0, 1): value}
-
-
-def test_the_order_of_the_ants_does_not_matter():
-    # Three errors whose float32 sum would depend on it.
-    q_values = table(s1a0=0.1, s2a0=1e4, s3a0=-1e4, s0a1=1e-3)
-    ants = [transition(0, 1, 0, state, number=state) for state in (1, 2, 3)]
-    results = []
-    for order in itertools.permutations(ants):
-        minds = shared(q_values=q_values)
-        minds.learn(order, streams(3), 0.0)
-        results.append(minds.tables[0].table())
-    assert all((result == results[0]).all() for result in results)
 
 
 @pytest.mark.parametrize(
@@ -129,13 +87,6 @@ def test_the_sum_is_exact_in_units_of_two_to_the_minus_32(errors, mean):
     assert result == np.float32(mean)
 
 
-def test_a_sum_of_more_than_64_bits_is_refused():
-    assert mean_error([np.float32(2**30), np.float32(2**30 - 64)]) == np.float32(2**30)
-    with pytest.raises(AssertionError, match="64 bits"):
-        mean_error([np.float32(2**30), np.float32(2**30)])
-    assert mean_error([np.float32(-(2**30))] * 2) == -(2**30)
-
-
 def test_the_weights():
     weights = update_weights(0.1, 40)
     alpha = float(np.float32(0.1))
@@ -151,49 +102,8 @@ def test_the_weights():
     assert update_weights(0.3, 0).tolist() == [0]
 
 
-@pytest.mark.parametrize("alpha", [1e-30, 1e-12, 0.001, 0.1, 0.3, 0.5, 0.999, 1 - 2**-24, 1.0])
-def test_the_last_weight_is_that_of_all_larger_numbers(alpha):
-    rate = np.float64(np.float32(alpha))
-    n = np.arange(2, 100_000)
-    weights = update_weights(alpha, int(n[-1]))
-    assert len(weights) <= len(n) + 2
-    expected = (1 - (1 - rate) ** n).astype(np.float32)
-    assert np.array_equal(weights[np.minimum(n, len(weights) - 1)], expected)
-    if alpha >= 0.001:
-        assert len(weights) < 30 / alpha
-
-
 # In the world: two ants want one cell, both by (0, forward).
 MEETING = World((5, 5, 5), (0, 0, 4), ants=[((0, 0, 0), 0), ((2, 0, 0), 3)])
-
-
-def test_two_ants_that_meet_update_one_pair():
-    # The winner's reward is 0, the loser's -1: mean -1/2, times 3/4. All next values are 0.
-    colony = begun(MEETING, sharing="shared")
-    act(colony, FORWARD, FORWARD)
-    assert sorted(errors_of(colony)) == [-1, 0]
-    assert colony.q_values[0, FORWARD] == -0.375
-    assert np.count_nonzero(colony.q_values) == 1
-
-
-def test_with_own_tables_each_learns_its_own():
-    colony = begun(MEETING, sharing="independent", capacity=3)
-    act(colony, FORWARD, FORWARD)
-    tables = colony.q_values
-    assert tables.shape == (3, 128, 5)
-    loser = [ant.reward for ant in colony.ants.values()].index(-1)
-    assert tables[loser, 0, FORWARD] == -0.5
-    assert np.count_nonzero(tables) == 1
-
-
-def test_a_fixed_table_stays_as_it_is():
-    q_values = table(s0a1=1)
-    colony = begun(MEETING, sharing="frozen", q_values=q_values, seed=4)
-    for _ in range(3):
-        colony.tick()
-    np.testing.assert_array_equal(colony.q_values, q_values)
-    assert errors_of(colony) == [None, None]
-    assert len(colony.transitions) == 2
 
 
 @pytest.mark.parametrize(("learner", "n"), [("sarsa", 3), ("dyna_q", 3), ("q_learning", 3)])
@@ -220,27 +130,6 @@ def test_sarsa_chooses_by_the_table_before_the_update(learner, then):
     assert [step.next_action for step in colony.transitions] == [drawn] * 2
     colony.tick()
     assert [step.action for step in colony.transitions] == [then] * 2
-
-
-def test_sarsa_after_a_delivery():
-    # Absorbing: no a', no bootstrap, a fresh choice in the next tick. Continuing: a' is drawn and
-    # executed, though the ant has just delivered.
-    ready = World((5, 5, 5), (1, 0, 0), ants=[((0, 0, 0), 0)])
-    start = stream_state(0, STREAM_ANT, 0)
-    for delivery, error, draws in (("terminates", 10, 0), ("truncates", 12, 1)):
-        q_values = table(s4a1=4)  # what the ant sees after it gave: E O E
-        colony = begun(ready, training("sarsa"), "shared", q_values=q_values, delivery=delivery)
-        load(colony, 0)
-        act(colony, GIVE)
-        [step] = colony.transitions
-        assert step.next_state == 4
-        assert step.terminated == (delivery == "terminates")
-        assert step.next_action == (None if step.terminated else FORWARD)
-        assert errors_of(colony) == [error]
-        assert n_draws(colony.ants[0].stream.state, start) == draws
-        colony.tick()
-        assert colony.ants[0].action == FORWARD
-        assert n_draws(colony.ants[0].stream.state, start) == 2
 
 
 def entries(minds):
@@ -289,35 +178,6 @@ def test_a_round_of_planning_by_hand():
         assert [stream.state for stream in ants] == [rounds * GAMMA % 2**64] * 2
 
 
-def test_a_round_sees_the_table_as_it_stood_at_its_start():
-    # Two pairs that lead to each other's states: (0, 1) gives 8 and leads to state 1, (1, 0) gives
-    # 0 and leads to state 0. Real: Q(0,1) = 4, Q(1,0) = 0. The first draw of state 0 takes the
-    # second of two (0.883), that of state GAMMA the first (0.432).
-    minds = shared("dyna_q", planning_steps=1)
-    ants = [RandomStream(0), RandomStream(GAMMA)]
-    minds.learn([transition(0, 1, 8, 1), transition(1, 0, 0, 0, number=1)], ants, 0.0)
-    # (1, 0): error 0 + 4/2 - 0 = 2, so 1. (0, 1): error 8 + 0/2 - 4 = 4, so 6: Q(1, 0) was 0 still.
-    assert changed(minds) == {(0, 1): 6, (1, 0): 1}
-
-
-def test_own_tables_plan_each_from_its_own_model():
-    minds = IndependentTables(maker("dyna_q", planning_steps=2), 3, None)
-    ants = streams(2)
-    minds.learn(
-        [
-            transition(0, 1, 8, 5, slot=0, terminated=True),
-            transition(2, 2, 4, 5, slot=2, terminated=True),
-        ],
-        ants,
-        0.0,
-    )
-    assert [list(mind.model) for mind in minds.tables] == [[(0, 1)], [], [(2, 2)]]
-    # Three updates each: 1 - 1/8.
-    assert minds.tables[0].table()[0, 1] == 7
-    assert minds.tables[2].table()[2, 2] == 3.5
-    assert not minds.tables[1].table().any()
-
-
 def test_an_ant_born_into_a_slot_begins_with_nothing():
     # The second ant dies; the first gives twice, so that slots 2 and then 1 are taken.
     queen = (0, 0, 0)
@@ -347,85 +207,3 @@ def test_an_ant_born_into_a_slot_begins_with_nothing():
     colony.end_episode()
     colony.begin_episode()
     np.testing.assert_array_equal(colony.q_values, tables)
-
-
-def test_tables_and_models_live_through_the_episodes_and_epsilon_decays():
-    learning = training("dyna_q", epsilon=0.8, epsilon_decay=0.5, min_epsilon=0.3)
-    colony = ReferenceColony(MEETING, None, learning, 5, ants=4)
-    epsilons, sizes = [], []
-    for _ in range(3):
-        epsilons.append(colony.epsilon)
-        colony.run(1, 20)
-        sizes.append(len(colony.minds.tables[0].model))
-    assert epsilons == [0.8, 0.4, 0.3]
-    assert 0 < sizes[0] <= sizes[1] <= sizes[2]
-    assert [record.ticks for record in colony.records] == [20] * 3
-    # Two halves are a whole.
-    again = ReferenceColony(MEETING, None, learning, 5, ants=4)
-    again.run(3, 20)
-    assert again.records == colony.records
-    assert entries(again.minds) == entries(colony.minds)
-
-
-def test_with_own_tables_an_ant_far_from_others_is_an_ant_alone():
-    # Two ants shut in two rooms each run as each would alone in its world with its stream.
-    rocks = [(0, y, 0) for y in range(4)] + [(0, 0, z) for z in range(1, 4)]
-    world = World((4, 4, 4), (1, 0, 0), obstacles=rocks, ants=[((2, 0, 0), 0), ((0, 3, 3), 0)])
-    alone = World((4, 4, 4), (1, 0, 0), obstacles=rocks, ants=[((2, 0, 0), 0)])
-    learning = training("sarsa", epsilon=0.5)
-    runs = []
-    for place, n in ((world, 2), (alone, 1)):
-        colony = ReferenceColony(place, None, learning, 8, ants=n, sharing="independent")
-        colony.run(2, 60)
-        runs.append(colony)
-    np.testing.assert_array_equal(runs[0].q_values[0], runs[1].q_values[0])
-    assert runs[0].ants[0] == runs[1].ants[0]
-
-
-def test_a_table_for_each_slot_may_be_given():
-    each = np.arange(2 * 640, dtype=np.float32).reshape(2, 128, 5)
-    colony = ReferenceColony(
-        MEETING, None, training(), 0, ants=2, sharing="independent", q_values=each
-    )
-    np.testing.assert_array_equal(colony.q_values, each)
-
-
-@pytest.mark.parametrize(
-    ("sharing", "learner", "message"),
-    [
-        ("common", "q_learning", "'common'.*shared, independent, frozen"),
-        ("independent", "sarsi", "'sarsi'"),
-    ],
-)
-def test_unknown_names_are_refused(sharing, learner, message):
-    with pytest.raises(AntsError, match=message):
-        ReferenceColony(MEETING, None, training(learner), 0, ants=2, sharing=sharing)
-
-
-@pytest.mark.parametrize("learner", [name for name in LEARNERS if not LEARNERS[name].shares])
-def test_learners_with_a_memory_of_their_own_cannot_share_a_table(learner):
-    with pytest.raises(AntsError, match=f"'{learner}'.*independent"):
-        begun(MEETING, training(learner), "shared")
-    colony = begun(MEETING, training(learner), "independent")
-    for _ in range(3):
-        colony.tick()
-    assert colony.q_values.shape == (2, 128, 5)
-
-
-def test_learners_of_a_td_error_share_a_table():
-    sharing = [name for name in LEARNERS if LEARNERS[name].shares]
-    assert sharing == ["q_learning", "sarsa", "expected_sarsa", "dyna_q"]
-
-
-def test_more_ants_than_cells_are_refused():
-    with pytest.raises(AntsError, match="n is 61"):
-        ReferenceColony(MEETING, None, training(), 0, ants=61)
-    assert len(begun(MEETING, ants=60).ants) == 60
-
-
-def test_failed_deeds_count_once_and_only_moves_can_be_blocked():
-    colony = begun(MEETING)
-    act(colony, LEFT, PICK_UP)
-    act(colony, GIVE, PICK_UP)
-    assert (colony.record.moves, colony.record.blocked) == (1, 0)
-    assert colony.record.episode_return == -3

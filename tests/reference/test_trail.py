@@ -5,9 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from colonies import act, begun, load
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from random_worlds import random_world
 
 from taichi_ants.reference.geometry import existing_cells, neighbour
 from taichi_ants.reference.world_state import Trail
@@ -29,14 +26,6 @@ def after(trail, ticks):
     return trail
 
 
-def test_levels_are_integers_only_where_they_fall_by_one_or_stay():
-    for evaporation in ("linear", "exponential", "none"):
-        for diffusion in (0.0, 0.1):
-            level = Trail(plain_world(), Pheromone(evaporation, diffusion=diffusion)).level(MIDDLE)
-            dense = evaporation == "exponential" or diffusion > 0
-            assert isinstance(level, np.float32 if dense else np.integer)
-
-
 @pytest.mark.parametrize("diffusion", [0.0, 1e-9])
 def test_linear_evaporation(diffusion):
     trail = Trail(plain_world(level=3), Pheromone(diffusion=diffusion))
@@ -45,11 +34,6 @@ def test_linear_evaporation(diffusion):
         levels.append(float(trail.level(MIDDLE)))
         trail.tick()
     assert levels == pytest.approx([3, 2, 1, 0, 0], abs=1e-6)
-
-
-def test_without_evaporation_levels_stay():
-    trail = after(Trail(plain_world(level=3), Pheromone("none")), 100)
-    assert trail.level(MIDDLE) == 3
 
 
 @pytest.mark.parametrize("half_life", [1, 7.5, 50])
@@ -94,23 +78,6 @@ def test_what_is_aimed_out_of_the_world_stays():
     assert around == [0, 0, 96, 96, 96, 0]
 
 
-def test_food_and_queen_are_no_walls():
-    queen, food = neighbour(MIDDLE, 0), neighbour(MIDDLE, 3)
-    world = World((5, 5, 5), queen, foods=[food], trails=[(MIDDLE, 768)])
-    trail = after(Trail(world, Pheromone("none", diffusion=0.75)), 1)
-    assert float(trail.level(queen)) == float(trail.level(food)) == 96
-
-
-def test_evaporation_comes_before_diffusion():
-    # Linear: 769 falls to 768 first. Exponential with half-life 1: 1536 falls to 768.
-    for pheromone, level in (
-        (Pheromone("linear", diffusion=0.75), 769),
-        (Pheromone("exponential", 1, diffusion=0.75), 1536),
-    ):
-        trail = after(Trail(plain_world(level), pheromone), 1)
-        assert float(trail.level(neighbour(MIDDLE, 2))) == 96
-
-
 def test_a_level_below_one_that_was_spread_lasts_until_the_next_evaporation():
     # 8 falls to 4, of which 0.5 goes to each neighbour and 1 stays; all that halves to below 1.
     trail = after(Trail(plain_world(8), Pheromone("exponential", 1, diffusion=0.75)), 1)
@@ -120,28 +87,6 @@ def test_a_level_below_one_that_was_spread_lasts_until_the_next_evaporation():
 
 def total(trail, world):
     return sum(float(trail.level(cell)) for cell in existing_cells(world.ranges))
-
-
-@given(st.integers(0, 2**32 - 1), st.floats(0.01, 1.0))
-@settings(max_examples=50, deadline=None, derandomize=True)
-def test_diffusion_conserves_the_sum(seed, rate):
-    world = random_world(seed)
-    trail = Trail(world, Pheromone("none", diffusion=rate))
-    at_start = total(trail, world)
-    assert at_start == sum(world.trails[:, 3].tolist())
-    assert total(after(trail, 30), world) == pytest.approx(at_start, rel=1e-5, abs=1e-5)
-
-
-def test_diffusion_ends_in_evenness():
-    # Shares are the same both ways, so an even level is what stays, rocks and edges or not.
-    world = plain_world(level=6100, obstacles=[(1, 0, 0), (0, 3, 0)])
-    trail = after(Trail(world, Pheromone("none", diffusion=0.9)), 400)
-    open_cells = [
-        cell for cell in existing_cells(world.ranges) if cell not in [(1, 0, 0), (0, 3, 0)]
-    ]
-    assert len(open_cells) == 61 - 2
-    levels = [float(trail.level(cell)) for cell in open_cells]
-    assert levels == pytest.approx([6100 / 59] * 59, rel=1e-4)
 
 
 @pytest.mark.parametrize("rate", [0.3, 1.0])
@@ -208,34 +153,6 @@ def test_the_deposit_of_a_carrying_ant(pheromone, bare, trodden):
     assert colony.world.trail.level(second) == trodden
 
 
-def test_an_ant_that_does_not_move_or_does_not_carry_lays_nothing():
-    colony = begun(LANE)
-    act(colony, FORWARD)
-    load(colony, 0)
-    act(colony, GIVE)
-    assert {colony.world.trail.level(cell) for cell in colony.world.ground} == {0, 598}
-
-
-@pytest.mark.parametrize(
-    ("pheromone", "level"),
-    [
-        (Pheromone(), 249),
-        (Pheromone(deposit="add", level=4), 13),  # 10 + 4 - 1
-        (Pheromone("exponential", 1, deposit="add", level=4), 7),  # (10 + 4) / 2
-        (Pheromone(deposit="none"), 9),
-    ],
-)
-def test_picking_up_lays_a_trail_on_both_cells(pheromone, level):
-    cells = [(0, 0, 0), (1, 1, 0)]
-    world = World(
-        (3, 3, 3), (0, 0, 2), foods=cells[1:], trails=[(c, 10) for c in cells], ants=[(cells[0], 1)]
-    )
-    colony = begun(world, pheromone=pheromone)
-    act(colony, PICK_UP)
-    assert colony.ants[0].carries
-    assert [float(colony.world.trail.level(cell)) for cell in cells] == [level, level]
-
-
 def test_the_first_observation_sees_the_start_undiminished_and_the_next_a_tick_later():
     # Levels 1 and 2 to the left and to the right: seen E E T, then 0 and 1, and nothing at last.
     cells = [(neighbour(MIDDLE, 0), 1), (neighbour(MIDDLE, 2), 2)]
@@ -286,20 +203,6 @@ def test_trails_that_fade_rise_towards_the_food(pheromone, levels):
     act(colony, FORWARD)
     act(colony, FORWARD)
     assert [float(colony.world.trail.level(cell)) for cell in cells] == list(levels)
-
-
-def test_a_fading_deposit_lowers_no_trail():
-    colony = begun(
-        "trail = 900\n" + FADING.replace(".", "t"),
-        pheromone=Pheromone("none", deposit="fading", level=500),
-    )
-    first = colony.ants[0].cell
-    act(colony, PICK_UP)
-    act(colony, FORWARD)
-    assert [colony.world.trail.level(first), colony.world.trail.level(neighbour(first, 3))] == [
-        500,
-        900,
-    ]
 
 
 # An ant below food; below it two free cells, and the queen beside them.

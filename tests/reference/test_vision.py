@@ -69,16 +69,6 @@ def test_a_trail_is_seen_from_half_of_the_strongest_in_view(levels, state):
     assert sees(trails=list(zip((L, M, R), levels, strict=True))) == state
 
 
-def test_trails_behind_the_ant_and_under_it_do_not_count():
-    assert sees(trails=[(A, 900), ((0, 0, 1), 900), (M, 1)]) == 8
-
-
-def test_only_empty_cells_count_for_the_strongest_trail():
-    # The food's 100 and the queen's 100 are not compared with: F T E and O T E.
-    assert sees(foods=[L], trails=[(L, 100), (M, 1)]) == 48 + 8
-    assert sees(queen=L, trails=[(L, 100), (M, 1)]) == 16 + 8
-
-
 def test_outside_the_world_there_are_obstacles():
     # From (4, 0, 0), heading 0: (5, 0, 1), (5, 0, 0), (5, 1, 0), none of which exists.
     assert sees(cell=(4, 0, 0), heading=0) == 21
@@ -105,19 +95,6 @@ def test_outside_the_world_there_are_obstacles():
 )
 def test_with_food(queen, state):
     assert sees(carries=True, queen=queen) == state
-
-
-def test_with_food_an_obstacle_on_the_way_home_looks_o():
-    assert sees(carries=True, queen=(4, 2, 0), obstacles=[L]) == 64 + 16 + 8  # O S E
-
-
-def test_with_food_other_food_looks_o():
-    assert sees(carries=True, foods=[M]) == 64 + 4
-    assert sees(carries=True, queen=(4, 2, 0), foods=[L]) == 64 + 16 + 8
-
-
-def test_with_food_trails_are_not_seen():
-    assert sees(carries=True, trails=[(M, 250)]) == 64
 
 
 @pytest.mark.parametrize(

@@ -51,7 +51,6 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong)),
     ],
     "Snapshot": [("snapshot", lambda wrong: Scene(WORLD.grid).draw(wrong))],
-    "Checkpoint": [("a checkpoint", lambda wrong: next(rendering.learning_frames([wrong])))],
     "Status": [("status", lambda wrong: Scene(WORLD.grid).draw(at_start(WORLD), wrong))],
     "at_start": [("world", of(at_start))],
     "picture": [
@@ -76,16 +75,6 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("status", lambda wrong: next(rendering.frames([(at_start(WORLD), wrong)]))),
         ("size", lambda wrong: next(rendering.frames(episode().snapshots(), wrong))),
     ],
-    "learning_frames": [
-        ("checkpoints", of(rendering.learning_frames)),
-        ("title", lambda wrong: next(rendering.learning_frames([checkpoint()], title=wrong))),
-    ],
-    "learning_checkpoints": [("checkpoints", lambda wrong: learning_checkpoints(wrong))],
-    "policy_sheet": [
-        ("q_values", of(rendering.policy_sheet)),
-        ("title", lambda wrong: rendering.policy_sheet(TABLE, wrong)),
-        ("task", lambda wrong: rendering.policy_sheet(TABLE, task=wrong)),
-    ],
     "save_animation": [
         ("path", of(rendering.save_animation, [FRAME], 8)),
         ("frames", lambda wrong: rendering.save_animation("a.gif", wrong, 8)),
@@ -95,19 +84,7 @@ CALLS: dict[str, list[tuple[str, Callable[[object], object]]]] = {
         ("path", of(rendering.save_picture, FRAME)),
         ("a frame", lambda wrong: rendering.save_picture("a.png", wrong)),
     ],
-    "typical_seed": [
-        ("checkpoints", lambda wrong: rendering.typical_seed(WORLD, CONFIG, checkpoints=wrong)),
-        ("a seed", lambda wrong: rendering.typical_seed(WORLD, CONFIG, seeds=wrong)),
-    ],
 }
-
-
-def checkpoint() -> rendering.Checkpoint:
-    return rendering.Checkpoint(0, episode())
-
-
-def learning_checkpoints(wrong: object) -> object:
-    return rendering.learning_checkpoints(WORLD, CONFIG, checkpoints=wrong)
 
 
 def test_all_that_is_public_is_tried() -> None:

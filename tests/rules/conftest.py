@@ -9,11 +9,11 @@ import pytest
 
 from taichi_ants.rules import registry
 
-registry._RULES.clear()
+registry.RULES.yours.clear()
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _registered():
     importlib.reload(own_rules)
     yield
-    registry._RULES.clear()
+    registry.RULES.yours.clear()

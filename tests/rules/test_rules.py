@@ -34,7 +34,7 @@ from taichi_ants.testing import check_observation, check_rule
 @pytest.fixture
 def clean(monkeypatch):
     """Forget the rules that a test registers."""
-    monkeypatch.setattr(registry, "_RULES", dict(registry._RULES))
+    monkeypatch.setattr(registry.RULES, "yours", dict(registry.RULES.yours))
 
 
 def test_a_task_names_rules_and_their_parameters():
@@ -488,7 +488,7 @@ def test_a_colony_file_keeps_the_rule(tmp_path, clean):
     colony.begin_episode()
     colony.save(tmp_path / "colony.npz")
     assert Colony.load(tmp_path / "colony.npz") == colony
-    del registry._RULES["weber"]
+    del registry.RULES.yours["weber"]
     with pytest.raises(AntsError, match="weber"):
         Colony.load(tmp_path / "colony.npz")
 
@@ -518,7 +518,7 @@ def test_twins_are_asked_for_all_levels_that_occur_and_named_if_they_fail(clean)
     rules.register("evaporation", reference=fails_at_large)(same)
     says = "its Python function fails (KeyError: 'a twin') for level="
     assert check_rule("same").difference.startswith(says)
-    registry._RULES["same"] = replace(rules.get("same"), reference=differs_in_places)
+    registry.RULES.yours["same"] = replace(rules.get("same"), reference=differs_in_places)
     assert "but its Python function 0.0" in check_rule("same").difference
 
 
@@ -548,7 +548,7 @@ def homely(view):
 
 
 def test_an_observation_is_compared_with_the_reference(monkeypatch):
-    monkeypatch.setattr(seen, "_OBSERVATIONS", dict(seen._OBSERVATIONS))
+    monkeypatch.setattr(seen.OBSERVATIONS, "yours", dict(seen.OBSERVATIONS.yours))
     observations.register(Observation("homely", 256, homely, reads=("B", "trail")))
     check = check_observation("homely")
     assert str(check) == "homely (reads the fields B and trail): 360 ticks of 6 colonies: equal"

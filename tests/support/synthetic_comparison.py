@@ -24,7 +24,7 @@ from paper.comparison import (
 from paper.figures import curves_of
 
 from taichi_ants.analysis.behaviour import DELIVERS, WALKS
-from taichi_ants.measures.runs import measures_of_runs
+from taichi_ants.measures.finished import Run, values_of
 
 EARLY = 50  # number of early episodes
 EPISODES = ("returns", "steps", "deliveries")
@@ -170,7 +170,7 @@ def comparison_of(arrays: dict[str, np.ndarray], rows: tuple[Row, ...], **fields
 
 def remeasured(made: Made) -> Made:
     """Return a comparison with measures and learning curves recomputed from its episodes."""
-    made = replace(made, measures=measures_of_runs(made.arrays))
+    made = replace(made, measures=values_of(Run.of_lone_ant(made.arrays)))
     each = ({n: made.arrays[n][row] for n in EPISODES} for row in range(len(made.rows)))
     return replace(made, curves=curves_of(made, enumerate(each)))
 

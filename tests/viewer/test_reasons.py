@@ -61,7 +61,7 @@ STORIES = """() => viewer.history.frames.flatMap((frame, moment) =>
 def _registered():
     rules.register("choice")(straight)
     yield
-    del registry._RULES["straight"]
+    del registry.RULES.yours["straight"]
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from taichi_ants.worlds import World, registry
 
 @pytest.fixture(autouse=True)
 def _own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_BUILDERS", dict(registry._BUILDERS))
+    monkeypatch.setattr(registry.WORLDS, "yours", dict(registry.WORLDS.yours))
 
 
 def tiny(seed: int) -> World:
@@ -87,7 +87,7 @@ def test_unknown_names_list_the_known_ones(name: object) -> None:
 
 @pytest.mark.parametrize("path", ["maps/none", "none.txt", Path("none")])
 def test_missing_files_are_named(path: object) -> None:
-    with pytest.raises(AntsError, match=f"no world named '{path}' and no such file"):
+    with pytest.raises(AntsError, match=f"no world '{path}'.*; .* path of a map file that exists"):
         worlds.build(path)
 
 

@@ -64,10 +64,10 @@ class ColonyEpisodes(Record, Tidy):
             episodes, worlds = (one.ravel().astype(np.int32) for one in np.indices(shape))
             ticks = self.ticks.ravel()
             values = {name: array.ravel() for name, array in self.counts().items()}
-            usual: tuple[str, ...] = ("deliveries",)
+            plotted: tuple[str, ...] = ("deliveries",)
         else:
             worlds, episodes, ticks = series.worlds, series.episodes, series.ticks
-            values, usual = dict(series.values), tuple(series.values)
+            values, plotted = dict(series.values), tuple(series.values)
         seeds = seed_array(self.seeds)[worlds]
         index = {"world": worlds, "seed": seeds, "episode": episodes, "tick": ticks}
         return Measured(
@@ -76,6 +76,6 @@ class ColonyEpisodes(Record, Tidy):
             of_seed=worlds,
             of_group=np.zeros(len(worlds), np.int32),
             seeds=self.seeds,
-            usual=usual,
+            plotted=plotted,
             units={} if series is None else dict(series.units),
         )

@@ -412,19 +412,21 @@ class ColonyState:
     def outcome(self) -> ColonyEpisodes:
         """Return the results of the episode so far, arrays (1, W), after `check_finite`."""
         self.check_finite()
+        arrays = {**self._counts(), **self._deliveries_apart()}
+        counts: dict[str, Any] = {name: array[None].copy() for name, array in arrays.items()}
+        return ColonyEpisodes(**counts, seeds=self.seeds)
+
+    def _deliveries_apart(self) -> Arrays:
+        """Return deliveries by nest and kind of food, and by caste: int32 (W, ...)."""
         if self.n_nests * self.n_kinds == 1:
             apart = self.deliveries.astype(np.int32)
         else:
             apart = self.arrays["deliveries_by_nest_and_kind"]
-        apart = apart.reshape(-1, self.n_nests, self.n_kinds)
         by_caste = self.arrays.get("caste_deliveries", self.deliveries.astype(np.int32))
-        every = {
-            **self._counts(),
-            "deliveries_by_nest_and_kind": apart,
+        return {
+            "deliveries_by_nest_and_kind": apart.reshape(-1, self.n_nests, self.n_kinds),
             "caste_deliveries": by_caste.reshape(len(self.seeds), -1),
         }
-        counts: dict[str, Any] = {name: one[None].copy() for name, one in every.items()}
-        return ColonyEpisodes(**counts, seeds=self.seeds)
 
     def _counts(self) -> Arrays:
         """Return the counts of the episode (W,), by their names in `ColonyEpisodes`."""
@@ -451,6 +453,15 @@ class ColonyState:
             of_ants = self.arrays["kind"].reshape(self.cells.shape)[world, living].astype(np.int32)
             of_cells = np.where(ground == FOOD, self.arrays["kind_of"][cells], np.uint8(0))
         queens = self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)[world]
+        counts: dict[str, Any] = {n: int(array[world]) for n, array in self._counts().items()}
+        apart = self._deliveries_apart()
+        counts["nest_deliveries"] = apart["deliveries_by_nest_and_kind"][world].sum(
+            axis=1, dtype=np.int32
+        )
+        counts["food_deliveries"] = apart["deliveries_by_nest_and_kind"][world].sum(
+            axis=0, dtype=np.int32
+        )
+        counts["caste_deliveries"] = apart["caste_deliveries"][world].copy()
         return Snapshot(
             self.grid,
             ground,
@@ -470,7 +481,7 @@ class ColonyState:
             ant_idle=self.idle[world, living],
             ant_thresholds=self.thresholds[world, living],
             fields=fields,
-            counts={name: int(array[world]) for name, array in self._counts().items()},
+            counts=counts,
             world=self.worlds[world],
         )
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import learners
+from taichi_ants import learners, measures
 from taichi_ants.arguments import checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES, padded
 from taichi_ants.engines.records import Record
@@ -19,6 +19,7 @@ from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Memory
+from taichi_ants.measures.finished import counts_of_lone_ant, of_lone_ants
 from taichi_ants.measures.tidy import Measured, Tidy, seed_array
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
@@ -249,28 +250,25 @@ def _measured(
     arrays: dict[str, np.ndarray], seeds: tuple[int, ...], groups: tuple[str, ...]
 ) -> Measured:
     """Return the measures of lone ants from arrays (configurations, seeds, episodes) by name."""
-    steps, deliveries = arrays["steps"].ravel(), arrays["deliveries"].ravel()
     configurations, places, episodes = (
-        one.ravel().astype(np.int32) for one in np.indices(arrays["steps"].shape)
+        numbers.ravel().astype(np.int32) for numbers in np.indices(arrays["steps"].shape)
     )
+    values = {name: array.ravel() for name, array in arrays.items()}
+    read = of_lone_ants(counts_of_lone_ant(values))
     return Measured(
         index={
             "configuration": configurations,
             "seed": seed_array(seeds)[places],
             "episode": episodes,
-            "tick": steps,
+            "tick": values["steps"],
         },
-        values={
-            **{name: array.ravel() for name, array in arrays.items()},
-            "first_delivery": steps,  # an episode ends at its first delivery, or without one
-            "efficiency": deliveries / steps,
-        },
+        values={**values, **read},
         of_seed=places,
         of_group=configurations,
         seeds=seeds,
         groups=groups,
-        usual=("returns", "deliveries", "steps"),
-        units={"steps": "ticks", "first_delivery": "ticks", "efficiency": "per ant and tick"},
+        plotted=("returns", "deliveries", "steps"),
+        units={"steps": "ticks", **{name: measures.get(name).unit for name in read}},
     )
 
 

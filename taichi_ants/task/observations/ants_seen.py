@@ -1,6 +1,6 @@
 """The three cells ahead; ants differ from rocks."""
 
-from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.observations.observation import Observation
 from taichi_ants.task.states import name_of_codes
 
 

@@ -1,6 +1,6 @@
 """The observation of the paper's ants: the three cells ahead, four codes each."""
 
-from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.observations.observation import Observation
 from taichi_ants.task.states import state_name
 
 

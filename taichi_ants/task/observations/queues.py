@@ -1,6 +1,6 @@
 """The three cells ahead; ants differ from rocks, and ants worth following from other ants."""
 
-from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.observations.observation import Observation
 from taichi_ants.task.states import name_of_codes
 
 

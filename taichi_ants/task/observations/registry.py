@@ -1,36 +1,33 @@
 """The registry of observations.
 
-An observation determines the state index of an ant. Actions and rewards do not depend on it, but
-on the paper's state. To add an observation to the package, write a file in this folder
-and add it to `__init__.py`. To add your own observation, call `register` from a plugin file.
+To add one to the package, write a file in this folder and add it to `BUILT_IN`. To add your own
+observation, call `register` from a plugin file.
 """
 
 from __future__ import annotations
 
-import ast
 import inspect
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from textwrap import dedent
-from types import SimpleNamespace
-from typing import Any
 
-from taichi_ants.errors import (
-    AntsError,
-    check_new_name,
-    checked_whole,
-    expect,
-    shown,
-    unusable,
-    whole,
-)
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN, SEES_CUE
+from taichi_ants.errors import AntsError, checked_whole, expect, shown
+from taichi_ants.task.observations.ants import ANTS
+from taichi_ants.task.observations.ants_seen import ANTS_SEEN
+from taichi_ants.task.observations.five_cells import FIVE_CELLS
+from taichi_ants.task.observations.observation import AHEAD, OBSERVATIONS, Observation
+from taichi_ants.task.observations.paper import PAPER
+from taichi_ants.task.observations.queues import QUEUES
+from taichi_ants.task.observations.six_cells import SIX_CELLS
+from taichi_ants.task.observations.trail_levels import TRAIL_LEVELS
+from taichi_ants.task.observations.trial import try_in_python
+
+BUILT_IN = (PAPER, FIVE_CELLS, SIX_CELLS, TRAIL_LEVELS, ANTS_SEEN, ANTS, QUEUES)
+OBSERVATIONS.built_in = {observation.name: observation for observation in BUILT_IN}
+get, names = OBSERVATIONS.get, OBSERVATIONS.names
 
 # Tables of this many rows have 5 * 2**20 values; kernels index several tables with 32 bits.
 MAX_STATES = 1 << 20
-AHEAD = (-1, 0, 1)
-_VIEW = (
+# Names of a view, and of the methods of a view in kernels.
+_OF_VIEWS = (
     *(
         "carries",
         "paper_state",
@@ -41,75 +38,8 @@ _VIEW = (
         "nearer",
         "strongest",
     ),
-    "own_level",
+    *("own_level", "entries", "keys", "items"),
 )
-_TAKEN = (*_VIEW, "entries", "keys", "items")  # methods of a view in kernels
-_VIEWS = 3000  # the number of views, and of names of states, that a check tries
-
-
-@dataclass(frozen=True)
-class Observation:
-    """A mapping from the view of an ant to a state index.
-
-    The view of an ant has these whole numbers, except that levels are floats if trails evaporate
-    exponentially or spread. Those marked (k) have an entry for each cell in `cells`.
-
-    - `carries`: 1 with food, else 0; `paper_state`: the paper's state, 0 to 127.
-    - `codes` (k): 0 E, 1 O, 2 T or S, 3 F or Q, relative to the strongest trail ahead.
-    - `levels` (k): The trail level if the cell is empty or has an ant on it, else 0.
-    - `ants` (k): 0 for no ant, 1 for an ant without food, 2 for an ant with food.
-    - `other_nest_ants` (k): 1 if an ant of another nest is on the cell, where `ants` is 0.
-    - `nearer` (k): 1 if the cell is nearer to the queen than the ant's own.
-    - `strongest`: The level of the strongest trail ahead; `own_level`: the ant's own cell.
-    - `NAME` (k), for each NAME in `reads`: The level of this field, like `levels`; `own_NAME`: that
-      of the ant's own cell.
-
-    Trails and levels are those of the task's outbound cue. If the homing cue is a pheromone, those
-    of ants with food are its levels, and `nearer` is 1 if the level exceeds `own_level`.
-
-    Attributes:
-        name: The name that tasks use.
-        n_states: The number of states, at least 1.
-        encode: A function of the view that returns the state index, from 0 to n_states - 1. It is
-            compiled for the kernels. It computes with whole numbers: arithmetic, comparisons, `if`,
-            `for` over a `range`, `min`, `max` and `abs`. Its only `return` is its last line.
-        reads: The names of fields to read, or "trail"; the task must have these fields.
-        cells: The cells in view, as headings relative to the ant's, each from -2 to 3. They must
-            include -1, 0 and 1, the cells ahead.
-        name_of: A function that returns the name of a state for people.
-        summary: A line for listings.
-        letters: The meaning of letters in names other than the paper's E, O, T, S, F and Q.
-        shape: The number of values of each part of a state index, if it has several parts.
-            Environments show neural networks each part.
-    """
-
-    name: str
-    n_states: int
-    encode: Callable[[Any], int]
-    cells: tuple[int, ...] = AHEAD
-    name_of: Callable[[int], str] = str
-    summary: str = ""
-    letters: str = ""
-    shape: tuple[int, ...] = ()
-    reads: tuple[str, ...] = ()
-
-    def __reduce__(self) -> Any:
-        # A pickle holds only the name, because reading it requires the registered observation.
-        registered = _OBSERVATIONS.get(self.name) is self
-        return (get, (self.name,)) if registered else object.__reduce_ex__(self, 2)
-
-    @property
-    def parts(self) -> tuple[int, ...]:
-        """The number of values of each part of a state index: `shape`, or (n_states,)."""
-        return self.shape or (self.n_states,)
-
-    @property
-    def ahead(self) -> tuple[int, ...]:
-        """The indices in `cells` of the cells left, forward and right."""
-        return tuple(self.cells.index(cell) for cell in AHEAD)
-
-
-_OBSERVATIONS: dict[str, Observation] = {}
 
 
 def register(observation: Observation) -> Observation:
@@ -119,11 +49,11 @@ def register(observation: Observation) -> Observation:
     does not have the right form, or a state index is outside its range.
     """
     expect("observation", observation, Observation)
-    name = observation.name
-    check_new_name("observation", name, (one for one in _OBSERVATIONS if _is_built_in(one)))
-    expect(f"letters of {name!r}", observation.letters, str)
+    name, encode, cells = observation.name, observation.encode, observation.cells
+    OBSERVATIONS.check_new(name)
+    for text in ("letters", "summary"):
+        expect(f"{text} of {name!r}", getattr(observation, text), str)
     checked_whole(f"n_states of {name!r}", observation.n_states, 1, MAX_STATES)
-    encode, cells = observation.encode, observation.cells
     # Kernels cannot compile lambdas.
     named = inspect.isfunction(encode) and encode.__name__ != "<lambda>"
     if not named or len(inspect.signature(encode).parameters) != 1:
@@ -137,133 +67,28 @@ def register(observation: Observation) -> Observation:
             f"cells of {name!r} is {shown(cells)}; it must be a tuple of -1, 0, 1, and optionally "
             "-2, 2 and 3, each once."
         )
-    expect(f"summary of {name!r}", observation.summary, str)
     _check_reads(observation)
     shape = observation.shape
     expect(f"shape of {name!r}", shape, tuple)
-    if shape and math.prod(checked_whole(f"shape of {name!r}", n) for n in shape) != (
-        observation.n_states
-    ):
+    lengths = [checked_whole(f"shape of {name!r}", length) for length in shape]
+    if shape and math.prod(lengths) != observation.n_states:
         raise AntsError(
             f"shape of {name!r} is {shape}, whose product is not its n_states, "
             f"{observation.n_states}; correct one of them."
         )
-    if not encode.__module__.startswith("taichi_ants."):
-        _try_functions(observation)
-    _OBSERVATIONS[name] = observation
-    return observation
+    try_in_python(observation)
+    return OBSERVATIONS.add(name, observation)
 
 
 def _check_reads(observation: Observation) -> None:
     reads = observation.reads
     expect(f"reads of {observation.name!r}", reads, tuple)
-    taken = {*_TAKEN, *(f"own_{name}" for name in reads if isinstance(name, str))}
+    taken = {*_OF_VIEWS, *(f"own_{name}" for name in reads if isinstance(name, str))}
     for name in reads:
-        if not isinstance(name, str) or not name.isidentifier() or name in taken:
+        is_word = isinstance(name, str) and name.isidentifier()
+        if not is_word or name in taken or f"own_{name}" in _OF_VIEWS:
             raise AntsError(
                 f"reads of {observation.name!r} contains {shown(name)}; it must contain names of "
-                "fields, each once, other than the names in a view."
-            )
-        if f"own_{name}" in _TAKEN:
-            raise AntsError(
-                f"reads of {observation.name!r} contains {name!r}, but `own_{name}` of a view has "
-                "another meaning; rename the field."
+                f"fields, each once, and neither they nor own_NAME can be names in a view."
             )
         taken.add(name)
-
-
-def _is_built_in(name: str) -> bool:
-    return _OBSERVATIONS[name].encode.__module__.startswith("taichi_ants.")
-
-
-def get(name: str) -> Observation:
-    """Return the observation of this name; AntsError, with a list of all names, if none exists."""
-    if not isinstance(name, str) or name not in _OBSERVATIONS:
-        raise AntsError(
-            f"there is no observation {shown(name)}; choose one of {', '.join(names())}, or give "
-            "the file that registers it with --plugin."
-        )
-    return _OBSERVATIONS[name]
-
-
-def names() -> tuple[str, ...]:
-    """Return the names of all registered observations, in the order of registration."""
-    return tuple(_OBSERVATIONS)
-
-
-def _try_functions(observation: Observation) -> None:
-    """Compute and name many states in Python, because kernels do not check their indices."""
-    import numpy as np  # here, so that commands show their help without NumPy
-
-    function, last = "encode", observation.n_states - 1
-    try:
-        (source,) = ast.parse(dedent(inspect.getsource(observation.encode))).body
-        returns = [one for one in ast.walk(source) if isinstance(one, ast.Return)]
-        if not isinstance(source, ast.FunctionDef) or returns != source.body[-1:]:
-            raise ValueError("its only return must be its last line")
-        with np.errstate(all="raise"):
-            for view in _drawn_views(observation):
-                state = whole("the state", observation.encode(view))
-                if not 0 <= state <= last:
-                    raise ValueError(f"it returns {state}, which must lie between 0 and {last}")
-        function = "name_of"
-        for state in np.linspace(0, last, min(last + 1, _VIEWS), dtype=int).tolist():
-            expect(f"the name of state {state}", observation.name_of(state), str)
-    except Exception as error:
-        raise unusable(observation, f"{function} fails ({error})") from error
-
-
-class _View(SimpleNamespace):
-    """A drawn view; its message about a name that it does not have lists those that it has."""
-
-    def __getattr__(self, name: str) -> Any:
-        raise AttributeError(
-            f"a view has no `{name}`; choose one of {', '.join(vars(self))}, or add a field to "
-            "`reads`"
-        )
-
-
-def _drawn_views(observation: Observation) -> Iterator[_View]:
-    import numpy as np
-
-    rng, shape = np.random.default_rng(0), (_VIEWS, len(observation.cells))
-    ahead = list(observation.ahead)
-    ants = rng.integers(0, 3, shape, np.int32) * (rng.random(shape) < 0.3)
-    drawn = rng.choice([EMPTY, EMPTY, OBSTACLE, FOOD, QUEEN], shape)
-    ground = np.where(ants > 0, OBSTACLE, drawn).astype(np.int32)
-    nearer = rng.integers(0, 2, shape, np.int32)
-    carries = rng.integers(0, 2, _VIEWS, np.int32)
-    trails = rng.integers(0, 2, shape) * 10.0 ** rng.uniform(-1, 6, shape)
-    for n in range(_VIEWS):
-        trail = trails[n].astype(np.int32 if n % 2 else np.float32)
-        levels = trail * ((ground[n] == EMPTY) | (ants[n] > 0))
-        visible = trail * (ground[n] == EMPTY)
-        strongest = visible[ahead].max()
-        if carries[n]:
-            shows_cue, codes = (ground[n] == EMPTY) & (nearer[n] == 1), ground[n] >> 2
-        else:
-            shows_cue, codes = 2 * visible >= max(strongest, 2), ground[n] & 3
-        codes[shows_cue] = SEES_CUE
-        left, forward, right = codes[ahead]
-        yield _View(
-            carries=carries[n],
-            paper_state=carries[n] << 6 | left << 4 | forward << 2 | right,
-            codes=_Vector(codes),
-            levels=_Vector(levels),
-            strongest=strongest,
-            ants=_Vector(ants[n]),
-            other_nest_ants=_Vector((ants[n] == 0) & (ground[n] == OBSTACLE) & (trails[n] > 1)),
-            nearer=_Vector(nearer[n]),
-            own_level=trail[0],
-            **{name: _Vector(np.roll(levels, 1 + r)) for r, name in enumerate(observation.reads)},
-            **{f"own_{name}": trail[-1] for name in observation.reads},
-        )
-
-
-class _Vector(tuple):
-    """A vector without negative indices, as in kernels."""
-
-    def __getitem__(self, k: Any) -> Any:
-        if not 0 <= k < len(self):
-            raise IndexError(f"there is no entry {k}")
-        return super().__getitem__(k)

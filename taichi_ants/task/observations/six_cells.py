@@ -1,6 +1,6 @@
 """The paper's codes of all six neighbouring cells."""
 
-from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.observations.observation import Observation
 from taichi_ants.task.states import name_of_codes
 
 CELLS = (-2, -1, 0, 1, 2, 3)

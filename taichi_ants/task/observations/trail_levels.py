@@ -1,6 +1,6 @@
 """The three cells ahead; a trail is weak, medium or strong, relative to the strongest ahead."""
 
-from taichi_ants.task.observations.registry import Observation
+from taichi_ants.task.observations.observation import Observation
 from taichi_ants.task.states import name_of_codes
 
 

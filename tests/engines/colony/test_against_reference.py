@@ -372,7 +372,7 @@ def levels_seen(world, ant):
 @pytest.mark.parametrize("noise", ["misread", pytest.param("", marks=pytest.mark.slow)])
 def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
     """Drawn colonies whose ants observe two fields, in every tick."""
-    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
     monkeypatch.setitem(OBSERVATIONS, "levels", levels_seen)
     monkeypatch.setitem(TURNS, "levels", AHEAD)
     observations.register(Observation("levels", 128, with_levels, reads=("a", "B")))
@@ -414,7 +414,7 @@ def crowd(view):
 @pytest.fixture
 def seen_strangers(monkeypatch):
     """The observation, registered for one test."""
-    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
     monkeypatch.setitem(OBSERVATIONS, "other_nest_ants", strangers_seen)
     return observations.register(Observation("other_nest_ants", 54, with_strangers))
 
@@ -431,7 +431,7 @@ def strangers_seen(world, ant):
 @pytest.fixture
 def seen_crowd(monkeypatch):
     """The observation, registered for one test."""
-    monkeypatch.setattr(registry, "_OBSERVATIONS", dict(registry._OBSERVATIONS))
+    monkeypatch.setattr(registry.OBSERVATIONS, "yours", dict(registry.OBSERVATIONS.yours))
     return observations.register(Observation("crowd", 3**6, crowd, (-1, 0, 1, 2, 3, -2)))
 
 

@@ -1,31 +1,43 @@
-"""Pictures of learning: the same ant at several stages of training, side by side."""
+"""Render an ant before and after learning, side by side.
+
+Without --seed, the script trains many ants, each alone with its own seed, and shows the one that is
+closest to the median at all --checkpoints. The extension of --out selects the file type: .gif,
+.mp4, or none for a folder of PNG pictures. See docs/rendering.md.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from itertools import islice
-from typing import Any
+from taichi_ants.studies.interruption import stoppable
 
-import numpy as np
+with stoppable():  # Ctrl-C also works during these slow imports
+    import argparse
+    import math
+    from collections.abc import Iterator, Sequence
+    from dataclasses import dataclass, replace
+    from itertools import islice
+    from typing import Any
 
-from taichi_ants import arguments
-from taichi_ants.engines.runs.training import evaluate, train
-from taichi_ants.errors import AntsError, count, entries_of, expect, shown, whole
-from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.rasteriser import Rasteriser, cell, draw_marks
-from taichi_ants.rendering.scene import check_size
-from taichi_ants.rendering.snapshots import Episode
-from taichi_ants.task import Rewards, Task
-from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.task.events import Event
-from taichi_ants.worlds.world import World
+    import numpy as np
 
-CHECKPOINTS = (0, 1, 2, 20)  # in the paper's world, behaviour differs most between these
-SEEDS = 200
-DEFAULT_SIZE = (1280, 520)  # four worlds in a row fill it
+    from taichi_ants import TrainingConfig, World, evaluate, learners, train
+    from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
+    from taichi_ants.commands import render
+    from taichi_ants.errors import count
+    from taichi_ants.rendering import Episode, check_animation, colours, text
+    from taichi_ants.rendering.rasteriser import Rasteriser, cell, draw_marks
+    from taichi_ants.rendering.scene import check_size
+    from taichi_ants.studies.command_line import (
+        Parser,
+        given_world,
+        load_plugin,
+        run_command,
+        whole_number,
+    )
+    from taichi_ants.task import Rewards, Task
+    from taichi_ants.task.constants import N_ACTIONS
+    from taichi_ants.task.events import Event
+
+CHECKPOINTS = [0, 1, 2, 20]  # in the paper's world, behaviour differs most between these
 # Heights in multiples of the text size: a tile's title, a second line below it, all text of a tile,
 # the legend.
 _TITLE_LINES, _MORE_LINES, _TILE_LINES, _LEGEND_LINES = 1.7, 1.4, 5.6, 2.6
@@ -67,90 +79,56 @@ class Checkpoint:
 def learning_checkpoints(
     world: World,
     config: TrainingConfig,
-    *,
-    seed: int = 0,
-    checkpoints: Sequence[int] = CHECKPOINTS,
+    seed: int,
+    checkpoints: Sequence[int],
     max_steps: int = 150,
-    task: Task | None = None,
+    task: Task = render.TASK,
     epsilon: float = 0.0,
-    progress: Callable[[float], None] | None = None,
 ) -> list[Checkpoint]:
     """Return rollouts of an ant's policy, one after each given number of training episodes.
 
-    Args:
-        world, config, task: The training setup; a task of None is the paper's.
-        seed: The seed of training and rollouts.
-        checkpoints: Numbers of episodes, ascending; 0 is before learning.
-        max_steps, epsilon: The step limit and the exploration rate of rollouts.
-        progress: Called with the completed share of the work.
+    `max_steps` and the exploration rate `epsilon` are those of rollouts.
     """
-    task, checkpoints = _checked(task, checkpoints, progress)
-    played = []
+    found = []
     for n in checkpoints:
-        table = _tables(world, config, [seed], n, task)[0]
-        rules: dict[str, Any] = {"max_steps": max_steps, "task": task, "epsilon": epsilon}
-        episode = Episode.play(world, table, seed=seed, **rules)
-        played.append(Checkpoint(n, episode, "delivered" if episode.delivered else ""))
-        if progress is not None:
-            progress(len(played) / len(checkpoints))
-    return played
+        table = action_values(world, config, [seed], n, task)[0]
+        limits: dict[str, Any] = {"max_steps": max_steps, "task": task, "epsilon": epsilon}
+        episode = Episode.play(world, table, seed=seed, **limits)
+        behaviour = classify(episode.trace, max_steps)[0][0]
+        note = BEHAVIOURS[behaviour]
+        if behaviour in (DELIVERS, OTHER):
+            note = "delivered" if episode.delivered else ""
+        found.append(Checkpoint(n, episode, note))
+    return found
 
 
 def typical_seed(
     world: World,
     config: TrainingConfig,
-    *,
-    seeds: int | Sequence[int] = range(SEEDS),
-    checkpoints: Sequence[int] = CHECKPOINTS,
+    seeds: Sequence[int],
+    checkpoints: Sequence[int],
     max_steps: int = 150,
-    task: Task | None = None,
+    task: Task = render.TASK,
     epsilon: float = 0.0,
-    progress: Callable[[float], None] | None = None,
 ) -> tuple[int, list[int]]:
-    """Return the seed closest to the median run, and the number of seeds that deliver.
+    """Return the seed closest to the median run, and how many seeds deliver at each checkpoint.
 
     The function ranks all seeds by the return and by the steps of their rollouts at each
     checkpoint; equal values share the mean of their ranks. It chooses the seed whose largest
-    distance from the middle rank is smallest, and the first one on a tie. `seeds` are the seeds to
-    choose from; other arguments and errors are those of `learning_checkpoints`.
-
-    Returns:
-        The seed, and for each checkpoint the number of seeds that deliver within `max_steps`.
+    distance from the middle rank is smallest, and the first one on a tie.
     """
-    task, checkpoints = _checked(task, checkpoints, progress)
-    chosen = arguments.checked_seeds(seeds)
-    distances, deliver = np.zeros(len(chosen)), []
-    for done, n in enumerate(checkpoints, start=1):
-        tables = _tables(world, config, chosen, n, task)
-        outcome = evaluate(world, tables, 1, chosen, max_steps, task, epsilon)
+    distances, deliver = np.zeros(len(seeds)), []
+    for n in checkpoints:
+        tables = action_values(world, config, seeds, n, task)
+        outcome = evaluate(world, tables, 1, seeds, max_steps, task, epsilon)
         for values in (outcome.returns[:, 0], outcome.steps[:, 0]):
             above = np.sign(values[:, None] - values).sum(axis=1)  # 0 at the middle rank
-            distances = np.maximum(distances, np.abs(above) / len(chosen))
+            distances = np.maximum(distances, np.abs(above) / len(seeds))
         deliver.append(int((outcome.deliveries[:, 0] > 0).sum()))
-        if progress is not None:
-            progress(done / len(checkpoints))
-    return int(chosen[distances.argmin()]), deliver
+    return int(seeds[distances.argmin()]), deliver
 
 
-def _checked(
-    task: Task | None, checkpoints: Sequence[int], progress: object
-) -> tuple[Task, list[int]]:
-    arguments.check_progress(progress)
-    task = arguments.checked_lone_task(task)
-    listed = entries_of(checkpoints)
-    if listed is None:
-        raise AntsError(
-            f"checkpoints is {shown(checkpoints)}; it must be a list of numbers of episodes."
-        )
-    checkpoints = [whole("a checkpoint", checkpoint) for checkpoint in listed]
-    if not checkpoints or checkpoints != sorted(set(checkpoints)) or checkpoints[0] < 0:
-        raise AntsError(
-            f"checkpoints is {shown(tuple(checkpoints))}; it must be ascending numbers, 0 or more."
-        )
-    return task, checkpoints
-
-
-def _tables(
+def action_values(
     world: World, config: TrainingConfig, seeds: Sequence[int], episodes: int, task: Task
 ) -> np.ndarray:
     """Return action values after a number of training episodes, float32 (seeds, n_states, 5)."""
@@ -160,25 +138,14 @@ def _tables(
 
 
 def learning_frames(
-    checkpoints: Sequence[Checkpoint], size: tuple[int, int] = DEFAULT_SIZE, title: str = ""
+    checkpoints: Sequence[Checkpoint], size: tuple[int, int], title: str = ""
 ) -> Iterator[np.ndarray]:
     """Yield frames that show checkpoints of one world side by side, uint8 (height, width, 3).
 
     Shorter episodes show their last snapshot until the longest ends. `size` is width and height in
     pixels; `title` is a line of text at the top.
     """
-    expect("checkpoints", checkpoints, list, tuple)
-    for checkpoint in checkpoints:
-        expect("a checkpoint", checkpoint, Checkpoint)
-    if not checkpoints:
-        raise AntsError("checkpoints is empty; give at least one checkpoint.")
-    worlds = len({checkpoint.episode.made.world for checkpoint in checkpoints})
-    if worlds > 1:
-        raise AntsError(
-            f"checkpoints has episodes in {worlds} worlds; give checkpoints of one world."
-        )
     width, height = check_size(size)
-    expect("title", title, str)
     canvas = np.full((height, width, 3), colours.channels(colours.PAGE))
     letters = round(min(width / 60, height / 26))
     letters *= letters >= text.SMALLEST
@@ -186,7 +153,7 @@ def learning_frames(
     room = width - 2 * letters
     text.write(canvas, title, width / 2, 1.5 * letters, letters, align="middle", room=room)
     if letters:
-        _draw_legend(canvas, bottom, letters, checkpoints[0].episode.made.task.rewards)
+        draw_legend(canvas, bottom, letters, checkpoints[0].episode.made.task.rewards)
     columns = math.ceil(len(checkpoints) / max(1, math.isqrt(len(checkpoints) * height // width)))
     more = _MORE_LINES * any(checkpoint.among for checkpoint in checkpoints)
     rows, lines = math.ceil(len(checkpoints) / columns), round((_TILE_LINES + more) * letters)
@@ -197,7 +164,7 @@ def learning_frames(
     grid, margin = checkpoints[0].episode.made.world.grid, max(2, round(min(w, h) / 60))
     rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
     pictures = [
-        _tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints
+        tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints
     ]
     for _ in range(max(len(checkpoint.episode) for checkpoint in checkpoints)):
         for place, waiting in enumerate(pictures):
@@ -207,7 +174,7 @@ def learning_frames(
         yield canvas.copy()
 
 
-def _tile_pictures(
+def tile_pictures(
     checkpoint: Checkpoint, rasteriser: Rasteriser, height: int, letters: int, more: float
 ) -> Iterator[np.ndarray]:
     """Yield pictures of one world, with the title above and the return below."""
@@ -239,7 +206,7 @@ def _tile_pictures(
         yield tile
 
 
-def _draw_legend(canvas: np.ndarray, top: int, letters: int, rewards: Rewards) -> None:
+def draw_legend(canvas: np.ndarray, top: int, letters: int, rewards: Rewards) -> None:
     lines = [f"{letter} {words} {getattr(rewards, name):+}" for letter, _, words, name in _SOURCES]
     before, after = 1.9 * letters, 0.9 * letters  # pixels for the cell, and after the label
     width = sum(before + text.width(line, letters) + after for line in lines) - after
@@ -253,3 +220,58 @@ def _draw_legend(canvas: np.ndarray, top: int, letters: int, rewards: Rewards) -
         x += before
         text.write(canvas, line, x, baseline, letters, colours.FAINT_INK)
         x += text.width(line, letters) + after
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Return the settings of the command line."""
+    parser = Parser(__doc__)
+    common = ("--out", "--title", "--world", "--seed", "--plugin", "--max-steps", "--epsilon")
+    defaults = {"out": "results/renders/learning.gif", "size": "1280x520", "max_steps": 150}
+    render.add_options(parser, (*common, "--size", "--fps"), seed=None, **defaults)
+    add = parser.add_argument
+    seeds = "without --seed, train seeds 0 to N - 1 and show the median one"
+    add("--seeds", type=whole_number(1, 10_000), default=200, metavar="N", help=seeds)
+    after = "numbers of training episodes after which to show the ant"
+    add(
+        "--checkpoints",
+        **{"nargs": "+", "type": whole_number(0), "metavar": "N"},
+        default=CHECKPOINTS,
+        help=after,
+    )
+    settings = render.parse(parser, arguments)
+    if settings.checkpoints != sorted(set(settings.checkpoints)):
+        parser.error(f"--checkpoints is {settings.checkpoints}; it must be ascending numbers")
+    return settings
+
+
+def noted_checkpoints(settings: argparse.Namespace, world: World) -> tuple[int, list[Checkpoint]]:
+    """Return the seed, and its checkpoints with notes on other seeds."""
+    config, seed = render.training_config(settings), settings.seed
+    limits = settings.max_steps, render.given_task(settings), settings.epsilon
+    among = [""] * len(settings.checkpoints)
+    if seed is None:
+        seeds = range(settings.seeds)
+        seed, deliver = typical_seed(world, config, seeds, settings.checkpoints, *limits)
+        if len(seeds) > 1:
+            among = [f"{n} of {len(seeds)} ants deliver{'s' * (n == 1)}" for n in deliver]
+    found = learning_checkpoints(world, config, seed, settings.checkpoints, *limits)
+    return seed, [replace(one, among=others) for one, others in zip(found, among, strict=True)]
+
+
+def show(settings: argparse.Namespace) -> None:
+    """Write the animation, and print a summary."""
+    check_animation(settings.out, settings.fps)
+    check_size(settings.size)
+    load_plugin(settings.plugin)
+    seed, checkpoints = noted_checkpoints(settings, given_world(settings))
+    ant = "an ant" if settings.seed is not None else f"the median of {count(settings.seeds, 'ant')}"
+    learner = learners.label(render.training_config(settings).learner)
+    title = settings.title or f"{learner}: {ant} before and after learning"
+    longest = max(len(checkpoint.episode) for checkpoint in checkpoints)
+    render.save_frames(settings, learning_frames(checkpoints, settings.size, title), longest)
+    told = [f"{one.title}{f' ({one.among})' if one.among else ''}" for one in checkpoints]
+    print(f"{settings.out}: seed {seed}, {', '.join(told)}")
+
+
+if __name__ == "__main__":
+    run_command(lambda: show(parse_arguments()), "Stopped; nothing was left behind.")

@@ -1,4 +1,4 @@
-"""The published models of `taichi_ants.baselines`, written directly from their rules.
+"""The published models of `experiments/`, in plain Python, written directly from their rules.
 
 They are the double bridge of Goss, Aron, Deneubourg and Pasteels, Naturwissenschaften 76 (1989);
 ant colony optimisation; and ants that back up utilities. Each model simulates one colony.

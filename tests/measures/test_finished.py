@@ -1,11 +1,11 @@
-"""The measures of a lone run, by hand."""
+"""Measures of finished runs, by hand: those of lone ants, and of the evaluation of a colony."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from taichi_ants.measures.runs import MEASURES, measures_of_runs
+from taichi_ants.measures.finished import LONE, Run, values_of
 
 
 def single_run(
@@ -20,7 +20,8 @@ def single_run(
         "greedy_steps": [34, 36],
         "greedy_deliveries": [1, 0],
     }
-    return measures_of_runs({name: np.array(one)[None, None] for name, one in arrays.items()})
+    outcome = {name: np.array(array)[None, None] for name, array in arrays.items()}
+    return values_of(Run.of_lone_ant(outcome))
 
 
 def measured(run: dict[str, np.ndarray], name: str) -> float:
@@ -64,7 +65,34 @@ def test_short_runs_use_all_episodes_or_say_that_they_cannot() -> None:
     run = single_run([1, 2, 6], [3, 4, 5], [0, 0, 1])
     assert measured(run, "return_last50") == 3
     assert measured(run, "deliveries_last50") == pytest.approx(1 / 3)
-    for name, measure in MEASURES.items():
+    for name, measure in LONE.items():
         assert np.isnan(measured(run, name)) == (measure.episodes > 3), name
     assert np.isnan(measured(run, "steps_first50"))
     assert np.isnan(measured(single_run([1], [1], [0]), "return_fluctuation_all"))
+
+
+# Two seeds, three episodes of 500 ticks, four ants; as small as blocks keep them.
+OUTCOME = {
+    "deliveries": np.array([[10, 20, 0], [0, 0, 0]], np.int8),
+    "first_delivery": np.array([[40, 60, -1], [-1, -1, -1]], np.int8),
+    "moves": np.array([[100, 200, 100], [0, 0, 0]], np.uint8),
+    "blocked": np.array([[10, 10, 20], [0, 0, 0]], np.uint8),
+    "returns": np.array([[600, 900, -300], [-30, -30, -60]], np.int16),
+}
+
+
+@pytest.mark.parametrize(
+    ("measure", "expected"),
+    [
+        ("deliveries", [20, 0]),
+        ("per_ant", [5, 0]),
+        # Episodes without a delivery count with all their ticks.
+        ("first_delivery", [200, 500]),
+        ("no_delivery_rate", [1 / 3, 1]),
+        # Of all moves, not the mean of shares; without a move there is none.
+        ("blocked", [0.1, np.nan]),
+        ("reward", [200, -20]),
+    ],
+)
+def test_measures_of_a_colony(measure: str, expected: list[float]) -> None:
+    np.testing.assert_allclose(values_of(Run.of_colony(OUTCOME, 4, 500))[measure], expected)

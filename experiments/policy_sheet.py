@@ -1,34 +1,40 @@
-"""Policy sheets: the best action in each state for which something was learned.
+"""Render a policy sheet: the best action in each state for which something was learned.
 
 There is one part for foraging and one for carrying, or a single part if state names have no task.
-States are ordered by the cell ahead, then by the other cells in view.
+States are ordered by the cell ahead, then by the other cells in view. The policy is that of a file,
+or of an ant that the script trains first. See docs/rendering_reference.md.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
+from taichi_ants.studies.interruption import stoppable
 
-import numpy as np
+with stoppable():  # Ctrl-C also works during these slow imports
+    import argparse
+    import math
+    from collections.abc import Iterator, Sequence
 
-from taichi_ants.errors import expect
-from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
-from taichi_ants.grid.hexgrid import centre_of
-from taichi_ants.learners.policies import checked_table
-from taichi_ants.rendering import colours, text
-from taichi_ants.rendering.colours import Mark
-from taichi_ants.rendering.rasteriser import (
-    CELL_LETTERS,
-    ants,
-    cell,
-    cell_colour,
-    draw_marks,
-    marks,
-)
-from taichi_ants.rendering.scene import fill, name_parts, possible_states
-from taichi_ants.task import Observation, Task
-from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
-from taichi_ants.task.states import TASK_NAMES
+    import numpy as np
+
+    from taichi_ants.commands import render
+    from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
+    from taichi_ants.grid.hexgrid import centre_of
+    from taichi_ants.learners.policies import checked_table
+    from taichi_ants.rendering import check_picture, colours, save_picture, text
+    from taichi_ants.rendering.colours import Mark
+    from taichi_ants.rendering.rasteriser import (
+        CELL_LETTERS,
+        ants,
+        cell,
+        cell_colour,
+        draw_marks,
+        marks,
+    )
+    from taichi_ants.rendering.scene import fill, name_parts
+    from taichi_ants.studies.command_line import Parser, given_world, load_plugin, run_command
+    from taichi_ants.task import Observation, Task
+    from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
+    from taichi_ants.task.states import REACHABLE_STATES, TASK_NAMES
 
 MOST = 128  # states drawn in each part
 _HARDLY = 0.01  # share of the usual spread below which a state counts as not learned
@@ -51,6 +57,12 @@ _EXPLANATION = (
 )
 _GOALS = "FQ"
 _ARROW_COLOURS = {PICK_UP: colours.CELL_FOOD, GIVE: colours.CELL_QUEEN}
+
+
+def possible_states(observation: Observation) -> Sequence[int]:
+    """Return the states that can occur: the reachable ones of the paper, otherwise all states."""
+    paper = observation.name == "paper"
+    return REACHABLE_STATES if paper else range(observation.n_states)
 
 
 def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
@@ -89,11 +101,9 @@ def policy_sheet(
         task: The task of the policy, which defines its states; None is the paper's.
     """
     task = Task() if task is None else task
-    expect("task", task, Task)
     table = checked_table(q_values, task)
-    expect("title", title, str)
     observation, spread = task.sees, usual_spread(table, task.sees)
-    picture = _Picture(observation)
+    picture = StateDrawing(observation)
     parts: dict[str, list[int]] = {}
     for state in possible_states(observation):
         parts.setdefault(name_parts(observation, state)[0], []).append(state)
@@ -105,7 +115,7 @@ def policy_sheet(
     tile = picture.height + _BELOW
     heights = [_HEADING + max(1, math.ceil(len(states) / _COLUMNS)) * tile for states in drawn]
     sheet = np.full((_TOP + sum(heights) + _MARGIN, WIDTH, 3), colours.channels(colours.PAGE))
-    _write_head(sheet, title, observation)
+    write_head(sheet, title, observation)
     top = _TOP
     for (task_name, every), states, height in zip(parts.items(), drawn, heights, strict=True):
         n = len(known[task_name])
@@ -121,12 +131,12 @@ def policy_sheet(
             part, values = sheet[y : y + tile, x : x + _TILE], table[state]
             best = np.flatnonzero(values == values.max()).tolist()
             part[: picture.height] = picture.draw(state, best)
-            _write_action(part, picture.height, best, clarity(values, spread))
+            write_action(part, picture.height, best, clarity(values, spread))
         top += height
     return sheet
 
 
-def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None:
+def write_head(sheet: np.ndarray, title: str, observation: Observation) -> None:
     room = WIDTH - 2 * _MARGIN
     text.write(sheet, title, _MARGIN, _MARGIN + _LARGE, _LARGE, room=room)
     *lines, letters = _EXPLANATION
@@ -138,7 +148,7 @@ def _write_head(sheet: np.ndarray, title: str, observation: Observation) -> None
         text.write(sheet, line, _MARGIN, y + 7, _SMALL, colours.FAINT_INK, room=room)
 
 
-def _write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> None:
+def write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> None:
     """Write the best actions below a state, with a bar of relative length `clear`."""
     words, size = " / ".join(ACTION_NAMES[action] for action in best), _SMALL
     while text.width(words, size) > _TILE:
@@ -149,7 +159,7 @@ def _write_action(tile: np.ndarray, top: int, best: list[int], clear: float) -> 
     text.write(tile, words, _TILE / 2, top + 15, size, ink, align="middle")
 
 
-class _Picture:
+class StateDrawing:
     """Draws states: an ant, the cells that it sees, and its best actions as arrows."""
 
     def __init__(self, observation: Observation) -> None:
@@ -199,3 +209,24 @@ class _Picture:
                     middle = 0.55 * self._own + 0.45 * self._seen[place]
                     colour = _ARROW_COLOURS.get(action, colours.CHOSEN)
                     yield marks(middle, 0.37 * _HEXAGON, Mark.ARROW, colour, heading)
+
+
+def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
+    """Return the settings of the command line."""
+    parser = Parser(__doc__)
+    flags = ("--out", "--title", "--world", "--seed", "--plugin", "--policy", "--episodes")
+    render.add_options(parser, flags, kind="sheet", out="results/renders/policy_sheet.png")
+    return render.parse(parser, arguments)
+
+
+def show(settings: argparse.Namespace) -> None:
+    """Write the sheet, and print a summary."""
+    check_picture(settings.out)
+    load_plugin(settings.plugin)
+    q_values, task, title = render.find_policy(settings, given_world(settings))
+    save_picture(settings.out, policy_sheet(q_values, title, task=task))
+    print(f"{settings.out}: the best action in each state")
+
+
+if __name__ == "__main__":
+    run_command(lambda: show(parse_arguments()))

@@ -1,61 +1,41 @@
-"""Learning made visible, the policy sheet, and colonies."""
+"""Pictures of learning, and policy sheets."""
 
 from __future__ import annotations
 
-import itertools
+import re
 from functools import cache
+from pathlib import Path
 
+import gallery
+import learning
 import numpy as np
 import pytest
-from named_states import parse_state
-from PIL import Image
-
-from taichi_ants import AntsError, Colony, TrainingConfig, World, train
-from taichi_ants.learners.policies import random_policy, trail_follower
-from taichi_ants.rendering import (
+from command_lines import ROOT, assert_one_sentence, call_script
+from learning import (
     Checkpoint,
-    Episode,
-    colony_snapshots,
-    frames,
     learning_checkpoints,
     learning_frames,
-    policy_sheet,
-    save_animation,
-    text,
+    noted_checkpoints,
     typical_seed,
 )
+from named_states import parse_state
+from PIL import Image
+from policy_sheet import clarity, learned, policy_sheet, usual_spread
+
+from taichi_ants import AntsError, TrainingConfig
+from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
+from taichi_ants.rendering import Episode, save_animation, text
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
-from taichi_ants.rendering.scene import PAPER
-from taichi_ants.rendering.sheet import clarity, learned, usual_spread
-from taichi_ants.task import Caste, Life, Observation, Rewards, Task, observations
+from taichi_ants.task import Observation, Rewards, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES
-from taichi_ants.worlds import open_world, paper
+from taichi_ants.worlds import paper
 
 CONFIG = TrainingConfig("sarsa", 0.01, 0.9, 0.5, 0.995)
 
 
 def coloured(picture: np.ndarray, colour: int) -> np.ndarray:
     return (picture == (colour >> 16, colour >> 8 & 255, colour & 255)).all(axis=2)
-
-
-def test_stages_are_those_of_one_training() -> None:
-    checkpoints = learning_checkpoints(
-        paper(), CONFIG, seed=2, checkpoints=(0, 3, 20), max_steps=60
-    )
-    assert [checkpoint.episodes for checkpoint in checkpoints] == [0, 3, 20]
-    assert [checkpoint.title for checkpoint in checkpoints] == [
-        "before learning",
-        "after 3 episodes",
-        "after 20 episodes",
-    ]
-    for checkpoint in checkpoints:
-        table = np.zeros((128, 5), dtype=np.float32)
-        if checkpoint.episodes:
-            table = train(paper(), CONFIG, 2, checkpoint.episodes).q_values[0, 0]
-        trace = checkpoint.episode.trace
-        assert (trace.q_values == table[trace.states]).all()
-        assert len(trace) <= 60
 
 
 def test_the_account_says_where_the_return_comes_from() -> None:
@@ -65,9 +45,7 @@ def test_the_account_says_where_the_return_comes_from() -> None:
     assert account[-1].tolist() == [16, 16, 3, 10, 0]
     assert account[0].tolist() == [0] * 5
     for seed, checkpoints in ((2, (0, 10)), (7, (10, 30))):
-        for checkpoint in learning_checkpoints(
-            paper(), CONFIG, seed=seed, checkpoints=checkpoints, max_steps=80
-        ):
+        for checkpoint in learning_checkpoints(paper(), CONFIG, seed, checkpoints, 80):
             returns = np.concatenate([[0], checkpoint.episode.trace.rewards.cumsum()])
             assert (checkpoint.account().sum(axis=1) == returns).all()
             assert (checkpoint.account()[:, :4] >= 0).all()
@@ -76,15 +54,8 @@ def test_the_account_says_where_the_return_comes_from() -> None:
 
 def test_the_typical_seed_is_the_one_nearest_to_the_middle_rank_at_every_stage() -> None:
     seeds, checkpoints, steps = (3, 14, 15, 92, 65, 35, 89, 79), (0, 1, 3), 80
-    chosen, deliver = typical_seed(
-        paper(), CONFIG, seeds=seeds, checkpoints=checkpoints, max_steps=steps
-    )
-    played = {
-        seed: learning_checkpoints(
-            paper(), CONFIG, seed=seed, checkpoints=checkpoints, max_steps=steps
-        )
-        for seed in seeds
-    }
+    chosen, deliver = typical_seed(paper(), CONFIG, seeds, checkpoints, steps)
+    played = {s: learning_checkpoints(paper(), CONFIG, s, checkpoints, steps) for s in seeds}
     for n, told in enumerate(deliver):
         assert told == sum(several[n].episode.delivered for several in played.values())
     assert deliver[0] < deliver[-1]
@@ -103,28 +74,13 @@ def test_the_typical_seed_is_the_one_nearest_to_the_middle_rank_at_every_stage()
     assert chosen == min(seeds, key=farthest)
 
 
-@pytest.mark.parametrize("checkpoints", [(), (3, 2), (0, 5, 5), (-1, 5)])
-def test_stages_that_are_refused(checkpoints) -> None:
-    for function in (learning_checkpoints, typical_seed):
-        with pytest.raises(AntsError, match="checkpoints"):
-            function(paper(), CONFIG, checkpoints=checkpoints)
-
-
-def test_stages_of_several_worlds_are_refused() -> None:
-    checkpoints = [
-        Checkpoint(1, Episode.play(world, trail_follower())) for world in (paper(), open_world(3))
-    ]
-    with pytest.raises(AntsError, match="in 2 worlds; give checkpoints of one"):
-        next(learning_frames(checkpoints))
-
-
 def test_a_stage_that_has_ended_stays() -> None:
-    checkpoints = learning_checkpoints(paper(), CONFIG, seed=2, checkpoints=(0, 50), max_steps=60)
+    checkpoints = learning_checkpoints(paper(), CONFIG, 2, (0, 50), 60)
     short, long = sorted(checkpoints, key=lambda checkpoint: len(checkpoint.episode))
     assert len(short.episode) < len(long.episode) == 61
-    frames = list(learning_frames(checkpoints, (640, 400), "a title"))
-    assert len(frames) == 61
-    halves = [(frame[:, :320], frame[:, 320:]) for frame in frames]
+    shown = list(learning_frames(checkpoints, (640, 400), "a title"))
+    assert len(shown) == 61
+    halves = [(frame[:, :320], frame[:, 320:]) for frame in shown]
     ended = checkpoints.index(short)
     last = len(short.episode) - 1
     assert all((half[ended] == halves[last][ended]).all() for half in halves[last:])
@@ -134,7 +90,7 @@ def test_a_stage_that_has_ended_stays() -> None:
 
 @pytest.mark.parametrize("size", [(1280, 720), (400, 900), (64, 64), (4096, 200)])
 def test_all_stages_fit(size, tmp_path) -> None:
-    checkpoints = learning_checkpoints(paper(), CONFIG, checkpoints=(0, 1, 2, 3), max_steps=3)
+    checkpoints = learning_checkpoints(paper(), CONFIG, 0, (0, 1, 2, 3), 3)
     save_animation(tmp_path / "a.gif", learning_frames(checkpoints, size), 10)
     with Image.open(tmp_path / "a.gif") as image:
         assert image.size == size
@@ -145,6 +101,30 @@ def test_all_stages_fit(size, tmp_path) -> None:
     purple = (picture[..., 0] - picture[..., 1] > 90) & (picture[..., 2] - picture[..., 1] > 90)
     groups = [(np.diff(np.flatnonzero(purple.any(axis=axis))) > 8).sum() + 1 for axis in (0, 1)]
     assert groups == {(1280, 720): [4, 1], (400, 900): [2, 2], (64, 64): [2, 2]}.get(size, [4, 1])
+
+
+def test_the_legend_of_learning_tells_the_rewards_of_the_task(lines) -> None:
+    task = Task(rewards=Rewards(shaping=2, deliver=50, failed=-4))
+    checkpoints = learning_checkpoints(paper(), CONFIG, 0, (0,), 5, task)
+    next(learning_frames(checkpoints, (1400, 600)))
+    told = {"T onto a trail +2", "Q delivery +50", "F food +3", "X blocked, in vain -4"}
+    assert told <= set(lines)
+
+
+FIVE = observations.get("five_cells")
+HARDLY_VISITED = [
+    (0.0, 0.0, 1.97e-5, 0.0, 0.0),
+    (2.6e-6, 0.0, 0.0, 0.0, 0.0),
+    (-0.002, 0.0, -0.001, -0.001, -0.001),  # the best is the one that was never tried
+]
+
+
+@pytest.fixture
+def lines(monkeypatch) -> list[str]:
+    """The texts that pictures write."""
+    written: list[str] = []
+    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: written.append(line))
+    return written
 
 
 def test_how_clear_a_choice_is() -> None:
@@ -158,21 +138,14 @@ def test_how_clear_a_choice_is() -> None:
 def test_the_usual_spread() -> None:
     """Worked by hand: the mean over states that can occur and whose values differ."""
     table = random_policy()
-    assert usual_spread(table, PAPER) == 0.0
+    assert usual_spread(table, Task().sees) == 0.0
     table[parse_state("foraging E E E")] = (0.0, 4.0, 3.0, -1.0, 0.0)
     table[parse_state("foraging E F E")] = (2.0, 2.0, 2.0, 3.0, 2.0)
     table[parse_state("foraging F F F")] = 7.0
-    assert usual_spread(table, PAPER) == pytest.approx((5 + 1) / 2)
+    assert usual_spread(table, Task().sees) == pytest.approx((5 + 1) / 2)
     unreachable = next(index for index in range(128) if index not in REACHABLE_STATES)
     table[unreachable] = (100.0, 0.0, 0.0, 0.0, 0.0)
-    assert usual_spread(table, PAPER) == pytest.approx(3.0)
-
-
-HARDLY_VISITED = [
-    (0.0, 0.0, 1.97e-5, 0.0, 0.0),
-    (2.6e-6, 0.0, 0.0, 0.0, 0.0),
-    (-0.002, 0.0, -0.001, -0.001, -0.001),  # the best is the one that was never tried
-]
+    assert usual_spread(table, Task().sees) == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize("values", HARDLY_VISITED)
@@ -190,13 +163,6 @@ def test_a_hairline_is_no_clear_choice(values) -> None:
     clear = policy_sheet(table)
     assert (hardly == blank).all()
     assert coloured(clear, CHOSEN).sum(axis=1).max() > 60
-
-
-def test_a_sheet_without_any_visited_state() -> None:
-    sheet = policy_sheet(random_policy())
-    assert sheet.shape[1] == 1280
-    assert sheet.dtype == np.uint8
-    assert not coloured(sheet, CHOSEN).any()
 
 
 def all_known() -> np.ndarray:
@@ -240,15 +206,6 @@ def test_the_bar_of_a_state_is_as_long_as_its_choice_is_clear() -> None:
     assert 15 <= coloured(policy_sheet(table), CHOSEN).sum(axis=1).max() < 40  # a fifth of 112
 
 
-@pytest.mark.slow
-def test_only_states_that_can_occur_are_on_a_sheet() -> None:
-    table = all_known()
-    table[[index for index in range(128) if index not in REACHABLE_STATES]] = (1, 0, 0, 0, 0)
-    assert (policy_sheet(table) == sheet_of_all_known()).all()
-    seen = {tuple(place // 20 for place in changed_place(row)) for row in REACHABLE_STATES[::9]}
-    assert len(seen) == len(REACHABLE_STATES[::9])
-
-
 def test_a_sheet_shows_only_what_was_learned() -> None:
     table = random_policy()
     table[list(REACHABLE_STATES[:30]), RIGHT] = 1.0
@@ -259,9 +216,7 @@ def test_a_sheet_shows_only_what_was_learned() -> None:
     assert heights == sorted(set(heights))
 
 
-def test_text_on_a_sheet_says_what_it_shows(monkeypatch) -> None:
-    lines = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+def test_text_on_a_sheet_says_what_it_shows(lines) -> None:
     table = random_policy()
     table[parse_state("foraging E F E"), PICK_UP] = 1.0
     policy_sheet(table, "a title")
@@ -272,28 +227,20 @@ def test_text_on_a_sheet_says_what_it_shows(monkeypatch) -> None:
     assert max(map(len, lines)) < 125
 
 
-FIVE = observations.get("five_cells")
-
-
-def test_the_sheet_of_an_observation_of_more_cells(monkeypatch) -> None:
+def test_the_sheet_of_an_observation_of_more_cells(lines) -> None:
     """One state is visited: foraging T E F O E, with food ahead and a trail behind to the left."""
     table = np.zeros((FIVE.n_states, 5), dtype=np.float32)
     row = next(row for row in range(FIVE.n_states) if FIVE.name_of(row) == "foraging T E F O E")
     table[row, PICK_UP] = 1.0
     sheet = policy_sheet(table, task=Task(observation="five_cells"))
     assert coloured(sheet, CELL_FOOD).sum() > 60
-    lines: list[str] = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    policy_sheet(table, task=Task(observation="five_cells"))
     assert "1 of 1024 states learned" in lines
     assert [line for line in lines if len(line) == 1] == list("TEOE")
     with pytest.raises(AntsError, match=r"\(2048, 5\)"):
         policy_sheet(random_policy(), task=Task(observation="five_cells"))
 
 
-def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(monkeypatch) -> None:
-    lines: list[str] = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
+def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(lines) -> None:
     table = np.zeros((FIVE.n_states, 5), dtype=np.float32)
     table[:300, RIGHT] = 1.0
     policy_sheet(table, task=Task(observation="five_cells"))
@@ -301,40 +248,21 @@ def test_of_very_many_states_a_sheet_shows_the_first_and_says_so(monkeypatch) ->
     assert lines.count("right") == 128
 
 
-def test_states_with_names_of_another_form_are_written_out(monkeypatch) -> None:
+def test_states_with_names_of_another_form_are_written_out(monkeypatch, lines) -> None:
     own = Observation("own", 4, lambda view: 0, name_of=lambda row: f"carrying crumb number {row}")
     monkeypatch.setattr(Task, "sees", own)
     monkeypatch.setattr(Task, "n_states", 4)
-    lines: list[str] = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     policy_sheet(np.eye(4, 5))
     assert {f"crumb number {row}" for row in range(4)} <= set(lines)
     assert "4 of 4 states learned" in lines
 
 
-def test_states_without_names_are_told_by_their_numbers_and_not_split_by_load(monkeypatch) -> None:
-    episode = Episode.play(paper(), random_policy(), max_steps=1)
-    monkeypatch.setattr(Task, "sees", Observation("own", 4, lambda view: 0))
-    monkeypatch.setattr(Task, "n_states", 4)
-    lines: list[str] = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    policy_sheet(np.eye(4, 5))
-    assert {"0", "1", "2", "3", "States"} <= set(lines)
-    assert not any("orag" in line or "arry" in line or "trail" in line for line in lines)
-    status = episode._status(0, 0)
-    assert ("state", str(status.state)) in status.lines
-    assert not {"task", "sees"} & dict(status.lines).keys()
-
-
 @pytest.mark.parametrize("name", ["ants_seen", "trail_levels", "paper"])
-def test_letters_of_their_own_are_explained_on_the_sheet_and_in_the_panel(
-    name, monkeypatch
-) -> None:
-    task, lines = Task(name), []
+def test_letters_of_their_own_are_explained_on_the_sheet_and_in_the_panel(name, lines) -> None:
+    task = Task(name)
     table = np.zeros((task.n_states, 5), np.float32)
     names = {task.sees.name_of(row) for row in range(task.n_states)}
     strange = set("".join(one.partition(" ")[2] for one in names)) - set(" -EOTSFQ")
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
     policy_sheet(table, task=task)
     (legend,) = (line for line in lines if line.startswith("E empty"))
     beside = dict(Episode.play(paper(), table, max_steps=1, task=task)._status(0, 0).lines)
@@ -357,79 +285,75 @@ def test_no_tie_is_cut_off(best, monkeypatch) -> None:
     assert text.width(words, size) <= more.get("room", tile.shape[1])
 
 
-def test_sheets_that_are_refused() -> None:
-    for wrong in (np.zeros((5, 128)), np.full((128, 5), "a")):
-        with pytest.raises(AntsError, match="q_values"):
-            policy_sheet(wrong)
-    with pytest.raises(AntsError, match="must be finite"):
-        policy_sheet(np.full((128, 5), np.nan))
+# The command lines.
 
 
-def colony(ants: int = 30) -> Colony:
-    made = Colony(open_world(3), None, CONFIG, 0, ants, sharing="frozen", q_values=trail_follower())
-    made.begin_episode()
-    return made
+def test_learning_and_a_sheet_from_the_command_line(tmp_path: Path, capsys) -> None:
+    place = tmp_path / "a.gif"
+    arguments = ["--seed", 5, "--checkpoints", 0, 2, "--max-steps", 9, "--size", "300x200"]
+    arguments += ["--task.observation", "ants_seen", "--training.learner", "dyna_q"]
+    status, out, err = call_script("learning", [*arguments, "--out", place], capsys)
+    assert (status, err) == (0, "")
+    assert out.endswith("a.gif: seed 5, before learning, after 2 episodes\n")
+    with Image.open(place) as image:
+        assert image.n_frames >= 5
+    save_policy(tmp_path / "five.npz", np.eye(2048, 5), {}, "five_cells")
+    arguments = ["--policy", tmp_path / "five.npz", "--out", tmp_path / "sheet.png"]
+    assert call_script("policy_sheet", arguments, capsys)[0] == 0
+    assert Image.open(tmp_path / "sheet.png").width == 1280
 
 
-def test_a_colony_on_the_move() -> None:
-    pictures = list(frames(colony_snapshots(colony(), 7, frame_interval=3), (200, 150)))
-    assert len(pictures) == 4
-    assert not any((a == b).all() for a, b in itertools.pairwise(pictures))
-    other = colony()
-    other.tick(7)
-    assert (next(frames(colony_snapshots(other), (200, 150))) == pictures[-1]).all()
-    for wrong in ({"frame_interval": 0}, {"ticks": -1}):
-        with pytest.raises(AntsError, match=next(iter(wrong))):
-            list(colony_snapshots(colony(), **{"ticks": 5, **wrong}))
+@pytest.mark.parametrize(
+    ("name", "arguments", "said"),
+    [
+        ("learning", ["--out", "{}/a.png"], ".gif"),
+        ("learning", ["--policy", "a.npz"], "--policy"),
+        ("learning", ["--checkpoints", "5", "2"], "it must be ascending numbers"),
+        ("policy_sheet", ["--out", "{}/a.gif"], ".png"),
+        ("policy_sheet", ["--size", "400x300"], "--size"),
+        ("policy_sheet", ["--policy", "a.npz", "--episodes", "5"], "--episodes configures"),
+        ("policy_sheet", ["--training.discount", "y", "--out", "{}/a.png"], "is 'y'; it must be"),
+    ],
+)
+def test_mistakes_are_one_sentence(name, arguments, said, tmp_path, capsys) -> None:
+    status, out, err = call_script(name, [one.format(tmp_path) for one in arguments], capsys)
+    assert (status, out) == (2, "")
+    assert_one_sentence(err)
+    assert said in err
+    assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("observation", ["paper", "ants"])
-def test_one_ant_of_a_colony_is_followed(observation) -> None:
-    """With its state and its action values; as without it once it is dead."""
-    table = random_policy(observation)
-    table += np.arange(table.shape[0])[:, None]
-    task = Task(observation, life=Life(lifespan=9))
-    made = Colony(open_world(3), task, CONFIG, 0, 20, sharing="frozen", q_values=table)
-    made.begin_episode()
-    for _ in range(8):
-        snapshot, status = next(colony_snapshots(made, follow=5))
-        slot = int(np.flatnonzero(made.numbers[0] == 5)[0])
-        assert snapshot.ant_cells[0] == made.cells[0, slot]
-        assert sorted(snapshot.ant_cells) == sorted(made.snapshot().ant_cells)
-        assert status.q_values[0] == status.state == table[status.state, 0]
-        assert ("ant", "5") in status.lines
-        assert ("sees", task.sees.name_of(status.state).split(" ", 1)[1]) in status.lines
-        made.tick()
-    made.tick()
-    _, status = next(colony_snapshots(made, follow=5))
-    assert status.state is None
-    with pytest.raises(AntsError, match="follow is 20; it must be from 0 to 19"):
-        next(colony_snapshots(made, follow=20))
+def test_the_picture_of_learning_shows_stages_that_differ_and_the_median_of_many_ants(
+    lines,
+) -> None:
+    """docs/paper.md says of it what the picture shows, and how many of 200 ants do so."""
+    arguments = gallery.drawing(gallery.GALLERY["learning.gif"])[1]
+    _, checkpoints = noted_checkpoints(arguments, paper())
+    steps = [len(checkpoint.episode.trace) for checkpoint in checkpoints]
+    notes = [checkpoint.note for checkpoint in checkpoints]
+    assert len({*zip(steps, notes, strict=True)}) == len(checkpoints)
+    page = " ".join((ROOT / "docs" / "paper.md").read_text(encoding="utf-8").lower().split())
+    for n, checkpoint in zip(steps[1:], checkpoints[1:], strict=True):
+        assert checkpoint.note == "delivered"
+        number, _, seeds = checkpoint.among.split()[:3]
+        assert f"{checkpoint.title} it delivers in {n} steps ({number} of {seeds} ants" in page
+    list(learning_frames(checkpoints, arguments.size))
+    assert {checkpoint.among for checkpoint in checkpoints} < set(lines)
+    assert f"step {steps[-1]}, return 45: delivered" in lines
 
 
-def test_a_followed_ant_has_the_colours_and_the_table_of_its_nest_and_caste() -> None:
-    """Each table has its number as its values; the followed ant moves to the front as a whole."""
-    world = World((6, 6, 6), queen=[(0, 0, 0), (3, 0, 0)], foods=[(0, 3, 0)])
-    task = Task(castes={"a": Caste(share=0.5), "b": Caste(share=0.5)})
-    tables = np.broadcast_to(np.arange(4.0).reshape(2, 2, 1, 1), (2, 2, task.n_states, 5))
-    made = Colony(world, task, CONFIG, 0, 8, sharing="frozen", q_values=tables[None])
-    made.begin_episode()
-    before = made.snapshot()
-    for number in range(8):
-        (at,) = np.flatnonzero(before.ant_numbers == number)
-        snapshot, status = next(colony_snapshots(made, follow=number))
-        nest, caste = before.ant_nests[at], before.ant_castes[at]
-        assert (snapshot.ant_nests[0], snapshot.ant_castes[0]) == (nest, caste)
-        assert snapshot.ant_numbers[0] == number
-        assert (status.q_values == 2 * nest + caste).all()
-    assert len({*zip(before.ant_nests.tolist(), before.ant_castes.tolist(), strict=True)}) == 4
-
-
-def test_the_legend_of_learning_tells_the_rewards_of_the_task(monkeypatch) -> None:
-    lines: list[str] = []
-    monkeypatch.setattr(text, "write", lambda frame, line, *_, **__: lines.append(line))
-    task = Task(rewards=Rewards(shaping=2, deliver=50, failed=-4))
-    checkpoints = learning_checkpoints(paper(), CONFIG, checkpoints=(0,), max_steps=5, task=task)
-    next(learning_frames(checkpoints, (1400, 600)))
-    told = {"T onto a trail +2", "Q delivery +50", "F food +3", "X blocked, in vain -4"}
-    assert told <= set(lines)
+def test_an_ant_that_circles_earns_more_than_a_delivery_and_the_picture_says_why(lines) -> None:
+    """docs/rendering.md says so of this seed."""
+    arguments = learning.parse_arguments(["--seed", "7", "--checkpoints", "0", "10", "20"])
+    seed, checkpoints = noted_checkpoints(arguments, paper())
+    assert seed == 7
+    notes = [(checkpoint.note, checkpoint.among) for checkpoint in checkpoints]
+    assert notes == [("", ""), ("circles with food", ""), ("delivered", "")]
+    returns = [int(checkpoint.episode.trace.rewards.sum()) for checkpoint in checkpoints]
+    assert returns[1] > returns[2] == 45
+    told = (ROOT / "docs" / "rendering.md").read_text(encoding="utf-8")
+    assert re.search(rf"returns\s+{returns[1]}\s+after\s+10\s+episodes", told)
+    list(learning_frames(checkpoints, (1200, 480)))
+    assert f"step 150, return {returns[1]}: circles with food" in lines
+    assert "= T 16 + S 16 + F 3 + Q 10" in lines
+    assert "S nearer to the queen +1" in lines  # the legend

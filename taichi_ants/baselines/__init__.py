@@ -1,1 +1,0 @@
-"""Published models as baselines: a double bridge, ant colony optimisation, utility pheromones."""

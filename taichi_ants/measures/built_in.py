@@ -1,0 +1,257 @@
+"""The measures of the package of the state of a colony: one function each.
+
+Measures of `counts` take numbers or arrays, so they also measure lone ants and finished runs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taichi_ants.errors import AntsError
+from taichi_ants.measures.measure import COUNTS, Measure
+from taichi_ants.measures.paths import shortest_path
+from taichi_ants.task.constants import OBSTACLE
+from taichi_ants.task.events import Event
+from taichi_ants.task.field import TRAIL
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.records import Snapshot
+    from taichi_ants.task import Task
+    from taichi_ants.worlds.world import World
+
+Counts = Mapping[str, Any]
+Function = Callable[..., Any]
+BUILT_IN: dict[str, Measure] = {}
+
+
+def _measure(unit: str, summary: str, of: str | None = None, **more: Any) -> Callable[..., Any]:
+    """Return a decorator that adds a function to `BUILT_IN`; the arguments are those of Measure."""
+
+    def add(function: Function) -> Function:
+        name = function.__name__
+        BUILT_IN[name] = Measure(name, function, unit, summary, of, **more)
+        return function
+
+    return add
+
+
+def ratio(part: Any, whole: Any) -> Any:
+    """Return part / whole of numbers or arrays; nan where the whole is 0."""
+    return part / np.where(np.asarray(whole) > 0, whole, math.nan)
+
+
+def share_of(which: np.ndarray) -> float:
+    """Return the share of true entries; nan for an empty array."""
+    return int(np.count_nonzero(which)) / len(which) if len(which) else math.nan
+
+
+@_measure("food items", "deliveries since the start of the episode", COUNTS)
+def deliveries(counts: Counts) -> Any:
+    """Return the number of deliveries since the start of the episode."""
+    return counts["deliveries"]
+
+
+@_measure("food items", "deliveries since the last row of the series", "deliveries")
+def new_deliveries(values: np.ndarray, snapshot: Snapshot) -> float:
+    """Return the number of deliveries since the last row of the series; see `deliveries`."""
+    return values[-1] - values[-2] if len(values) > 1 else values[-1]
+
+
+def _owners(world: World, task: Task) -> tuple[str, ...]:
+    numbers = {"nest": len(world.queens), "food": len(task.foods), "caste": len(task.castes)}
+    return tuple(f"{owner}_{i}" for owner, n in numbers.items() for i in range(max(n, 1)))
+
+
+@_measure("food items", "deliveries by nest, kind of food and caste", COUNTS, parts=_owners)
+def deliveries_by(counts: Counts) -> dict[str, Any]:
+    """Return the number of deliveries since the start of the episode by "nest_0", "food_0", ..."""
+    return {
+        f"{owner}_{i}": number
+        for owner in ("nest", "food", "caste")
+        for i, number in enumerate(counts[f"{owner}_deliveries"])
+    }
+
+
+@_measure("ticks", "first passage time; if there is none, ticks so far", COUNTS)
+def first_delivery(counts: Counts) -> Any:
+    """Return the first passage time: the ticks up to the first delivery of the episode.
+
+    Before the first delivery it is the number of ticks so far. Means over episodes are therefore
+    restricted means (of survival analysis), which are at most the true ones.
+    """
+    first = counts["first_delivery"]
+    return np.where(np.asarray(first) < 0, counts["ticks"], first)
+
+
+@_measure("per ant and tick", "deliveries per living ant and tick", COUNTS)
+def efficiency(counts: Counts) -> Any:
+    """Return the deliveries of the episode per tick and ant that lives now; nan without any."""
+    return ratio(counts["deliveries"], counts["ticks"] * counts["living"])
+
+
+@_measure("ticks", "mean ticks with food of a delivered load", COUNTS)
+def path_length(counts: Counts) -> Any:
+    """Return the mean ticks from pick-up to delivery, of all loads delivered in the episode.
+
+    An ant that walks straight to the queen from a pick-up k moves away from her needs k + 1 ticks.
+    The value is nan before the first delivery.
+    """
+    return ratio(counts["carried"], counts["deliveries"])
+
+
+@_measure("", "path length divided by that of the shortest path")
+def path_ratio(snapshot: Snapshot) -> float:
+    """Return `path_length` divided by the fewest ticks that a load of this world needs, at least 1.
+
+    The fewest ticks are those of `shortest_path`. The value is nan before the first delivery.
+    """
+    shortest = math.nan if snapshot.world is None else shortest_path(snapshot.world)
+    return path_length(snapshot.counts) / shortest
+
+
+@_measure(
+    *("", "entropy of each pheromone field, 0 (one cell) to 1 (equal levels)"),
+    parts=lambda world, task: (TRAIL, *task.fields),
+)
+def entropy(snapshot: Snapshot) -> dict[str, float]:
+    """Return the normalised entropy of the levels of each pheromone field, by its name.
+
+    It is -(sum of p log p) / log N. N is the number of cells that are not obstacles, and p is the
+    level of each of them, divided by the sum of their levels. This is Shannon's entropy [1]_
+    divided by its largest value, which is called Pielou's evenness [2]_. All of the pheromone in
+    one cell gives 0, equal levels in all cells give 1. The value is nan for a field without
+    pheromone, and in a world with one cell.
+
+    .. [1] C. E. Shannon (1948), A mathematical theory of communication, Bell System Technical
+       Journal 27, 379-423.
+    .. [2] E. C. Pielou (1966), The measurement of diversity in different types of biological
+       collections, Journal of Theoretical Biology 13, 131-144.
+    """
+    is_open = snapshot.ground != OBSTACLE
+    return {name: _evenness(levels[is_open]) for name, levels in snapshot.fields.items()}
+
+
+def _evenness(levels: np.ndarray) -> float:
+    """Return the entropy of levels (n,) divided by the logarithm of n; nan if all are 0."""
+    # Few levels differ, and exact sums do not depend on the order of cells.
+    different, times = np.unique(levels[levels > 0].astype(float), return_counts=True)
+    if len(levels) < 2 or not len(different):
+        return math.nan
+    pairs = list(zip(different.tolist(), times.tolist(), strict=True))
+    total = math.fsum(n * level for level, n in pairs)
+    shares = [(level / total, n) for level, n in pairs]
+    summed = math.fsum(n * (p * math.log(p)) for p, n in shares if p > 0)
+    return max(0.0, -summed / math.log(len(levels)))
+
+
+@_measure("", "share of the moves that failed", COUNTS)
+def blocked_share(counts: Counts) -> Any:
+    """Return the share of the moves of the episode that failed; nan before the first move."""
+    return ratio(counts["blocked"], counts["moves"])
+
+
+@_measure("", "share of the ants that moved in the last tick")
+def activity(snapshot: Snapshot) -> float:
+    """Return the share of the ants that entered a cell by their own move in the last tick.
+
+    Ants that were pushed do not count. The value is nan without ants.
+    """
+    events = snapshot.ant_events
+    return share_of((events == Event.ENTERED_EMPTY) | (events == Event.ENTERED_CUE))
+
+
+@_measure("", "variance of the activity, relative to independent ants", "activity")
+def synchrony(values: np.ndarray, snapshot: Snapshot) -> float:
+    """Return how much more the `activity` varies over time than that of independent ants.
+
+    It is n v / (m (1 - m)), the binomial index of dispersion, for n living ants. The mean m and the
+    variance v are those of the activity in the rows of the episode so far, without rows in which no
+    ant lives. The variance is divided by their number. Independent ants with equal, constant
+    activity give about 1. Ants that all move or rest together give n. Studies of activity cycles
+    in ants, such as Cole [1]_, look at the same series, the share of active ants. The value is nan
+    with fewer than two such rows, without ants, and if m is 0 or 1.
+
+    .. [1] B. J. Cole (1991), Short-term activity cycles in ants: generation of periodicity by
+       worker interaction, American Naturalist 137, 244-259.
+    """
+    shares, n = values[~np.isnan(values)].tolist(), len(snapshot.ant_cells)
+    if len(shares) < 2:
+        return math.nan
+    mean = math.fsum(shares) / len(shares)
+    if not n or not 0 < mean < 1:
+        return math.nan
+    variance = math.fsum((share - mean) ** 2 for share in shares) / len(shares)
+    return n * variance / (mean * (1 - mean))
+
+
+@_measure("ants", "number of living ants", COUNTS)
+def living(counts: Counts) -> Any:
+    """Return the number of living ants."""
+    return counts["living"]
+
+
+@_measure("ants", "births that wait for a free cell or slot", COUNTS)
+def waiting_births(counts: Counts) -> Any:
+    """Return the number of food items that wait at the queens to become ants."""
+    return counts["waiting_births"]
+
+
+@_measure("", "share of the ants that carry food")
+def carriers(snapshot: Snapshot) -> float:
+    """Return the share of the living ants that carry food; nan without ants."""
+    return share_of(snapshot.ant_carries)
+
+
+@_measure("", "share of the ants that forage, which are not idle")
+def foraging(snapshot: Snapshot) -> float:
+    """Return the share of the living ants that are not idle; nan without ants."""
+    return share_of(~snapshot.ant_idle)
+
+
+@_measure("steps", "mean distance of the ants to the nearest queen")
+def distance(snapshot: Snapshot) -> float:
+    """Return the mean distance of the ants to the nearest queen in steps; nan without ants."""
+    if not len(snapshot.ant_cells):
+        return math.nan
+    return int(snapshot.distances[snapshot.ant_cells].sum(dtype=np.int64)) / len(snapshot.ant_cells)
+
+
+def regions_of(world: World | None) -> Mapping[str, np.ndarray]:
+    """Return the cells of the regions of a world by name; AntsError if it has none."""
+    if world is None or not world.regions:
+        raise AntsError(
+            "the measure 'regions' needs a world with regions; add them with World.with_regions, "
+            "or with a table [world.regions] in a sweep file."
+        )
+    return world.regions
+
+
+@_measure(
+    *("", "share of the ants in each region of the world"),
+    parts=lambda world, task: tuple(regions_of(world)),
+)
+def regions(snapshot: Snapshot) -> dict[str, float]:
+    """Return the share of the living ants in each region of the world, by its name.
+
+    The shares refer to the living ants on any cell, and are nan without ants. AntsError if the
+    world has no regions.
+    """
+    return shares_in(regions_of(snapshot.world), snapshot)
+
+
+def shares_in(cells_of: Mapping[str, np.ndarray], snapshot: Snapshot) -> dict[str, float]:
+    """Return the share of the living ants in each region, whose cells are given by its name."""
+    return {
+        name: share_of(np.isin(snapshot.ant_cells, snapshot.grid.index(cells)))
+        for name, cells in cells_of.items()
+    }
+
+
+@_measure("ants", "number of ants on each cell (an array)", is_array=True)
+def occupancy(snapshot: Snapshot) -> np.ndarray:
+    """Return the number of ants on each cell, int32 (grid.size,)."""
+    return np.bincount(snapshot.ant_cells, minlength=snapshot.grid.size).astype(np.int32)

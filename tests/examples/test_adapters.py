@@ -1,0 +1,116 @@
+"""The adapters in examples/: data sets of Minari, vector environments of Stable-Baselines3."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taichi_ants import Colony, Life, Task, TrainingConfig, record, record_colony, worlds
+from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
+from taichi_ants.envs.formats import FORMATS, Shown
+from taichi_ants.learners.policies import trail_follower
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning:minari")
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_data_set_is_the_same_after_minari(form, tmp_path, monkeypatch) -> None:
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("h5py")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    from examples.minari_data import from_minari, to_minari
+
+    task = Task(life=Life(births=True, lifespan=15, regrowth=0))
+    training = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 1.0)
+    world = worlds.open_world(5, (6, 6, 6))
+    colony = Colony(world, task, training, 7, 4, q_values=trail_follower())
+    data = record_colony(colony, 1, 40)
+    to_minari(data, "ants/colony-v0", form)
+    assert from_minari("ants/colony-v0") == data
+    loaded, shown = minari.load_dataset("ants/colony-v0"), Shown(task.sees, form)
+    assert loaded.total_episodes == len(data.begins) - 1
+    for k, episode in enumerate(loaded.iterate_episodes()):
+        rows = slice(data.begins[k], data.begins[k + 1])
+        states = [*data.state[rows], data.next_state[rows][-1]]
+        assert shown.states(episode.observations).tolist() == states
+        assert episode.rewards.tolist() == data.reward[rows].tolist()
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning:minari")
+def test_a_data_set_of_another_program_gets_a_world_and_unknown_probabilities(
+    tmp_path, monkeypatch
+) -> None:
+    minari = pytest.importorskip("minari")
+    pytest.importorskip("h5py")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    from gymnasium import spaces
+    from minari.data_collector import EpisodeBuffer
+
+    from examples.minari_data import from_minari
+
+    data = record(worlds.paper(), None, 3, 4, 20)
+    buffers = [
+        EpisodeBuffer(
+            observations=np.append(data.state[a:b], data.next_state[b - 1]).astype(np.int64),
+            actions=data.action[a:b],
+            rewards=data.reward[a:b].astype(float),
+            terminations=np.zeros(b - a, bool),
+            truncations=np.zeros(b - a, bool),  # the collector was stopped
+        )
+        for a, b in zip(data.begins[:-1], data.begins[1:], strict=True)
+    ]
+    form = {"action_space": spaces.Discrete(5), "observation_space": spaces.Discrete(128)}
+    minari.create_dataset_from_buffers("others/ants-v0", buffers, **form)
+    read = from_minari("others/ants-v0", worlds.paper(), form="index")
+    assert np.array_equal(read.state, data.state)
+    assert np.array_equal(read.truncated, data.truncated)
+    assert np.isnan(read.behaviour_probability).all()
+
+
+def adapted(n: int, **settings):
+    """The adapter; tests that call this are skipped without Stable-Baselines3."""
+    pytest.importorskip("stable_baselines3")
+    from examples.sb3_vec_env import SB3VecEnv
+
+    settings = {"observation_format": "one_hot", "max_steps": 60, **settings}
+    return SB3VecEnv(HexForageVectorEnv(n, autoreset_mode="SameStep", **settings))
+
+
+def test_episodes_are_those_of_single_environments_to_the_end() -> None:
+    """With what was seen last, and whether the step limit ended it: both ways occur."""
+    n, table, rng = 6, trail_follower(), np.random.default_rng(0)
+    envs = adapted(n, max_steps=36)
+    alone = [HexForageEnv(observation_format="one_hot", max_steps=36) for _ in range(n)]
+    assert envs.seed(5) == list(range(5, 5 + n))
+    seen = envs.reset()
+    assert envs._seeds == [None] * n  # they count for one reset only
+    now = [env.reset(seed=5 + i) for i, env in enumerate(alone)]
+    assert (seen == np.stack([one for one, _ in now])).all()
+    ends = []
+    for _ in range(130):
+        actions = (table[envs.infos["state"]] + 1.1 * rng.random((n, 5))).argmax(axis=1)
+        seen, rewards, dones, infos = envs.step(actions)
+        assert rewards.dtype == np.float32
+        for i, env in enumerate(alone):
+            one, reward, terminated, truncated, _ = env.step(actions[i])
+            assert (rewards[i], dones[i]) == (reward, terminated or truncated)
+            if dones[i]:
+                assert (infos[i]["terminal_observation"] == one).all()
+                assert infos[i]["TimeLimit.truncated"] is (truncated and not terminated)
+                ends.append(infos[i]["TimeLimit.truncated"])
+                one, _ = env.reset()
+            else:
+                assert infos[i] == {}
+            assert (seen[i] == one).all()
+    assert {True, False} == set(ends)
+
+
+def test_what_sb3_asks_of_single_environments() -> None:
+    envs = adapted(3)
+    envs.reset()
+    assert (np.stack(envs.env_method("action_masks")) == envs.infos["action_mask"]).all()
+    (mask,) = envs.env_method("action_masks", indices=1)
+    assert mask.dtype == bool
+    assert envs.has_attr("action_masks")
+    assert not envs.has_attr("nothing")
+    with pytest.raises(ValueError, match="SameStep"):
+        type(envs)(HexForageVectorEnv(2))
