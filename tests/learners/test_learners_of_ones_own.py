@@ -1,13 +1,15 @@
 """What may stand in a TD error that a user writes, and how the rest is refused."""
 
 import runpy
+import subprocess
+import sys
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 import pytest
 import taichi as ti
-from command_lines import ROOT, run
+from command_lines import ROOT, environment
 
 from taichi_ants import (
     AntsError,
@@ -366,7 +368,9 @@ for learn in (mine.that_forgets_at, mine.beyond_its_memory, mine.of_one_value):
 def test_the_command_tries_all_learners_of_a_file(kernels, tmp_path):
     folders = [str(ROOT / "tests" / name) for name in ("learners", "support")]
     (tmp_path / "plugin.py").write_text(PLUGIN.replace("FOLDERS", repr(folders)))
-    done = run("check", ["plugin.py"], kernels, tmp_path)
+    command = [sys.executable, "-m", "taichi_ants", "check", "plugin.py"]
+    how = {"cwd": tmp_path, "env": environment(kernels), "capture_output": True, "text": True}
+    done = subprocess.run(command, **how)
     assert (done.returncode, done.stderr) == (1, "")
     expected = {
         "fine": "no fault",
