@@ -41,6 +41,13 @@ def checked_world(
     return world
 
 
+def check_ranges(worlds: Sequence[World]) -> None:
+    """Raise AntsError unless all worlds have the same ranges."""
+    ranges = {world.ranges for world in worlds}
+    if len(ranges) > 1:
+        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; give worlds of one size.")
+
+
 def checked_task(
     task: Task | None, what: str, supports: Collection[str], instead: str = "leave it out"
 ) -> Task:

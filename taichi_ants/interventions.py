@@ -72,13 +72,9 @@ class ShorthandSettings(Settings):
         given = value if isinstance(value, Mapping) else cls.short(value)
         if given is None:
             return value
-        known = {one.name: one for one in declared(cls)}
-        for name in given:
-            if name not in known:
-                raise AntsError(f"`{cls.path}.{name}` {not_a_setting(name, known)}")
-        for name, one in known.items():
-            if one.default is MISSING and name not in given:
-                raise AntsError(f"`{cls.path}.{name}` is missing; add it.")
+        for one in declared(cls):
+            if one.default is MISSING and one.name not in given:
+                raise AntsError(f"`{cls.path}.{one.name}` is missing; add it.")
         return cls(**given)
 
     @classmethod
@@ -141,6 +137,12 @@ class OfCells(Intervention):
         super().check()
         if not isinstance(getattr(self, "cells", None), str | None):
             object.__setattr__(self, "cells", _checked_cells(f"{self.path}.cells", self.cells))  # type: ignore[attr-defined]
+
+    def _check_count(self, n: int, form: str) -> None:
+        """Raise AntsError unless there are n cells; `form` says which."""
+        cells: Any = self.cells  # type: ignore[attr-defined]
+        if isinstance(cells, str) or len(cells) != n:
+            raise AntsError(f"`{self.path}.cells` is {shown(cells)}; give {form}.")
 
     @classmethod
     def short(cls, value: Any) -> dict[str, Any] | None:
@@ -228,21 +230,17 @@ class Place(OfCells, path="place"):
 
     what: Annotated[Literal["rock", "food", "queen"], Setting("thing to place")]
     cells: Annotated[Sequence, _CELLS]
-    nest: Annotated[int | None, Setting("nest of the queen, by default 0", least=0)] = None
-    kind: Annotated[str | None, Setting("kind of food; the first if left out")] = None
+    nest: Annotated[
+        int | None, Setting("nest of the queen, by default 0", least=0, only=("what", "queen"))
+    ] = None
+    kind: Annotated[
+        str | None, Setting("kind of food; the first if left out", only=("what", "food"))
+    ] = None
 
     def check(self) -> None:
         super().check()
-        if self.what == "queen" and (isinstance(self.cells, str) or len(self.cells) != 1):
-            has = f"is {self.cells!r}"
-            if not isinstance(self.cells, str):
-                has = f"has {len(self.cells)} cells"
-            raise AntsError(f"`place.cells` {has}; give a list of a single cell for the queen.")
-        for name, of in (("nest", "queen"), ("kind", "food")):
-            if getattr(self, name) is not None and self.what != of:
-                raise AntsError(
-                    f"`place.{name}` is for what = {of!r}, not {self.what!r}; leave it out."
-                )
+        if self.what == "queen":
+            self._check_count(1, "a list of a single cell for the queen")
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
@@ -275,13 +273,7 @@ class Move(OfCells, path="move"):
 
     def check(self) -> None:
         super().check()
-        if isinstance(self.cells, str) or len(self.cells) != 2:
-            has = f"is {self.cells!r}"
-            if not isinstance(self.cells, str):
-                has = f"has {len(self.cells)} cells"
-            raise AntsError(
-                f"`move.cells` {has}; give the cell to move from, then the cell to move to."
-            )
+        self._check_count(2, "the cell to move from, then the cell to move to")
 
     def apply(self, to: Interventions) -> None:
         cell, there = (int(to.index([one])[0]) for one in self.cells)

@@ -45,7 +45,7 @@ from typing import (
     get_type_hints,
 )
 
-from taichi_ants.errors import AntsError, entries_of, is_flag, shown
+from taichi_ants.errors import AntsError, check_word, entries_of, is_flag, shown
 
 Self = TypeVar("Self", bound="Settings")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -199,16 +199,14 @@ class DeclaredSetting(NamedTuple):
         """Return named settings in which `value` replaces or changes those of `start`."""
         entry, entries = self.entry, dict(start)
         for name, one in value.items():
-            if not isinstance(name, str) or not name.isidentifier():
-                raise AntsError(
-                    f"`{self.path}` has the name {shown(name)}; a name has letters, digits and "
-                    "underscores, and does not begin with a digit."
-                )
+            check_word(f"a name in `{self.path}`", name)
             try:
                 kind = entry.entry_named(name)  # type: ignore[attr-defined]
                 entries[name] = one if isinstance(one, kind) else _entry(kind, one, start, name)
             except AntsError as error:
                 raise AntsError(_placed(str(error), entry, f"{self.path}.{name}")) from None
+        if len(entries) > (most := entry.most_entries):  # type: ignore[attr-defined]
+            self._refuse(list(entries), f"{self.allowed}, at most {most}")
         return Named(entries)
 
     def _in_range(self, value: float) -> bool:
@@ -270,7 +268,7 @@ class _Checked(type):
         path = cls.path  # type: ignore[attr-defined]
         try:
             for name in named:
-                if known and name not in known:
+                if known is not None and name not in known:
                     raise AntsError(f"`{_below(path, name)}` {not_a_setting(name, known)}")
             return super().__call__(*values, **named)
         except AntsError as error:
@@ -281,11 +279,11 @@ class _Checked(type):
 
 
 @cache
-def _arguments(cls: type) -> tuple[str, ...]:
-    """Return the names of the arguments of a class; none if it takes any name."""
+def _arguments(cls: type) -> tuple[str, ...] | None:
+    """Return the names of the arguments of a class; None if it takes any name."""
     every = signature(cls.__init__).parameters.values()  # type: ignore[misc]
     if any(one.kind is one.VAR_KEYWORD for one in every):
-        return ()
+        return None
     return tuple(one.name for one in every)[1:]
 
 
@@ -298,6 +296,7 @@ class Settings(metaclass=_Checked):
     """
 
     path: ClassVar[str] = ""
+    most_entries: ClassVar[float] = math.inf  # of this class in a `Named`
     form: ClassVar[str] = ""  # the values that stand for these settings, in the words of messages
 
     def __init_subclass__(cls, path: str = "", **more: Any) -> None:

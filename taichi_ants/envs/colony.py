@@ -55,7 +55,7 @@ class ColonyWorlds(Ants):
         supports: Collection[str] = SUPPORTS,
     ) -> None:
         task = arguments.checked_task(task_of(task), "this environment", supports)
-        super().__init__(n_worlds, task, given, SUPPORTS, METADATA["render_modes"])
+        super().__init__(n_worlds, task, given, supports, METADATA["render_modes"])
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
             replace(task, evaporation_in_evaluation=self.evaporates),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from gymnasium.error import InvalidAction
 
-from taichi_ants.errors import AntsError, check_array, checked_whole, shown
+from taichi_ants.errors import AntsError, as_array, checked_whole, shown
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import GAMMA, mix, stream_state
 from taichi_ants.learners.policies import checked_table, frozen_policy
@@ -61,7 +61,7 @@ class Rollout(NamedTuple):
     def check_like(self, other: Rollout) -> None:
         """Raise AntsError unless the arrays of this `out` have the shapes and types of another."""
         for name, mine, wanted in zip(self._fields[:-1], self, other, strict=False):
-            check_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
+            as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
             if not mine.flags.carray:
                 raise AntsError(
                     f"out.{name} is not contiguous or not writeable; give a rollout that "

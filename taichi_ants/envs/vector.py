@@ -24,7 +24,6 @@ from taichi_ants.errors import (
     check_one_of,
     checked_flag,
     checked_whole,
-    count,
     expect,
     shown,
     whole,
@@ -159,14 +158,12 @@ def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World,
             f"world is {shown(world)}; give the name of a world, a World, or a list of them."
         )
     if len(given) > most:
-        raise AntsError(f"world lists {count(len(given), 'world')}; it must list at most {most}.")
+        raise AntsError(f"world lists {len(given)} worlds; it must list at most {most}.")
     several = tuple(
         arguments.checked_world(_world_of(one), what="the environment", supports=supports)
         for one in given
     )
-    ranges = {one.ranges for one in several}
-    if len(ranges) > 1:
-        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must be the same.")
+    arguments.check_ranges(several)
     return several
 
 

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.errors import AntsError, as_array, check_one_of, expect, shown
 from taichi_ants.files import PathLike, to_json
 from taichi_ants.files.archives import Kind
 from taichi_ants.learners.config import TrainingConfig
@@ -59,12 +59,7 @@ class Policy(NamedTuple):
         States are an integer or integers of any shape; AntsError if a state does not exist.
         """
         expect("rng", rng, np.random.Generator)
-        states = np.asarray(states)
-        if states.dtype.kind not in "iu" or ((states < 0) | (states >= len(self.q_values))).any():
-            raise AntsError(
-                f"states is {shown(states)}; they must be integers from 0 to "
-                f"{len(self.q_values) - 1}."
-            )
+        states = as_array("states", states, "iu", None, 0, len(self.q_values) - 1)
         values = self.q_values[states]
         best = values == values.max(axis=-1, keepdims=True)
         return np.where(best, rng.random(values.shape), -1.0).argmax(axis=-1)
@@ -207,16 +202,8 @@ def save_policy(
         observation: Name of the registered observation whose states index the rows.
     """
     table = _checked(q_values, observation)
-    if not isinstance(metadata, Mapping):
-        raise AntsError(f"metadata is {shown(metadata)}; it must be a mapping of names to values.")
-    try:
-        to_json(metadata)
-    except (TypeError, ValueError, RecursionError) as error:
-        reason = str(error) or type(error).__name__
-        raise AntsError(
-            f"metadata is {shown(metadata)}, which JSON cannot represent ({reason}); use numbers, "
-            "text, lists and mappings."
-        ) from error
+    expect("metadata", metadata, Mapping)
+    to_json(metadata)  # raises TypeError
     _KIND.write(path, {"observation": observation, "metadata": metadata}, {"q_values": table})
 
 
@@ -230,14 +217,7 @@ def load_policy(path: PathLike) -> Policy:
 
 
 def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
-    table = checked_values(q_values, Task(observations.get(observation).name))
-    if table.ndim != 2:
-        indices = ", ".join("0" * (table.ndim - 2))
-        raise AntsError(
-            f"q_values has shape {table.shape}, but a policy file has one table, "
-            f"{table.shape[-2:]}; give one of them, for example q_values[{indices}]."
-        )
-    return table
+    return checked_table(q_values, Task(observations.get(observation).name))
 
 
 def checked_values(q_values: Any, task: Task) -> np.ndarray:
@@ -245,13 +225,8 @@ def checked_values(q_values: Any, task: Task) -> np.ndarray:
 
     Also accepts an object with `q_values`: a `TrainingResult`, a `Policy` or a `Colony`.
     """
-    q_values, shape = getattr(q_values, "q_values", q_values), (task.n_states, N_ACTIONS)
-    try:
-        values = np.asarray(q_values)
-    except ValueError:  # rows of different lengths
-        values = np.empty(0, object)
-    if values.dtype.kind not in "fiu":
-        raise AntsError(f"q_values is {shown(q_values)}; it must be an array of real numbers.")
+    shape = (task.n_states, N_ACTIONS)
+    values = as_array("q_values", getattr(q_values, "q_values", q_values), "fiu")
     if values.shape[-2:] != shape or values.size == 0:
         raise AntsError(
             f"q_values has shape {values.shape}; for the observation {task.observation!r} it must "

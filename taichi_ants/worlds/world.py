@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, check_one_of, shown, whole
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import choose, stream_state
@@ -201,9 +201,7 @@ class World:
             where: "nest" for the free cells nearest to the ant's queen, "spread" for any free
                 cells. With several nests, ants choose in the order of their numbers.
         """
-        seed, n = whole("seed", seed), whole("n", n)
-        if n < 1:
-            raise AntsError(f"n is {shown(n)}; there must be at least 1 ant.")
+        seed, n = whole("seed", seed), checked_whole("n", n)
         check_one_of("where", where, STARTS)
         cells, headings = self.grid.index(self.ants[:n, :3]), self.ants[:n, 3]
         if len(cells) < n:

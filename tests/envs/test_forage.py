@@ -436,7 +436,7 @@ def test_wrong_steps_raise_what_gymnasium_raises():
         ({"world": "nowhere"}, "there is no world 'nowhere'"),
         ({"world": 3}, "world is 3; give the name of a world"),
         ({"world": []}, "world is []"),
-        ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "all must be the same"),
+        ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "give worlds of one size"),
         ({"world": SMALL, "num_envs": 2}, "world lists 3 worlds; it must list at most 2"),
         ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
         ({"task": 3}, "a Task"),

@@ -314,7 +314,7 @@ def test_exports_are_files_of_the_project(edited, tmp_path):
     policy = load_policy(tmp_path / "x")
     assert np.array_equal(policy.q_values, session.colony.q_values[0])
     assert policy.task == session.colony.task
-    with pytest.raises(AntsError, match="has its own table"):
+    with pytest.raises(AntsError, match="several tables"):
         edited("paper").policy_bytes()
     for name in ("foraging", "paper", "nests"):
         one = edited(name)
@@ -598,7 +598,7 @@ def test_a_policy_is_a_training_or_one_table(table):
 
 def test_a_policy_of_several_nests_is_exported_if_they_share_it(tmp_path):
     two = SETUPS["nests"]
-    with pytest.raises(AntsError, match=r"^each nest has its own table, but .* export the colony"):
+    with pytest.raises(AntsError, match=r"^ants have several tables, but .* export the colony"):
         Session(two).policy_bytes()
     table = trail_follower("ants")
     follows = Session(replace(two, policy=table))
@@ -779,7 +779,7 @@ def test_ants_that_choose_without_action_values_need_no_policy(tmp_path, policy)
     assert {"ants", "deposit"} <= one.values().keys()
     assert not {"epsilon", "learning_rate"} & one.values().keys()
     assert one.header()["rule"] == "deneubourg"
-    with pytest.raises(AntsError, match="rule deneubourg has no policy"):
+    with pytest.raises(AntsError, match="ants have no table"):
         one.policy_bytes()
     one.save(tmp_path / "one.npz")
     assert Session.load(tmp_path / "one.npz").same(one)

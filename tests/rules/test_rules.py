@@ -459,7 +459,9 @@ def reads_a_field(levels_home):
 
 def test_a_rule_that_reads_a_field_needs_it(clean):
     rules.register("choice")(reads_a_field)
-    with pytest.raises(AntsError, match=r"reads the field 'home'; add `task\.fields\.home`"):
+    with pytest.raises(
+        AntsError, match=r"'reads_a_field' reads is 'home'; it must be one of trail"
+    ):
         Task(choice="reads_a_field")
     Task(choice="reads_a_field", fields={"home": Field()})
 
@@ -528,7 +530,7 @@ def test_rules_that_read_labour_or_fields_need_them(clean):
         Task(choice="hungry")
     castes, labour = {"one": {"threshold": 1.0}}, "thresholds"
     assert Task().replace(choice="hungry", castes=castes, labour=labour).choice.own_rule
-    with pytest.raises(AntsError, match=r"^the rule 'alarm' reads the field 'B'; add `task\.fiel"):
+    with pytest.raises(AntsError, match=r"^a field that the rule 'alarm' reads is 'B'; it must"):
         Task(pheromone=Pheromone(deposit="alarm"))
     with pytest.raises(AntsError, match=r"'levels_B', which is not an input .* level_FIELD, or"):
         rules.register("deposit")(reads_ahead)

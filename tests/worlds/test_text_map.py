@@ -123,7 +123,7 @@ def test_damaged_maps(text: str, message: str) -> None:
 
 @pytest.mark.parametrize("text", [None, b"Q", 5, ["Q"]])
 def test_a_map_is_text(text: object) -> None:
-    with pytest.raises(AntsError, match=f"{type(text).__name__}; it must be text"):
+    with pytest.raises(AntsError, match=r"the map is .*; it must be text"):
         from_text(text)
 
 

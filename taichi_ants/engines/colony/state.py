@@ -37,11 +37,12 @@ from taichi_ants.engines.layout import compass_of, note_best_actions, padded
 from taichi_ants.engines.records import Snapshot, same
 from taichi_ants.errors import (
     AntsError,
-    check_array,
+    as_array,
     check_one_of,
     checked_whole,
     count,
     entries_of,
+    expect,
     shown,
 )
 from taichi_ants.features import CASTES, COLONY, refuse_unsupported
@@ -146,11 +147,8 @@ class ColonyState:
                 f"values, but sharing is {shown(sharing)} and there is a training or q_values; set "
                 'sharing to "frozen" and training to None, and leave out q_values.'
             )
-        if not isinstance(training, TrainingConfig):
-            raise AntsError(
-                f"training is {shown(training)}; it must be one TrainingConfig, or None with "
-                'sharing="frozen" and without q_values.'
-            )
+        expect("training", training, TrainingConfig)
+        assert training is not None
         (self.training,) = arguments.checked_configs(training)
         follows = bool(self.task.castes) and all(one.policy for one in self.task.castes.values())
         if not self.learns and q_values is None and self.has_training and not follows:
@@ -1031,7 +1029,7 @@ class ColonyState:
                 colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:
                 array, kept = colony.arrays[name], arrays[f"array_{name}"]
-                check_array(name, kept, array.dtype, array.shape)
+                as_array(name, kept, array.dtype, array.shape)
                 array[:] = kept
             colony.ready = colony.arrays["episodes"] >= 0
         return colony
@@ -1104,9 +1102,5 @@ def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -
         raise AntsError(
             f"there are {len(worlds)} worlds for {n_seeds} seeds; give one world per seed."
         )
-    ranges = {world.ranges for world in worlds}
-    if len(ranges) > 1:
-        raise AntsError(
-            f"the worlds have the ranges {sorted(ranges)}; give worlds of equal ranges."
-        )
+    arguments.check_ranges(worlds)
     return worlds

@@ -15,7 +15,7 @@ from taichi_ants import arguments, learners, runtime
 from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.runs.engine import Progress, Runs, do_episodes
 from taichi_ants.engines.runs.results import Rollouts, RunState, TrainingResult, memory_for
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import check_finite, checked_values
 from taichi_ants.task import Task
@@ -87,8 +87,7 @@ def continue_training(
     It equals, bit for bit, the result of a single training with the sum of the episodes; `seconds`
     is the time of the new ones. Other arguments and errors are those of `train`.
     """
-    if not isinstance(result, TrainingResult):
-        raise AntsError(f"result is {shown(result)}; it must be a TrainingResult.")
+    expect("result", result, TrainingResult)
     arguments.checked_configs(result.configs)
     state = result.state
     given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])

@@ -257,7 +257,7 @@ WRONG = [
     (lambda: At(3, place={"what": "lava", "cells": [[1, 2, 3]]}), "`place.what` is 'lava'"),
     (lambda: At(3, clear=[[1, 2]]), "`clear.cells` has the cell [1, 2]; a cell is three"),
     (lambda: At(3, clear=[]), "`clear.cells` is empty; give at least one cell"),
-    (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` has 1 cells; give the cell to move from"),
+    (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` is ((1, 2, 0),); give the cell to move from"),
     (lambda: At(3, policy="nix"), "`policy` is 'nix'; it must be one of random, trail_follower"),
     (lambda: At(3, task={"pheromone.levl": 3}), "`task.pheromone.levl` is not a setting; choose"),
     (lambda: At(3, task="following"), "`at.task` is 'following'; it must be a table of settings"),
@@ -324,5 +324,5 @@ def test_wrong_protocols_are_refused_in_one_sentence():
         assert str(caught.value).endswith(".")
         assert colony.epsilon == 0.05
     learns = Colony(worlds.paper(), FORAGING, TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0))
-    with pytest.raises(AntsError, match="do not follow a policy"):
+    with pytest.raises(AntsError, match="follow no policy"):
         learns.run(1, 100, protocol=At(3, policy="random"))
