@@ -59,8 +59,10 @@ class Registry(Generic[T]):
 
     def check_new(self, name: object) -> None:
         """Raise AntsError unless you can register an entry by this name."""
-        if not (self._any_text and isinstance(name, str) and name.strip()):
+        if not self._any_text:
             check_word(f"the name of the {self.kind}", name)
+        elif not isinstance(name, str) or not name.strip():
+            raise AntsError(f"the name of the {self.kind} is {shown(name)}; it must be text.")
         if name in self.built_in or name in self._reserved:
             raise AntsError(
                 f"{name!r} is the name of a built-in {self.kind}, which cannot be replaced; choose "
