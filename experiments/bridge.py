@@ -13,37 +13,30 @@ from taichi_ants.studies.interruption import stoppable
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     from collections.abc import Mapping, Sequence
-    from dataclasses import asdict, replace
+    from dataclasses import dataclass, replace
     from functools import partial
-    from pathlib import Path
     from typing import Any
 
+    import bridge_report as shown
     import numpy as np
-    from bridge_report import (
-        DESIGNS,
-        LATE,
-        LOADS,
-        WINDOWS,
-        Design,
-        bridges,
-        length,
-        write_results,
-    )
-    from colony import learning, scheduled
+    from bridge_report import BRIDGES, DESIGNS, LATE, LOADS, WINDOWS, Design, bridges
+    from colony import LEARNING, scheduled
 
-    from taichi_ants import Colony, Life, Task
+    from taichi_ants import AntsError, Colony, Life, Task, files
+    from taichi_ants.analysis import style
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.studies import command_line
-    from taichi_ants.studies.blocks import kept
+    from taichi_ants.studies.command import run_study
     from taichi_ants.studies.command_line import whole_number
-    from taichi_ants.studies.points import ColonyPoint, settings_of
-    from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.runner import Study
+    from taichi_ants.studies.folder import Results
+    from taichi_ants.studies.points import ColonyPoint
+    from taichi_ants.studies.study import Study
     from taichi_ants.task import foraging, queueing
     from taichi_ants.task.constants import EMPTY, OBSTACLE
     from taichi_ants.worlds import double_bridge
     from taichi_ants.worlds.double_bridge import ROOM_RADIUS, branch_cells, junction_cells
 
+VERSION = 1  # of the arrays that are kept of each run
 REACH = 50  # number of ticks for which an ant lays a trail
 QUICK = {"seeds": 4, "episodes": 20, "ticks": 500, "evaluation_ticks": 1000}
 _LOOK_EVERY = 4  # ticks; all branches are longer, so no crossing is missed
@@ -66,6 +59,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     )
     add("--quick", action="store_true", help=quick)
     command_line.add_common(parser)
+    command_line.add_machines(parser)
     command_line.add_results(parser, "bridge")
     settings, given = parser.parse_given(arguments)
     for name in QUICK.keys() - given.keys() if settings.quick else ():
@@ -91,34 +85,75 @@ def point(design: Design, episodes: int, ticks: int) -> ColonyPoint:
     """
     right, left, *_ = bridges(design).values()
     pool = double_bridge(**right), double_bridge(**left)
-    several = pool[0], task(design), scheduled(learning(), episodes), pool, design.ants
+    several = pool[0], task(design), scheduled(LEARNING, episodes), pool, design.ants
     return ColonyPoint(*several, episodes=episodes, ticks=ticks, rollouts=1)
 
 
-def followed(
-    design: Design,
-    learned: ColonyPoint,
-    seeds: Sequence[int],
-    q_values: np.ndarray,
-    ticks: int,
-    where: Mapping[str, Any],
-) -> dict[str, np.ndarray]:
-    """Return the `crossings` of trained colonies on each bridge.
+@dataclass(frozen=True)
+class Plan:
+    """The study, the point of each design, and the ticks of an evaluation."""
 
-    Training in the point `learned` gave the tables `q_values`, float32 (seeds, n_states, 5). An
-    episode has `ticks`, twice as many on `LATE`; `where` has the arguments `threads` and `arch`.
+    study: Study
+    points: Mapping[Design, ColonyPoint]
+    ticks: int
+
+
+def plan(options: Mapping[str, Any]) -> Plan:
+    """Return the study."""
+    seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
+    lengths = options["episodes"], options["ticks"]
+    points = {design: point(design, *lengths) for design in DESIGNS}
+    ticks = options["evaluation_ticks"]
+    followed = partial(crossed, {one: design for design, one in points.items()}, ticks)
+    array = f"crossings_{ticks}"
+    return Plan(Study(tuple(points.values()), seeds, (array,), followed), points, ticks)
+
+
+def crossed(
+    designs: Mapping[ColonyPoint, Design],
+    ticks: int,
+    points: Sequence[ColonyPoint],
+    seeds: Sequence[int],
+    outcome: Mapping[str, np.ndarray],
+) -> dict[str, np.ndarray]:
+    """Return the `crossings` of trained colonies on each bridge, by its number in `BRIDGES`.
+
+    Arrays are int64 (1, seeds, WINDOWS, loads, branches). An episode has `ticks`, twice as many on
+    `LATE`.
     """
-    found = {}
-    for name, bridge in bridges(design).items():
+    (learned,), q_values, found = points, outcome["q_values"][0], {}
+    for name, bridge in bridges(designs[learned]).items():
         late, parts, world = name == LATE, [], double_bridge(**bridge)
         # Interventions need a colony with a single world.
         each = [slice(s, s + 1) for s in range(len(seeds))] if late else [slice(None)]
         for some in each:
-            given = world, seeds[some], q_values[some], False
-            colony = learned.colony(*given, schedule="by_world", **where)
-            parts.append(crossings(colony, bridge, length(name, ticks), ticks if late else 0))
-        found[name] = np.concatenate(parts, axis=-1)
+            colony = learned.colony(world, seeds[some], q_values[some], False, schedule="by_world")
+            parts.append(crossings(colony, bridge, shown.length(name, ticks), ticks if late else 0))
+        array = np.moveaxis(np.concatenate(parts, axis=-1), -1, 0)[None]
+        found[f"crossings_{ticks}.{BRIDGES.index(name)}"] = array
     return found
+
+
+def tables(plan: Plan, results: Results) -> str:
+    """Return the report, which needs all runs, and write counts and figures."""
+    if not results.present.all():
+        raise AntsError("not all runs are there yet, and the report compares all designs; wait.")
+    arrays = results.read(f"crossings_{plan.ticks}")
+    found = {
+        design: {
+            name: np.moveaxis(arrays[f"crossings_{plan.ticks}.{BRIDGES.index(name)}"][row], 0, -1)
+            for name in bridges(design)
+        }
+        for row, design in enumerate(plan.points)
+    }
+    table = shown.rows(found, plan.study.seeds, plan.ticks)
+    files.write_csv(results.folder / "shares.csv", table, list(table[0]))
+    if results.figures:
+        folder = files.check_writable_folder(results.folder / "figures")
+        with style.all_or_none(folder):
+            shown.draw(folder / "bridge.png", found, plan.ticks)
+            shown.draw_late(folder / "late.png", found, plan.ticks)
+    return shown.report(found, plan.ticks)
 
 
 def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0) -> np.ndarray:
@@ -133,7 +168,13 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     Returns:
         int64 (WINDOWS, loads, branches, worlds): foragers then carriers, short branch then long.
     """
-    zone, n_worlds = _zones(bridge), len(colony.seeds)
+    # The room or branch of each cell; a junction belongs to its room.
+    grid, junctions = double_bridge(**bridge).grid, junction_cells(**bridge)
+    pile = grid.distances(tuple((junctions[1] + junctions[0]).tolist()))
+    zone = np.where(pile <= ROOM_RADIUS + 1, _FOOD_ROOM, _QUEEN_ROOM)
+    for number, cells in zip((_SHORT, _LONG), branch_cells(**bridge), strict=True):
+        zone[grid.index(cells)] = number
+    n_worlds = len(colony.seeds)
     world = np.repeat(np.arange(n_worlds), colony.capacity)
     counts = np.zeros((WINDOWS, len(LOADS), 2, n_worlds), np.int64)
     room, branch = np.full(len(world), _QUEEN_ROOM), np.full(len(world), _SHORT)
@@ -157,43 +198,14 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     return counts
 
 
-def _zones(bridge: dict[str, Any]) -> np.ndarray:
-    """Return the room or branch of each cell; a junction belongs to its room."""
-    grid, junctions = double_bridge(**bridge).grid, junction_cells(**bridge)
-    zone = np.full(grid.size, _QUEEN_ROOM)
-    pile = junctions[1] + junctions[0]
-    zone[grid.distances(tuple(pile.tolist())) <= ROOM_RADIUS + 1] = _FOOD_ROOM
-    for number, cells in zip((_SHORT, _LONG), branch_cells(**bridge), strict=True):
-        zone[grid.index(cells)] = number
-    return zone
-
-
-def study(settings: argparse.Namespace) -> None:
-    """Run the study, or show its results if it is finished."""
-    command_line.load_plugin(settings.plugin)
-    seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
-    points = {design: point(design, settings.episodes, settings.ticks) for design in DESIGNS}
-    training = Study(tuple(points.values()), seeds)
-    ticks, where = settings.evaluation_ticks, {"threads": settings.threads, "arch": settings.arch}
-
-    def work(blocks: Path, ready: Path) -> None:
-        found = {}
-        with command_line.progress_bar("bridge") as progress:
-            outcomes = training.run(blocks, lambda share: progress(0.6 * share), **where)
-            for number, (design, one) in enumerate(points.items()):
-                path, given = blocks / f"followed-{number:06d}.npz", (design, one, seeds)
-                about = {**settings_of([one], seeds), "design": asdict(design), "ticks": ticks}
-                make = partial(followed, *given, outcomes[one]["q_values"], ticks, where)
-                found[design] = kept(path, about, make)
-                progress(0.6 + 0.4 * (number + 1) / len(points))
-        write_results(ready, found, seeds, ticks, draws=not settings.no_figures)
-
-    work_or_show(settings, {**training.settings(), "evaluation_ticks": ticks}, work)
-
-
 def main(arguments: list[str] | None = None) -> None:
     """Run the script."""
-    command_line.run_command(lambda: study(parse_arguments(arguments)), command_line.AGAIN)
+    command_line.run_command(lambda: start(arguments), command_line.AGAIN)
+
+
+def start(arguments: list[str] | None = None) -> None:
+    """Run the study, or show its results if it is finished."""
+    run_study(parse_arguments(arguments), __file__)
 
 
 if __name__ == "__main__":

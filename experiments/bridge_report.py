@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taichi_ants import files
 from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import LEAST_SEEDS
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.analysis.sweeps import draw_lines
 from taichi_ants.analysis.tables import Table, interval, number, plain_text, sentence
 from taichi_ants.errors import count
-from taichi_ants.files.results import REPORT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -110,20 +108,6 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
     ]
 
 
-def write_results(
-    folder: Path, found: Crossings, seeds: Sequence[int], ticks: int, draws: bool
-) -> None:
-    """Write counts, report and, if `draws`, figures of evaluations of `ticks` ticks."""
-    table = rows(found, seeds, ticks)
-    files.write_csv(folder / "shares.csv", table, list(table[0]))
-    files.write_text(folder / REPORT, report(found, ticks))
-    if draws:
-        figures = files.check_writable_folder(folder / "figures")
-        with style.all_or_none(figures):
-            draw(figures / "bridge.png", found, ticks)
-            draw_late(figures / "late.png", found, ticks)
-
-
 def report(found: Crossings, ticks: int) -> str:
     """Return tables of the late shares of all designs and of the shares after a late opening."""
     headers = [*asdict(Design())]
@@ -186,7 +170,11 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
             _draw_shares(axes, {"": found[Design()][bridge], **ahead}, ticks)
             axes.set(title=title, xlabel="Tick")
         for axes, (name, values) in zip(below, PANELS.items(), strict=True):
-            mirrored = np.array([_of_both_sides(found, name, value) for value in values])
+            several = [found[replace(Design(), **{name: value})] for value in values]
+            sides = [
+                [late_shares(one[side]) for side in (SHORT_RIGHT, SHORT_LEFT)] for one in several
+            ]
+            mirrored = np.mean(sides, axis=1)
             _draw_lines(axes, {load: (values, mirrored[:, k]) for k, load in enumerate(LOADS)})
             axes.set(title=name.capitalize())
             if name != "evaporation":
@@ -201,11 +189,6 @@ def draw(path: Path, found: Crossings, ticks: int) -> None:
         title = "Share of crossings by the short branch of a double bridge"
         style.frame(figure, title, caption, style.legend_entries(above))
     style.save(figure, path)
-
-
-def _of_both_sides(found: Crossings, name: str, value: Any) -> np.ndarray:
-    bridges = found[replace(Design(), **{name: value})]
-    return np.mean([late_shares(bridges[one]) for one in (SHORT_RIGHT, SHORT_LEFT)], axis=0)
 
 
 def draw_late(path: Path, found: Crossings, ticks: int) -> None:

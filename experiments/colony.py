@@ -4,8 +4,8 @@
 seeds, and writes tables, figures and findings to a folder. `live` runs a colony of any size, or
 many in parallel, and can save, resume and draw it. See docs/colony_study.md.
 
-To add rules, add entries to `RULES` (`colony_findings`) and `TASKS`. To add a kind of world, add an
-entry to `WORLDS` there, and extend `place`.
+To add rules, name them in `colony_series.toml`, and add an entry to `TASKS`. To add a kind of
+world, name it there, and extend `world_of`.
 """
 
 from __future__ import annotations
@@ -19,53 +19,20 @@ from taichi_ants.studies.interruption import stoppable
 with stoppable():  # Ctrl-C also works during these slow imports
     import argparse
     import sys
-    from collections.abc import Iterable, Mapping, Sequence
-    from dataclasses import replace
-    from functools import partial
+    from collections.abc import Mapping, Sequence
+    from dataclasses import dataclass, replace
     from itertools import product
     from pathlib import Path
     from typing import Any
 
+    import colony_findings as study
     import numpy as np
     from colony_figures import draw_all
-    from colony_findings import (
-        ABC,
-        ABC_SILENT,
-        ABROAD,
-        ALONE,
-        BC,
-        EVALUATION_EPSILON,
-        FEW,
-        JOINT,
-        OF_STUDY,
-        PAPER,
-        QUEUES,
-        RULES,
-        SILENT,
-        SOME,
-        WORLD_KINDS,
-        WORLDS,
-        A,
-        Condition,
-        Judged,
-        Measured,
-        Results,
-        difference_rows,
-        found,
-        glance,
-        headlines,
-        means,
-        of_largest,
-        on_one_screen,
-        rows_of_seeds,
-    )
+    from colony_findings import JOINT, WORLD_KINDS, WORLDS, Condition, Results
 
     from taichi_ants import (
         AntsError,
         Colony,
-        Life,
-        Pheromone,
-        Task,
         TrainingConfig,
         World,
         commands,
@@ -79,29 +46,22 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.findings import seeds_in_words
     from taichi_ants.analysis.tables import markdown, plain_text, sentence
     from taichi_ants.errors import count
-    from taichi_ants.files.results import MANIFEST, REPORT
-    from taichi_ants.learners.policies import load_policy, save_policy
+    from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import COLONY, Run, values_of
-    from taichi_ants.report.page import (
-        Player,
-        Shown,
-        Statement,
-        Statements,
-        fill,
-        made_facts,
-        setting_facts,
-    )
+    from taichi_ants.report import page
+    from taichi_ants.settings import nested
     from taichi_ants.studies import command_line
-    from taichi_ants.studies.blocks import Blocks, Outcome
+    from taichi_ants.studies.command import run_study
     from taichi_ants.studies.command_line import whole_number
-    from taichi_ants.studies.machines import chosen
-    from taichi_ants.studies.points import ColonyPoint, Progress
-    from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.runner import VALUE, Study
-    from taichi_ants.task import foraging, paper, queueing
+    from taichi_ants.studies.folder import MANIFEST, PAGE, REPORT
+    from taichi_ants.studies.folder import Results as Runs
+    from taichi_ants.studies.points import ColonyPoint, Drawn, settings_of
+    from taichi_ants.studies.study import Study
+    from taichi_ants.task import Life, Pheromone, Task, foraging, paper, queueing
     from taichi_ants.viewer import record_colony
 
-SEEDS, FIGURES, POLICIES = "seeds.csv", "figures", "policies"
+VERSION = 1  # of the arrays that are kept of each run
+LEARNING = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)  # without the decays that `scheduled` adds
 QUICK = {
     **{"world_kinds": ("paper", "open", "piles"), "sizes": (1, 16, 64), "seeds": 8},
     **{"episodes": 20, "ticks": 500, "rollouts": 2},
@@ -116,20 +76,20 @@ _SILENT, _LIVELY = Pheromone(deposit="none"), Life(regrowth=0)
 TASKS: dict[str, Task] = {
     rules: replace(task, evaporation_in_training=True, life=_LIVELY)
     for rules, task in {
-        PAPER: paper(),
-        SILENT: replace(paper(), pheromone=_SILENT),
-        A: replace(paper(), pheromone=foraging().pheromone),
-        BC: replace(foraging(), pheromone=paper().pheromone),
-        ABC: foraging(),
-        ABC_SILENT: replace(foraging(), pheromone=_SILENT),
-        QUEUES: queueing(),
+        study.PAPER: paper(),
+        study.SILENT: replace(paper(), pheromone=_SILENT),
+        study.A: replace(paper(), pheromone=foraging().pheromone),
+        study.BC: replace(foraging(), pheromone=paper().pheromone),
+        study.ABC: foraging(),
+        study.ABC_SILENT: replace(foraging(), pheromone=_SILENT),
+        study.QUEUES: queueing(),
     }.items()
 }
 # Rules whose policies are also evaluated with more ants, and in other worlds, than in training.
-COMPARED = (PAPER, ABC, QUEUES)
-TRAINED_WITH = {ALONE: 1, FEW: 4, SOME: 16}
+COMPARED = (study.PAPER, study.ABC, study.QUEUES)
+TRAINED_WITH = {study.ALONE: 1, study.FEW: 4, study.SOME: 16}
 OPEN, LARGE_SIZE = "open", 1000
-POOL, FIRST_OF_POOL = 64, 1 << 20  # number of worlds for training, and the first one's seed
+_POOL = range(1 << 20, (1 << 20) + 64)  # seeds of the worlds for training
 EXPLORING = 0.7  # the share of training episodes in which epsilon and the learning rate decrease
 OPTIMISM = 10.0  # the initial action value, above most true values
 # Kinds of world in which food moves or takes time to grow back.
@@ -139,7 +99,7 @@ _PILES = {"piles": 3, "moving": 3, "one_pile": 1}  # number of piles; there is n
 SHOWN_TICKS, MOST_SHOWN = 240, 1000  # of recordings: ticks, and ants at most
 
 # The point of each condition; conditions can share points.
-Plan = dict[Condition, ColonyPoint]
+Conditions = dict[Condition, ColonyPoint]
 
 
 def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
@@ -171,7 +131,7 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
     )
     add("--quick", action="store_true", help=quick)
     parser.open_settings, parser.own_settings = ("training",), _PLANNED
-    command_line.add_settings(parser, learning())
+    command_line.add_settings(parser, LEARNING)
     command_line.add_common(parser)
     command_line.add_machines(parser)
     command_line.add_results(parser, "colony")
@@ -180,16 +140,10 @@ def parse_arguments(arguments: Sequence[str]) -> argparse.Namespace:
         setattr(settings, name, QUICK[name])
     settings.world_kinds = tuple(one for one in WORLDS if one in settings.world_kinds)
     settings.sizes = tuple(sorted({1, *settings.sizes}))
-    settings.command = "colony"
     return command_line.with_folder(settings, "colony")
 
 
 # Training, worlds and rules of each condition.
-
-
-def learning() -> TrainingConfig:
-    """Return the default training, without the decays, which `scheduled` adds."""
-    return TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0)
 
 
 def scheduled(training: TrainingConfig, episodes: int) -> TrainingConfig:
@@ -214,55 +168,74 @@ def task_in(world_kind: str, task: Task) -> Task:
     return replace(task, life=LIVES.get(world_kind, _LIVELY))
 
 
-def place(world_kind: str, seed: int) -> World:
-    """Return the world of a kind and a seed; the paper's world ignores the seed."""
+def world_of(world_kind: str) -> World | Drawn:
+    """Return the world of a kind, or the recipe of one for each seed."""
     if world_kind == "paper":
         return worlds.paper()
     ranges = RANGES.get(world_kind, (30, 30, 30))
     if world_kind in _PILES:
-        return worlds.far_piles(seed, ranges, piles=_PILES[world_kind])
-    return worlds.open_world(seed, ranges, rock_share=0.3 if world_kind == "rocks" else 0.15)
+        return Drawn.by("far_piles", ranges=ranges, piles=_PILES[world_kind])
+    return Drawn.by("open", ranges=ranges, rock_share=0.3 if world_kind == "rocks" else 0.15)
 
 
-def _drawn(world_kind: str, seeds: Iterable[int]) -> tuple[World, ...] | None:
-    return None if world_kind == "paper" else tuple(place(world_kind, seed) for seed in seeds)
+@dataclass(frozen=True)
+class Plan:
+    """The study of some conditions, of kinds of world and numbers of ants."""
+
+    study: Study
+    conditions: Conditions
+    world_kinds: tuple[str, ...]
+    sizes: tuple[int, ...]
+
+    def facts(self) -> dict[str, Any]:
+        """Return facts for the manifest of the results."""
+        return {"world_kinds": self.world_kinds, "sizes": self.sizes}
 
 
-def plan(
-    world_kinds: Sequence[str],
-    sizes: Sequence[int],
-    seeds: Sequence[int],
-    training: TrainingConfig,
-    episodes: int,
-    ticks: int,
-    rollouts: int,
-) -> Plan:
-    """Return the conditions of some kinds of world, which are names in `WORLDS`.
-
-    `sizes` are ascending. Ants that train in one kind of world and act in another have the last
-    size.
+def plan(options: Mapping[str, Any]) -> Plan:
+    """Return the study, which evaluates all conditions with and without exploration.
 
     Raises:
         AntsError: Ants cannot share a table with the learner.
     """
+    given = nested({path: value for path, value in options.items() if "." in path})
+    training = LEARNING.replace(**given.get("training", {}))
     if learners.get(training.learner).td_error is None:
         able = [name for name in learners.names() if learners.get(name).td_error]
         raise AntsError(
             f"learner {training.learner!r} has no TD error that can be summed over ants, which "
             f"a shared table requires; choose one of {', '.join(able)}."
         )
-    training = scheduled(replace(training, min_epsilon=EVALUATION_EPSILON), episodes)
+    training = replace(training, min_epsilon=study.EVALUATION_EPSILON)
+    training = scheduled(training, options["episodes"])
+    names = "episodes", "ticks", "rollouts"
+    several = tuple(options["world_kinds"]), tuple(options["sizes"])
+    conditions = conditions_of(*several, training, **{name: options[name] for name in names})
+    seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
+    points = *conditions.values(), *map(greedy, conditions.values())
+    return Plan(Study(points, seeds, tuple(COLONY), measured), conditions, *several)
+
+
+def conditions_of(
+    world_kinds: Sequence[str], sizes: Sequence[int], training: TrainingConfig, **lengths: Any
+) -> Conditions:
+    """Return the conditions of some kinds of world, which are names in `WORLDS`.
+
+    `sizes` are ascending. Ants that train in one kind of world and act in another have the last
+    size.
+    """
     kinds = dict.fromkeys([*world_kinds, OPEN])
-    places = {world_kind: _drawn(world_kind, seeds) or worlds.paper() for world_kind in kinds}
-    others = range(FIRST_OF_POOL, FIRST_OF_POOL + POOL)
-    pools = {one: _drawn(one, others) for one in kinds if one in WORLD_KINDS}
-    lengths: Any = {"episodes": episodes, "ticks": ticks, "rollouts": rollouts}
+    places = {world_kind: world_of(world_kind) for world_kind in kinds}
+    pools: dict[str, tuple[World, ...] | None] = {}  # for training; None in the paper's world
+    for one in WORLD_KINDS.keys() & places.keys():
+        place = places[one]
+        pools[one] = tuple(map(place.of, _POOL)) if isinstance(place, Drawn) else None
 
     def trained(world_kind: str, rules: str, ants: int) -> ColonyPoint:
         places_of = places[world_kind], TASKS[rules], training, pools[world_kind]
         return ColonyPoint(*places_of, ants, **lengths)
 
-    conditions: Plan = {}
+    conditions: Conditions = {}
     for world_kind in world_kinds:
         for rules, n in product(TASKS, sizes if world_kind in WORLD_KINDS else ()):
             conditions[Condition(world_kind, rules, JOINT, n)] = trained(world_kind, rules, n)
@@ -276,7 +249,7 @@ def plan(
             where: Any = {"world": places[world_kind], "task": task_in(world_kind, after.task)}
             n = LARGE_SIZE if world_kind == "large" else sizes[-1]
             abroad = replace(after, **where, pool=None, ants=n, episodes=0, after=after)
-            conditions[Condition(world_kind, rules, ABROAD, abroad.ants)] = abroad
+            conditions[Condition(world_kind, rules, study.ABROAD, abroad.ants)] = abroad
     return conditions
 
 
@@ -286,51 +259,21 @@ def greedy(point: ColonyPoint) -> ColonyPoint:
     return replace(calm, pool=None, episodes=0, after=point) if point.episodes else calm
 
 
-def study_of(conditions: Plan, seeds: Sequence[int]) -> Study[ColonyPoint]:
-    """Return the study that measures all conditions of a plan."""
-    return Study((*conditions.values(), *map(greedy, conditions.values())), tuple(seeds))
-
-
 # Measures.
 
 
-def with_measures(points: Sequence[ColonyPoint], seeds: Sequence[int], outcome: Outcome) -> Outcome:
-    """Return an outcome of one point with its measures."""
+def measured(
+    points: Sequence[ColonyPoint], seeds: Sequence[int], outcome: Mapping[str, np.ndarray]
+) -> dict[str, np.ndarray]:
+    """Return the measures of the runs of one point, float64 (1, seeds)."""
     (point,) = points
     run = Run.of_colony({n: a[0] for n, a in outcome.items()}, point.ants, point.ticks)
-    values = values_of(run)
-    return {**outcome, **{f"{VALUE}{name}": array[None] for name, array in values.items()}}
+    return {name: array[None] for name, array in values_of(run).items()}
 
 
-def take_results(
-    conditions: Plan,
-    asked: Study[ColonyPoint],
-    folder: Path,
-    runs: Mapping[str, Any],
-    blocks: Blocks,
-) -> None:
-    """Add finished results, whose `Study.runs` were `runs`, to the blocks of a study."""
-    key_of = dict(zip(asked.in_order, asked.keys, strict=True))
-    names_of = dict(zip(runs["points"], runs["seeds_of"], strict=True))
-    rows: dict[Condition, list[dict[str, str]]] = {}
-    for row in files.read_csv(folder / SEEDS):
-        where = row["world_kind"], row["rules"], row["regime"], int(row["ants"])
-        rows.setdefault(Condition(*where), []).append(row)
-    for condition, several in rows.items():
-        point = conditions[condition]
-        columns = {name: np.array([float(row[name]) for row in several]) for name in OF_STUDY}
-        own = {name: columns[name] for name in COLONY}
-        # Only this measure of ants that do not explore is in the results.
-        calm = dict.fromkeys(own, np.full(len(several), np.nan))
-        calm["deliveries"] = columns["greedy"]
-        for one, values in ((point, own), (greedy(point), calm)):
-            seeds = runs["seeds"][names_of[key_of[one]]]
-            blocks.add([key_of[one]], seeds, {f"{VALUE}{n}": a[None] for n, a in values.items()})
-
-
-def measured(
-    conditions: Plan, values: Mapping[Any, Mapping[str, np.ndarray]], seeds: int
-) -> Measured:
+def with_bounds(
+    conditions: Conditions, values: Mapping[Any, Mapping[str, np.ndarray]], seeds: Sequence[int]
+) -> study.Measured:
     """Return all measures, float64 (seeds,), of all conditions from those of the points.
 
     Bounds are nan if food moves or takes time to grow back, because no bound is known.
@@ -340,10 +283,12 @@ def measured(
     for condition, point in conditions.items():
         key = point.world, point.task.traffic, point.task.turns_at_queen
         if key not in limits:
-            limits[key] = [limits_of(one, point.task) for one in point.places_of_evaluation]
+            places = point.worlds(seeds)
+            several = places if isinstance(places, list) else [places]
+            limits[key] = [limits_of(one, point.task) for one in several]
         known = point.task.life == _LIVELY
         most = [one.deliveries(point.ants) if known else np.nan for one in limits[key]]
-        bound, of_point = np.broadcast_to(np.array(most), seeds), values[point]
+        bound, of_point = np.broadcast_to(np.array(most), len(seeds)), values[point]
         share = of_point["deliveries"] / np.where(bound > 0, bound, np.nan)
         calm = values[greedy(point)]["deliveries"]
         found[condition] = {**of_point, "greedy": calm, "bound": bound, "bound_share": share}
@@ -353,100 +298,58 @@ def measured(
 # Results: tables, policies, figures, and the page.
 
 
-def do_study(
-    conditions: Plan,
-    asked: Study[ColonyPoint],
-    blocks: Path,
-    folder: Path,
-    draws: bool,
-    progress: Progress,
-    **how: Any,
-) -> Results | None:
-    """Return the results of a study, after writing all of their files; None for a shard.
+def tables(plan: Plan, runs: Runs) -> str:
+    """Return the report, and write all results; while runs are missing, those of whole conditions.
 
-    Computes the blocks that are missing in `blocks`; `how` has further arguments of
-    `Study.in_blocks`.
+    The policies are those of median seeds.
     """
-    arrays = asked.reduced(blocks, with_measures, progress, **how)
-    if how.get("shard", (1, 1))[1] > 1:
-        return None
-    of_points = {p: {n: a[row] for n, a in arrays.items()} for row, p in enumerate(asked.points)}
-    values = measured(conditions, of_points, len(asked.seeds))
+    folder, seeds, present = runs.folder, runs.study.seeds, np.all(runs.present, axis=1)
+    place_of = {point: place for place, point in enumerate(runs.study.points)}
+    conditions = {
+        condition: point
+        for condition, point in plan.conditions.items()
+        if present[place_of[point]] and present[place_of[greedy(point)]]
+    }
+    if not conditions:
+        raise AntsError("no condition has all of its runs yet; wait for the first ones.")
+    arrays = runs.read(*COLONY)
+    of_points = {p: {n: a[row] for n, a in arrays.items()} for p, row in place_of.items()}
+    values = with_bounds(conditions, of_points, seeds)
     results = Results.of(values)
     for name, table in (
-        (SEEDS, rows_of_seeds(values, asked.seeds)),
+        ("seeds.csv", study.rows_of_seeds(values, seeds)),
         ("conditions.csv", [one.columns() for one in results.rows]),
-        ("differences.csv", difference_rows(results.judged)),
+        ("differences.csv", study.difference_rows(results.judged)),
     ):
         files.write_csv(folder / name, table, list(table[0]))
-    files.write_text(folder / "findings.md", markdown(found(*results)))
-    files.write_text(folder / REPORT, plain_text(on_one_screen(*results), width=79))
-    save_policies(conditions, asked, values, blocks, folder / POLICIES, **how)
-    if draws:
-        with style.all_or_none(folder / FIGURES):
-            style.save_all(draw_all(results.rows), folder / FIGURES)
-    return results
-
-
-def save_policies(
-    conditions: Plan,
-    asked: Study[ColonyPoint],
-    values: Measured,
-    blocks: Path,
-    folder: Path,
-    **how: Any,
-) -> None:
-    """Save the policy of the median seed of each condition with joint training in `COMPARED`.
-
-    Results that were taken over have only measures, so these runs are done again.
-    """
-    files.check_writable_folder(folder)
-    place_of = {point: place for place, point in enumerate(asked.in_order)}
-    median: dict[Condition, tuple[int, int]] = {}  # the point and the seed, by their places
+    files.write_text(folder / "findings.md", markdown(study.found(*results)))
+    policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:
+            q_values = runs.read("q_values", points=[place_of[point]])["q_values"][0]
             order = np.argsort(values[condition]["deliveries"], kind="stable")
-            median[condition] = place_of[point], int(order[(len(asked.seeds) - 1) // 2])
-    runs = np.zeros((len(asked.in_order), len(asked.seeds)), bool)
-    for at in median.values():
-        runs[at] = True
-    asked.complete(blocks, runs, "q_values", reduce=with_measures, **how)
-    saved = Blocks(blocks)
-    for condition, (where, run) in median.items():
-        point, name = asked.in_order[where], asked.names[where][run]
-        metadata = {
-            **condition._asdict(),
-            **{"task": point.task.as_dict(), "training": point.training.as_dict()},
-            **{"seed": asked.seeds[run], "episodes": point.episodes, "ticks": point.ticks},
-            "deliveries_per_1000_ticks": values[condition]["deliveries"][run],
-        }
-        (q_values,) = saved.read(asked.keys[where], [name], "q_values")["q_values"]
-        save_policy(policy_file(folder, condition), q_values, metadata, point.task.observation)
-
-
-def policy_file(folder: Path, condition: Condition) -> Path:
-    """Return the path of the policy of a condition."""
-    return folder / f"{condition.world_kind}_{condition.rules}_{condition.ants}.npz"
-
-
-def make_page(
-    settings: argparse.Namespace,
-    conditions: Plan,
-    asked: Study[ColonyPoint],
-    folder: Path,
-    results: Results | None,
-    made: Mapping[str, Any],
-) -> str:
-    """Return the page of the results in a folder, which are read from it if `results` is None."""
-    results = results or Results.read(files.read_csv(folder / SEEDS))
-    shown = not settings.no_figures
-    return colony_page(
-        results,
-        drawings=drawings(draw_all(results.rows)) if shown else [],
-        players=at_work(folder / POLICIES, conditions, asked.seeds, settings.arch) if shown else [],
-        facts={**setting_facts(asked.settings()), **made_facts(made)},
-        files=[path.name for path in folder.iterdir()] + [MANIFEST],
-    )
+            run = int(order[(len(seeds) - 1) // 2])
+            policies[condition] = q_values[run]
+            metadata = {
+                **condition._asdict(),
+                **{"task": point.task.as_dict(), "training": point.training.as_dict()},
+                **{"seed": seeds[run], "episodes": point.episodes, "ticks": point.ticks},
+                "deliveries_per_1000_ticks": values[condition]["deliveries"][run],
+            }
+            path = files.check_writable_folder(folder / "policies")
+            path /= f"{condition.world_kind}_{condition.rules}_{condition.ants}.npz"
+            save_policy(path, q_values[run], metadata, point.task.observation)
+    parts: dict[str, Any] = {"drawings": [], "players": []}
+    if runs.figures:
+        with style.all_or_none(folder / "figures"):
+            style.save_all(draw_all(results.rows), folder / "figures")
+            parts["drawings"] = drawings(draw_all(results.rows))
+            parts["players"] = at_work(conditions, policies, seeds[0])
+    facts = page.setting_facts(settings_of(runs.study.points, seeds))
+    parts["facts"] = {**facts, **page.made_facts(runs.made)}
+    links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
+    files.write_text(folder / PAGE, colony_page(results, **parts, files=links))
+    return plain_text(study.on_one_screen(*results), width=79)
 
 
 def colony_page(results: Results, **parts: Any) -> str:
@@ -454,83 +357,67 @@ def colony_page(results: Results, **parts: Any) -> str:
     rows, judged = results
     world_kinds = {row.condition.world_kind for row in rows}
     seeds = seeds_in_words(rows[0].seeds)
-    return fill(
+    return page.fill(
         Path(__file__).with_name("colony.html"),
         title="Which rules and which training make a colony deliver more?",
         byline=f"{seeds}, {count(len(rows), 'condition')}, "
         f"{count(len(world_kinds), 'kind')} of world",
         seeds=seeds,
-        epsilon=f"{EVALUATION_EPSILON:g}",
+        epsilon=f"{study.EVALUATION_EPSILON:g}",
         worlds=[words for name, words in WORLD_KINDS.items() if name in world_kinds],
-        headlines=headlines(*results),
+        headlines=study.headlines(*results),
         findings=_statements(judged),
-        glance=glance(rows),
-        tables=means(rows),
+        glance=study.glance(rows),
+        tables=study.means(rows),
         **parts,
     )
 
 
-def _statements(judged: Judged) -> Statements:
+def _statements(judged: study.Judged) -> page.Statements:
     lines = []
     for (world_kind, series), by_sizes in judged.items():
         unit = COLONY[series.measure].label
         told = [
-            Shown(count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit)
+            page.Shown(
+                count(n, "ant") if n == less else f"{n} against {less}", one, "Difference", unit
+            )
             for (n, less), one in by_sizes.items()
         ]
         facts = {"Question": series.question, "Difference in": unit}
-        verdicts = [of_largest(by_sizes).verdict]
+        verdicts = [study.of_largest(by_sizes).verdict]
         statement = f"{sentence(series.statement)}."
-        lines.append(Statement(statement, sentence(WORLDS[world_kind]), verdicts, facts, told))
-    return Statements(("Statement", "World", "Largest colony"), lines, "statements")
+        lines.append(page.Statement(statement, sentence(WORLDS[world_kind]), verdicts, facts, told))
+    return page.Statements(("Statement", "World", "Largest colony"), lines, "statements")
 
 
-def at_work(policies: Path, conditions: Plan, seeds: Sequence[int], arch: str) -> list[Player]:
+def at_work(
+    conditions: Conditions, policies: Mapping[Condition, np.ndarray], seed: int
+) -> list[page.Player]:
     """Return recordings of the largest colony under each of the compared rules, in one world."""
-    trained = [one for one in conditions if one.regime == JOINT and one.ants <= MOST_SHOWN]
-    if not trained:
+    shown = [one for one in policies if one.ants <= MOST_SHOWN]
+    if not shown:
         return []
-    world_kind = max((one.world_kind for one in trained), key=list(WORLD_KINDS).index)
-    ants = max(one.ants for one in trained)
+    world_kind = max((one.world_kind for one in shown), key=list(WORLD_KINDS).index)
+    ants = max(one.ants for one in shown)
     players = []
-    for rules in COMPARED:
-        condition = Condition(world_kind, rules, JOINT, ants)
-        point = conditions[condition]
+    for condition in (Condition(world_kind, rules, JOINT, ants) for rules in COMPARED):
+        if condition not in policies:  # its runs are missing
+            continue
+        point, world = conditions[condition], world_of(world_kind)
         colony = Colony(
-            *(point.places_of_evaluation[0], point.task),
+            *(world.of(seed) if isinstance(world, Drawn) else world, point.task),
             replace(point.training, epsilon=point.training.least_epsilon),
-            *(seeds[0], ants),
+            *(seed, ants),
             sharing="frozen",
-            q_values=load_policy(policy_file(policies, condition)).q_values,
-            arch=arch,
+            q_values=policies[condition],
         )
         colony.begin_episode()
-        recording = record_colony(colony, SHOWN_TICKS, title=RULES[rules])
+        rules = study.RULES[condition.rules]
+        recording = record_colony(colony, SHOWN_TICKS, title=rules)
         done = count(int(colony.outcome().deliveries.sum()), "delivery")
         words = f"{count(ants, 'ant')} in {WORLD_KINDS[world_kind]}: {done} in {SHOWN_TICKS} ticks."
-        players.append(Player(sentence(RULES[rules]), words, recording))
+        players.append(page.Player(sentence(rules), words, recording))
     return players
-
-
-def study(settings: argparse.Namespace) -> None:
-    """Run the study, or show its results if it is finished."""
-    command_line.load_plugin(settings.plugin)
-    seeds = tuple(range(settings.seed, settings.seed + settings.seeds))
-    lengths = settings.episodes, settings.ticks, settings.rollouts
-    training = learning().replace(**command_line.given_settings(settings).get("training", {}))
-    conditions = plan(settings.world_kinds, settings.sizes, seeds, training, *lengths)
-    asked = study_of(conditions, seeds)
-
-    def work(blocks: Path, ready: Path) -> Results | None:
-        bar = command_line.progress_bar
-        with chosen(settings) as how, bar("study", how.get("executor")) as progress:
-            shows = not settings.no_figures
-            return do_study(conditions, asked, blocks, ready, shows, progress, **how)
-
-    words = {name: getattr(settings, name) for name in ("world_kinds", "sizes")}
-    page = partial(make_page, settings, conditions, asked)
-    take = partial(take_results, conditions, asked)
-    work_or_show(settings, {**words, **asked.settings()}, work, tuple(words), page, asked, take)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -538,10 +425,13 @@ def main(arguments: list[str] | None = None) -> None:
     words = sys.argv[1:] if arguments is None else arguments
     if words[:1] == ["live"]:
         commands.run("colony", words)
-    command_line.run_command(lambda: study(parse_arguments(words)), command_line.AGAIN)
+    command_line.run_command(lambda: start(words), command_line.AGAIN)
+
+
+def start(arguments: Sequence[str]) -> None:
+    """Run the study, or show its results if it is finished."""
+    run_study(parse_arguments(arguments), __file__)
 
 
 if __name__ == "__main__":
-    from colony import main  # so that worker processes find its functions by their module
-
     main()

@@ -7,24 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from colony_findings import (
-    ABC,
-    ABROAD,
-    ALONE,
-    BC,
-    EVALUATION_EPSILON,
-    FEW,
-    JOINT,
-    PAPER,
-    QUEUES,
-    RULES,
-    SOME,
-    WORLD_KINDS,
-    WORLDS,
-    A,
-    ConditionRow,
-    Design,
-)
+import colony_findings as study
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import seeds_in_words
@@ -36,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Rows = Sequence[ConditionRow]
+Rows = Sequence[study.ConditionRow]
 
 
 def draw_all(rows: Rows) -> dict[str, Figure]:
@@ -45,8 +28,8 @@ def draw_all(rows: Rows) -> dict[str, Figure]:
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
 
-def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
-    panels: dict[str, dict[Design, ConditionRow]] = {}
+def _dots(title: str, designs: Sequence[study.Design], rows: Rows) -> Figure | None:
+    panels: dict[str, dict[study.Design, study.ConditionRow]] = {}
     for row in sorted(rows, key=lambda row: row.condition.ants):
         if row.design in designs:  # larger colonies replace smaller ones
             panels.setdefault(row.condition.world_kind, {})[row.design] = row
@@ -55,12 +38,12 @@ def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
     across = min(3, len(panels))
     down = -(-len(panels) // across)
     alike = len({one.regime for one in designs}) == 1  # then labels need not name the regime
-    names = [RULES[one.rules] if alike else one.words for one in designs]
+    names = [study.RULES[one.rules] if alike else one.words for one in designs]
     with style.styled():
         figure = style.new_figure(1.3 + down * (0.9 + 0.28 * len(designs)))
         axes = figure.subplots(down, across, sharey=True, squeeze=False)
         for axis, (world_kind, lines) in zip(axes.flat, panels.items(), strict=False):
-            axis.set_title(textwrap.fill(sentence(WORLDS[world_kind]), 32), fontsize=9)
+            axis.set_title(textwrap.fill(sentence(study.WORLDS[world_kind]), 32), fontsize=9)
             for design, row in lines.items():
                 _dot(axis, designs.index(design), row)
             axis.set_xlim(left=0)
@@ -80,7 +63,7 @@ def _dots(title: str, designs: Sequence[Design], rows: Rows) -> Figure | None:
     return figure
 
 
-def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
+def _dot(axis: Axes, place: int, row: study.ConditionRow) -> None:
     """Draw a mean with its number, interval and range over seeds, and the bounds if known."""
     mean, low, high, *_ = row.estimates["deliveries"]
     colour = style.COLOURS[place % len(style.COLOURS)]
@@ -94,11 +77,10 @@ def _dot(axis: Axes, place: int, row: ConditionRow) -> None:
     )
 
 
-def _lines(
-    title: str, designs: Sequence[Design], measures: Sequence[str], rows: Rows
-) -> Figure | None:
+def _lines(title: str, designs: Sequence[study.Design], rows: Rows) -> Figure | None:
+    measures = "deliveries", "per_ant"
     world_kinds = [
-        one for one in WORLD_KINDS if any(row.condition.world_kind == one for row in rows)
+        one for one in study.WORLD_KINDS if any(row.condition.world_kind == one for row in rows)
     ]
     if not world_kinds:
         return None
@@ -118,7 +100,7 @@ def _lines(
             for axis, world_kind in zip(line_of_axes, world_kinds, strict=True):
                 draw_lines(axis, points[world_kind], [*points.values()])
         for column, world_kind in zip(axes.T, world_kinds, strict=True):
-            column[0].set_title(sentence(WORLD_KINDS[world_kind]), fontsize=9)
+            column[0].set_title(sentence(study.WORLD_KINDS[world_kind]), fontsize=9)
             column[-1].set_xlabel("Ants")
         style.frame(figure, title, _spread(rows), style.legend_entries(axes.flat))
     return figure
@@ -127,23 +109,21 @@ def _lines(
 def _spread(rows: Rows) -> str:
     seeds = rows[0].seeds
     means = f"Means over {seeds_in_words(seeds)}, with 95 % intervals" if seeds > 1 else "One seed"
-    return f"{means}. Exploration rate {EVALUATION_EPSILON:g}."
+    return f"{means}. Exploration rate {study.EVALUATION_EPSILON:g}."
 
 
-def _each(rules: Iterable[str], *regimes: str) -> list[Design]:
-    return [Design(one, regime) for one in rules for regime in regimes]
+def _each(rules: Iterable[str], *regimes: str) -> list[study.Design]:
+    return [study.Design(one, regime) for one in rules for regime in regimes]
 
 
-_LEARNED = ALONE, FEW, SOME, JOINT
-_RISING = PAPER, A, BC, ABC, QUEUES
-_MAIN = PAPER, ABC, QUEUES
+_LEARNED = study.ALONE, study.FEW, study.SOME, study.JOINT
+_RISING = study.PAPER, study.A, study.BC, study.ABC, study.QUEUES
+_MAIN = study.PAPER, study.ABC, study.QUEUES
 FIGURES: dict[str, Callable[[Rows], Figure | None]] = {
-    "rules": partial(_dots, "Effect of each rule", _each(RULES, JOINT)),
-    "scaling": partial(
-        _lines, "Deliveries by the number of ants", _each(_RISING, JOINT), ("deliveries", "per_ant")
-    ),
+    "rules": partial(_dots, "Effect of each rule", _each(study.RULES, study.JOINT)),
+    "scaling": partial(_lines, "Deliveries by the number of ants", _each(_RISING, study.JOINT)),
     "training": partial(_dots, "Number of ants in training", _each(_MAIN[:2], *_LEARNED)),
     "elsewhere": partial(
-        _dots, "Trained in open worlds, evaluated in others", _each(_MAIN, ABROAD)
+        _dots, "Trained in open worlds, evaluated in others", _each(_MAIN, study.ABROAD)
     ),
 }

@@ -43,47 +43,16 @@ from taichi_ants.errors import count
 from taichi_ants.files import tomllib
 from taichi_ants.measures.finished import COLONY
 
-# Kinds of world for training and evaluation, with their names in tables and figures.
-WORLD_KINDS: dict[str, str] = {
-    "paper": "the paper's world",
-    "open": "open worlds (30, 30, 30)",
-    "piles": "three far piles (30, 30, 30)",
-}
-# Kinds of world for the evaluation of ants that were trained in open worlds.
-ELSEWHERES: dict[str, str] = {
-    "rocks": "twice the rocks",
-    "one_pile": "one far pile",
-    "moving": "piles that move every 100 ticks",
-    "slow": "food that grows back after 100 ticks",
-    "small": "small worlds (15, 15, 15)",
-    "wide": "wide worlds (60, 60, 60)",
-    "large": "large worlds (100, 100, 100), 1000 ants",
-}
+_FILE = tomllib.loads(Path(__file__).with_name("colony_series.toml").read_text(encoding="utf-8"))
+# Kinds of world for training and evaluation, and others for the evaluation of ants that were
+# trained in open worlds; rules, and training regimes: their names in tables and figures.
+WORLD_KINDS: dict[str, str] = _FILE["world_kinds"]
+ELSEWHERES: dict[str, str] = _FILE["elsewheres"]
 WORLDS = {**WORLD_KINDS, **ELSEWHERES}
-
-# Rules: A, trails that rise towards food; B, right of way; C, ants in view.
-PAPER, SILENT, A, BC, ABC, ABC_SILENT, QUEUES = (
-    *("paper", "paper_no_trails", "direction", "right_of_way"),
-    *("foraging", "foraging_no_trails", "queueing"),
-)
-RULES: dict[str, str] = {
-    PAPER: "paper's rules",
-    SILENT: "paper's rules, no trails laid",
-    A: "A",
-    BC: "B + C",
-    ABC: "A + B + C",
-    ABC_SILENT: "B + C, no trails laid",
-    QUEUES: "queues",
-}
-# Training regimes.
-JOINT, ALONE, FEW, SOME, ABROAD = "joint", "alone", "with_4", "with_16", "open"
-REGIMES: dict[str, str] = {
-    JOINT: "trained jointly",
-    ALONE: "trained alone, copied",
-    FEW: "trained with 4",
-    SOME: "trained with 16",
-    ABROAD: "trained in open worlds",
-}
+RULES: dict[str, str] = _FILE["rules"]
+PAPER, SILENT, A, BC, ABC, ABC_SILENT, QUEUES = RULES
+REGIMES: dict[str, str] = _FILE["regimes"]
+JOINT, ALONE, FEW, SOME, ABROAD = REGIMES
 
 
 class Design(NamedTuple):
@@ -118,8 +87,6 @@ OF_STUDY: dict[str, str] = {
 }
 # Measures of each seed, float64 (seeds,), by their names in `OF_STUDY`.
 Measured = Mapping[Condition, Mapping[str, np.ndarray]]
-
-
 # The numbers of ants of the first and the second condition of a difference.
 Sizes = tuple[int, int]
 
@@ -165,10 +132,9 @@ class Series:
         return [(n, n) for n in sizes if n >= self.least and n in others]
 
 
-_TEXT = Path(__file__).with_name("colony_series.toml").read_text(encoding="utf-8")
 SERIES = tuple(
     Series(**{**one, "first": Design(*one["first"]), "second": Design(*one["second"])})
-    for one in tomllib.loads(_TEXT)["series"]
+    for one in _FILE["series"]
 )
 QUESTIONS: tuple[str, ...] = tuple(dict.fromkeys(series.question for series in SERIES))
 # By the name of the kind of world and the series.
@@ -486,17 +452,3 @@ class Results(NamedTuple):
     def of(cls, measured: Measured) -> Results:
         """Return the results of all measures."""
         return cls(condition_rows(measured), judge_all(measured))
-
-    @classmethod
-    def read(cls, seeds: Sequence[Mapping]) -> Results:
-        """Return the results from the rows of seeds.csv."""
-        by_condition: dict[Condition, list[Mapping]] = {}
-        for row in seeds:
-            condition = Condition(row["world_kind"], row["rules"], row["regime"], int(row["ants"]))
-            by_condition.setdefault(condition, []).append(row)
-        return cls.of(
-            {  # an empty field is None, which is nan as a float
-                one: {name: np.array([row[name] for row in rows], float) for name in OF_STUDY}
-                for one, rows in by_condition.items()
-            }
-        )

@@ -22,7 +22,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import TYPE_CHECKING
 
     import numpy as np
-    from colony import LARGE_SIZE, place, task_in
+    from colony import LARGE_SIZE, task_in, world_of
     from colony_findings import ABROAD, EVALUATION_EPSILON, JOINT, WORLD_KINDS, WORLDS
 
     from taichi_ants import AntsError, Colony, Pheromone, Task, TrainingConfig, World, files, task
@@ -35,7 +35,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
         run_command,
         whole_number,
     )
-    from taichi_ants.studies.points import EVALUATION_SEEDS
+    from taichi_ants.studies.points import EVALUATION_SEEDS, Drawn
 
     if TYPE_CHECKING:
         from taichi_ants.engines.colony.colony import ColonyEpisodes
@@ -98,7 +98,11 @@ def print_table(settings: argparse.Namespace) -> None:
     with progress_bar("Ants with a fixed rule") as progress:
         for kind, name, epsilon in choices:
             ants = LARGE_SIZE if kind == "large" else settings.ants
-            places = [place(kind, seed) for seed in range(settings.seeds)]
+            world = world_of(kind)
+            places = [
+                world.of(seed) if isinstance(world, Drawn) else world
+                for seed in range(settings.seeds)
+            ]
             outcome = evaluate(settings, places, task_in(kind, TASKS[name]), epsilon, ants)
             taught = learned.get((kind, name, ants, MEASURES.get(epsilon, "")), {})
             rows.append(f"{kind:8} {name:18} {epsilon:7g} {row(outcome, taught)}")

@@ -223,10 +223,10 @@ def make_figures(folder: Path) -> None:
     from taichi_ants.commands import colony as command
 
     results = ROOT / "results"
-    compare.compare(compare.parse_arguments(["--out", str(results / "compare")]))
-    colony.study(colony.parse_arguments(["study", "--out", str(results / "colony")]))
+    compare.start(["--out", str(results / "compare")])
+    colony.start(["study", "--out", str(results / "colony")])
     command.live(command.parse_arguments([*MILLION, "--figure", str(results / "million.png")]))
-    bridge.study(bridge.parse_arguments(["--out", str(results / "bridge")]))
+    bridge.start(["--out", str(results / "bridge")])
     folder.mkdir(parents=True, exist_ok=True)
     for name, source in FIGURES.items():
         with Image.open(results / source) as image:

@@ -24,9 +24,9 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from scipy.ndimage import gaussian_filter
 
     from taichi_ants import Colony, Interventions, TrainingConfig, World, task
-    from taichi_ants.engines.records import Snapshot
     from taichi_ants.grid.hexgrid import AxialGrid, centre_of
     from taichi_ants.interventions import Place
+    from taichi_ants.records import Snapshot
     from taichi_ants.rendering import text
     from taichi_ants.rendering.colours import Mark, channels
     from taichi_ants.rendering.rasteriser import draw_marks, marks

@@ -29,10 +29,10 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.command_line import (
         Parser,
         given_world,
-        load_plugin,
         run_command,
         whole_number,
     )
+    from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import Rewards, Task
     from taichi_ants.task.constants import N_ACTIONS
     from taichi_ants.task.events import Event
@@ -153,7 +153,7 @@ def learning_frames(
     room = width - 2 * letters
     text.write(canvas, title, width / 2, 1.5 * letters, letters, align="middle", room=room)
     if letters:
-        draw_legend(canvas, bottom, letters, checkpoints[0].episode.made.task.rewards)
+        draw_legend(canvas, bottom, letters, checkpoints[0].episode.arguments.task.rewards)
     columns = math.ceil(len(checkpoints) / max(1, math.isqrt(len(checkpoints) * height // width)))
     more = _MORE_LINES * any(checkpoint.among for checkpoint in checkpoints)
     rows, lines = math.ceil(len(checkpoints) / columns), round((_TILE_LINES + more) * letters)
@@ -161,7 +161,7 @@ def learning_frames(
     # Not higher than wide, so that each title is close to its world.
     h = min((bottom - top) // rows, w + lines)
     top += (bottom - top - rows * h) // 2
-    grid, margin = checkpoints[0].episode.made.world.grid, max(2, round(min(w, h) / 60))
+    grid, margin = checkpoints[0].episode.arguments.world.grid, max(2, round(min(w, h) / 60))
     rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
     pictures = [
         tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints

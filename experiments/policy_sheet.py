@@ -31,7 +31,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
         marks,
     )
     from taichi_ants.rendering.scene import fill, name_parts
-    from taichi_ants.studies.command_line import Parser, given_world, load_plugin, run_command
+    from taichi_ants.studies.command_line import Parser, given_world, run_command
+    from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import Observation, Task
     from taichi_ants.task.constants import ACTION_NAMES, GIVE, PICK_UP, RIGHT
     from taichi_ants.task.states import REACHABLE_STATES, TASK_NAMES

@@ -33,24 +33,26 @@ def without_middle(message: str, most: int = _MOST_CHARACTERS) -> str:
     return message if len(message) <= most else f"{message[:half]} ... {message[-half:]}"
 
 
-def unusable(thing: Any, fault: object) -> AntsError:
+def unusable(registered: Any, fault: object) -> AntsError:
     """Return the error for a learner or an observation that cannot be used."""
-    kind, said = type(thing).__name__, str(fault).replace(".)", ")")
-    return AntsError(f"{kind.lower()} {thing.name!r} cannot be used: {said}; see help({kind}).")
+    kind, said = type(registered).__name__, str(fault).replace(".)", ")")
+    return AntsError(
+        f"{kind.lower()} {registered.name!r} cannot be used: {said}; see help({kind})."
+    )
 
 
-def missing(who: str, module: str, extra: str) -> str:
+def missing(feature: str, module: str, extra: str) -> str:
     """Return the message that `who` needs a module that an extra of this package installs."""
     how = f'run pip install -e ".[{extra}]" in your clone'
-    return f"{who} needs {module}, which cannot be imported; {how}."
+    return f"{feature} needs {module}, which cannot be imported; {how}."
 
 
-def imported(who: str, module: str, extra: str) -> Any:
+def imported(feature: str, module: str, extra: str) -> Any:
     """Return a module that only `who` needs; AntsError if it cannot be imported."""
     try:
         return import_module(module)
     except ImportError as error:
-        raise AntsError(missing(who, module, extra)) from error
+        raise AntsError(missing(feature, module, extra)) from error
 
 
 class _Short(reprlib.Repr):
@@ -74,10 +76,12 @@ def shown(value: object, most: int = 80) -> str:
 
 
 def count(number_of: int, noun: str) -> str:
-    """Return a number with its noun: "1 seed", "2 seeds", "3 deliveries"."""
+    """Return a number with its noun: "1 seed", "2 days", "3 deliveries"."""
     if number_of == 1:
         return f"1 {noun}"
-    return f"{number_of} {noun[:-1]}ies" if noun.endswith("y") else f"{number_of} {noun}s"
+    if noun.endswith("y") and not noun.endswith(("ay", "ey", "oy", "uy")):
+        return f"{number_of} {noun[:-1]}ies"
+    return f"{number_of} {noun}s"
 
 
 def listing(names: Iterable[str], noun: str) -> str:

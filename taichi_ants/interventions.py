@@ -42,7 +42,6 @@ from taichi_ants.task.field import TRAIL
 from taichi_ants.task.pheromone import MAX_DEPOSIT
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.grid.hexgrid import AxialGrid
     from taichi_ants.worlds.world import World
 
@@ -50,7 +49,7 @@ One = TypeVar("One", bound="ShorthandSettings")
 _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
 _MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)
-_NAMED = {one.name: one for one in named_groups(Task)}
+_NAMED = {group.name: group for group in named_groups(Task)}
 
 
 class ShorthandSettings(Settings):
@@ -59,23 +58,23 @@ class ShorthandSettings(Settings):
     @classmethod
     def from_dict(cls: type[One], facts: Any) -> One:
         """Return the record of a mapping of settings, or of a short form."""
-        found = cls.converted(facts)
-        if not isinstance(found, cls):
+        record = cls.converted(facts)
+        if not isinstance(record, cls):
             raise AntsError(f"`{cls.path}` is {shown(facts)}; it must be a table of settings.")
-        return found
+        return record
 
     @classmethod
     def converted(cls: type[One], value: Any) -> Any:
         """Return the record that a mapping or a short form stands for; else the value itself."""
         if isinstance(value, cls):
             return value
-        given = value if isinstance(value, Mapping) else cls.short(value)
-        if given is None:
+        values = value if isinstance(value, Mapping) else cls.short(value)
+        if values is None:
             return value
-        for one in declared(cls):
-            if one.default is MISSING and one.name not in given:
-                raise AntsError(f"`{cls.path}.{one.name}` is missing; add it.")
-        return cls(**given)
+        for setting in declared(cls):
+            if setting.default is MISSING and setting.name not in values:
+                raise AntsError(f"`{cls.path}.{setting.name}` is missing; add it.")
+        return cls(**values)
 
     @classmethod
     def short(cls, value: Any) -> dict[str, Any] | None:
@@ -84,17 +83,17 @@ class ShorthandSettings(Settings):
 
     def as_dict(self) -> dict[str, Any]:
         """Return the settings that differ from their defaults, JSON-compatible."""
-        found = {one.name: getattr(self, one.name) for one in declared(type(self))}
-        usual = {one.name: one.default for one in declared(type(self))}
-        found = {name: value for name, value in found.items() if value != usual[name]}
-        return {name: _plain(value) for name, value in found.items()}
+        values = {setting.name: getattr(self, setting.name) for setting in declared(type(self))}
+        defaults = {setting.name: setting.default for setting in declared(type(self))}
+        values = {name: value for name, value in values.items() if value != defaults[name]}
+        return {name: _plain(value) for name, value in values.items()}
 
 
 def _plain(value: Any) -> Any:
     """Return a value of a setting in the form that JSON has for it."""
     if isinstance(value, ShorthandSettings):
         return value.as_dict()
-    return [_plain(one) for one in value] if isinstance(value, tuple) else value
+    return [_plain(entry) for entry in value] if isinstance(value, tuple) else value
 
 
 class Intervention(ShorthandSettings):
@@ -123,8 +122,8 @@ class Intervention(ShorthandSettings):
                 "numbered from 0; choose one of them."
             )
 
-    def apply(self, to: Interventions) -> None:
-        """Apply the change; AntsError if a world does not allow it."""
+    def apply(self, to: Any) -> None:
+        """Apply the change to an `Interventions`; AntsError if a world does not allow it."""
         raise NotImplementedError
 
 
@@ -163,10 +162,10 @@ class OfAnts(OfCells):
 
     def check(self) -> None:
         super().check()
-        given = [name for name in ("number", "share", "cells") if getattr(self, name) is not None]
-        if len(given) != 1:
+        ways = [name for name in ("number", "share", "cells") if getattr(self, name) is not None]
+        if len(ways) != 1:
             raise AntsError(
-                f"`{self.path}` has {' and '.join(given) or 'neither number, share nor cells'}; "
+                f"`{self.path}` has {' and '.join(ways) or 'neither number, share nor cells'}; "
                 "give one of number, share and cells."
             )
 
@@ -189,7 +188,7 @@ class RemoveAnts(OfAnts, path="remove_ants"):
     cells: Annotated[Sequence | None, _CELLS] = None
     nest: Annotated[int | None, Setting("nest of the ants; any if left out", least=0)] = None
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         if self.cells is None:
             to.remove_some(self.number, self.share, self.nest)
         else:
@@ -214,7 +213,7 @@ class AddAnts(OfAnts, path="add_ants"):
     ] = None
     nest: Annotated[int | None, Setting("nest of the new ants", least=0)] = None
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         if self.cells is None:
             to.add_some(self.number, self.share, self.heading, self.nest)
         else:
@@ -252,7 +251,7 @@ class Place(OfCells, path="place"):
         if self.kind is not None:
             check_one_of("`place.kind`", self.kind, tuple(task.foods))
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         cells = to.index(self.cells)
         if self.what == "queen":
             to.move_queen(int(cells[0]), self.nest or 0)
@@ -275,9 +274,9 @@ class Move(OfCells, path="move"):
         super().check()
         self._check_count(2, "the cell to move from, then the cell to move to")
 
-    def apply(self, to: Interventions) -> None:
-        cell, there = (int(to.index([one])[0]) for one in self.cells)
-        to.move(cell, there)
+    def apply(self, to: Any) -> None:
+        cell, target = (int(to.index([cell])[0]) for cell in self.cells)
+        to.move(cell, target)
 
 
 @dataclass(frozen=True)
@@ -286,7 +285,7 @@ class Clear(OfCells, path="clear"):
 
     cells: Annotated[Sequence, _CELLS]
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.put(to.index(self.cells), EMPTY)
 
 
@@ -310,7 +309,7 @@ class SetTrail(OfCells, path="trail"):
         super().check_in(world, task, learns)
         check_one_of("`trail.field`", self.field, (TRAIL, *task.fields))
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         self.check_in(to.colony.worlds[0], to.colony.task, to.colony.learns)
         cells = to.everywhere() if self.cells is None else to.index(self.cells)
         to.lay_trail(cells, self.level, self.field)
@@ -328,7 +327,7 @@ class SetAnts(Intervention, path="ants"):
     def short(cls, value: Any) -> dict[str, Any] | None:
         return {"number": value} if isinstance(value, (int, np.integer)) else None
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_ants(self.number)
 
 
@@ -343,28 +342,30 @@ class SetTask(Intervention, path="task"):
     in_all_worlds = True
 
     def check(self) -> None:
-        known = {one.path.removeprefix("task."): one for one in all_of(Task)}
+        known = {setting.path.removeprefix("task."): setting for setting in all_of(Task)}
         if not self.values:
             raise AntsError("`task` has no settings; name at least one, with its new value.")
         values = []
         for name, value in self.values:
             group, _, rest = name.partition(".")
             of = rest.partition(".")[0]
-            here = known
+            settings = known
             if rest and group in _NAMED:
-                own = settings_of_entry(_NAMED[group], of)
-                here = {path.removeprefix("task."): one for path, one in own.items()}
-            if name not in here:
-                raise AntsError(f"`task.{name}` {not_a_setting(name, here)}")
-            values.append((name, here[name].checked(value)))
+                of_entry = settings_of_entry(_NAMED[group], of)
+                settings = {
+                    path.removeprefix("task."): setting for path, setting in of_entry.items()
+                }
+            if name not in settings:
+                raise AntsError(f"`task.{name}` {not_a_setting(name, settings)}")
+            values.append((name, settings[name].checked(value)))
         object.__setattr__(self, "values", tuple(sorted(values)))
 
     @classmethod
     def converted(cls, value: Any) -> Any:
         if not isinstance(value, Mapping):
             return value
-        given = flat({k: v for k, v in value.items() if isinstance(k, str)})
-        return cls(tuple(given.items()))
+        numbers = flat({k: v for k, v in value.items() if isinstance(k, str)})
+        return cls(tuple(numbers.items()))
 
     def as_dict(self) -> dict[str, Any]:
         return dict(self.values)
@@ -381,7 +382,7 @@ class SetTask(Intervention, path="task"):
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         check_same_kernels(task, self.changed(task), learns)
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_task(self.changed(to.colony.task))
 
 
@@ -401,7 +402,7 @@ class SetEpsilon(_Rate, path="epsilon"):
 
     value: Annotated[Share, Setting("exploration rate")]
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_epsilon(self.value)
 
 
@@ -414,7 +415,7 @@ class SetLearningRate(_Rate, path="learning_rate"):
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         check_learns(learns)
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_learning_rate(self.value)
 
 
@@ -466,7 +467,7 @@ class SetPolicy(Intervention, path="policy"):
         check_follows(learns, task)
         self.table_for(task)
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.set_policy(self.table_for(to.colony.task))
 
 
@@ -476,13 +477,13 @@ class Episode(Intervention, path="episode"):
 
     in_all_worlds = True
 
-    def apply(self, to: Interventions) -> None:
+    def apply(self, to: Any) -> None:
         to.begin_episode()
 
 
 INTERVENTIONS: dict[str, type[Intervention]] = {
-    one.path: one
-    for one in (
+    cls.path: cls
+    for cls in (
         *(RemoveAnts, AddAnts, SetAnts, Place, Move, Clear, SetTrail),
         *(SetTask, SetEpsilon, SetLearningRate, SetPolicy, Episode),
     )
@@ -556,7 +557,7 @@ def indices(grid: AxialGrid, cells: Sequence[Any]) -> np.ndarray:
 
 def _checked_cells(path: str, cells: Sequence) -> tuple:
     """Return cells as triples or flat indices; AntsError if one is neither."""
-    found: list[Any] = []
+    cells_found: list[Any] = []
     for cell in cells:
         parts = entries_of(cell)
         if parts is not None and len(parts) != 3:
@@ -564,7 +565,9 @@ def _checked_cells(path: str, cells: Sequence) -> tuple:
                 f"`{path}` has the cell {shown(cell)}; a cell is three whole numbers [x, y, z]."
             )
         name = f"a cell of `{path}`"
-        found.append(whole(name, cell) if parts is None else tuple(whole(name, x) for x in parts))
-    if not found:
+        cells_found.append(
+            whole(name, cell) if parts is None else tuple(whole(name, x) for x in parts)
+        )
+    if not cells_found:
         raise AntsError(f"`{path}` is empty; give at least one cell.")
-    return tuple(found)
+    return tuple(cells_found)

@@ -64,19 +64,19 @@ class ProtocolEvent(ShorthandSettings):
         """Check all settings."""
         super().check()
         if not self.interventions:
-            names = ", ".join(one.name for one in fields(ProtocolEvent))
+            names = ", ".join(setting.name for setting in fields(ProtocolEvent))
             raise AntsError(f"`{self.path}` has no intervention; give one or more of {names}.")
 
     @property
     def interventions(self) -> tuple[Intervention, ...]:
         """The interventions, in the order in which they are applied."""
-        several = (getattr(self, one.name) for one in fields(ProtocolEvent))
-        return tuple(one for one in several if one is not None)
+        interventions = (getattr(self, setting.name) for setting in fields(ProtocolEvent))
+        return tuple(intervention for intervention in interventions if intervention is not None)
 
     @property
     def in_all_worlds(self) -> bool:
         """Whether worlds of a colony share what an intervention changes."""
-        return any(one.in_all_worlds for one in self.interventions)
+        return any(intervention.in_all_worlds for intervention in self.interventions)
 
     def facts(self) -> dict[str, Any]:
         """Return the kind of the event and its settings, JSON-compatible."""
@@ -180,13 +180,13 @@ class When(ProtocolEvent, path="when"):
         return self.below is not None and value < self.below
 
 
-EVENTS: dict[str, type[ProtocolEvent]] = {one.path: one for one in (At, Every, When)}
+EVENTS: dict[str, type[ProtocolEvent]] = {cls.path: cls for cls in (At, Every, When)}
 
 
 def checked_protocol(protocol: Any) -> tuple[ProtocolEvent, ...]:
     """Return the events of a protocol; AntsError if one is not a `ProtocolEvent`."""
     events = [protocol] if isinstance(protocol, ProtocolEvent) else entries_of(protocol)
-    if events is None or not all(isinstance(one, ProtocolEvent) for one in events):
+    if events is None or not all(isinstance(event, ProtocolEvent) for event in events):
         raise AntsError(f"protocol is {shown(protocol)}; it must be a list of At, Every and When.")
     return tuple(events)
 
@@ -206,16 +206,16 @@ def check_room(
     in `of` can remove some, there may be room later.
     """
     lifespans = (task.life.lifespan, *(caste.lifespan for caste in task.castes.values()))
-    if any(lifespans) or any(one.remove_ants or one.ants for one in of):
+    if any(lifespans) or any(other.remove_ants or other.ants for other in of):
         return
     number = added = _number_added(event)
     if length is not None and not isinstance(event, When):
         last = event.times(length)[-1]
         added = sum(
-            _number_added(one) * len(range(times.start, min(times.stop, last + 1), times.step))
-            for one in of
-            if _number_added(one) and not isinstance(one, When)
-            for times in [one.times(length)]
+            _number_added(other) * len(range(times.start, min(times.stop, last + 1), times.step))
+            for other in of
+            if _number_added(other) and not isinstance(other, When)
+            for times in [other.times(length)]
         )
     if number and ants + added > capacity:
         total = f", which makes {added} ants with those of earlier events" if added > number else ""
@@ -238,16 +238,16 @@ def check_queen(
     It has rock or a queen in the world, and no event in `of` can remove it. `length` is that of
     episodes.
     """
-    place = event.place
-    if place is None or place.what != "queen":
+    placed = event.place
+    if placed is None or placed.what != "queen":
         return
-    if any(one.clear or one.move or one.place not in (None, place) for one in of):
+    if any(other.clear or other.move or other.place not in (None, placed) for other in of):
         return
-    cell = indices(world.grid, place.cells)
+    cell = indices(world.grid, placed.cells)
     if np.isin(cell, world.grid.index(np.vstack([world.obstacles, world.queens]))):
         raise AntsError(
-            f"`place.cells` has the cell {place.cells[0]}, where the world has rock or a queen, so "
-            "the queen cannot move there; choose an empty cell."
+            f"`place.cells` has the cell {placed.cells[0]}, where the world has rock or a queen, "
+            "so the queen cannot move there; choose an empty cell."
         )
     if not isinstance(event, When) and len(event.times(length)) > 1:
         raise AntsError(

@@ -146,7 +146,7 @@ def holds_data() -> bool:
         or len(runtime.unfinalized_fields_builder) > 1  # one is the root
         # There are half a million objects, but only a few thousand types.
         or any(
-            issubclass(one, (ti.Ndarray, ti.Texture)) for one in set(map(type, gc.get_objects()))
+            issubclass(cls, (ti.Ndarray, ti.Texture)) for cls in set(map(type, gc.get_objects()))
         )
     )
 
@@ -174,14 +174,14 @@ def quiet() -> Iterator[None]:
     running, config = ti.lang.impl.get_runtime(), ti.lang.impl.current_cfg()
     types = running.default_fp, running.default_ip  # those of `config` would be references
     try:
-        for one in (running, config):
-            one.default_fp, one.default_ip = ti.f32, ti.i32
+        for options in (running, config):
+            options.default_fp, options.default_ip = ti.f32, ti.i32
         with Flushing(), warnings.catch_warnings():
             warnings.simplefilter("ignore", SyntaxWarning)
             yield
     finally:
-        for one in (running, config):
-            one.default_fp, one.default_ip = types
+        for options in (running, config):
+            options.default_fp, options.default_ip = types
         Context.get_pos_info = marked
         kernel_impl.getsourcelines, kernel_impl.textwrap = reads
         core.set_logging_level(before)

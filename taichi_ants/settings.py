@@ -93,9 +93,9 @@ class Setting:
 
     def replace(self, other: Setting) -> Setting:
         """Return the combination of both; where `other` declares something, it takes precedence."""
-        given = {one.name: getattr(other, one.name) for one in fields(other)}
-        usual = vars(Setting())
-        return replace(self, **{k: v for k, v in given.items() if v is not usual[k] and v != ""})
+        defaults = vars(Setting())
+        declared = {k: v for k, v in vars(other).items() if v is not defaults[k] and v != ""}
+        return replace(self, **declared)
 
 
 Share = Annotated[float, Setting(least=0, most=1)]
@@ -151,25 +151,25 @@ class DeclaredSetting(NamedTuple):
         if self.rule.only is not None:
             other, *values = self.rule.only
             flag = _below(self.path.rpartition(".")[0], other).replace("_", "-")
-            parts.append(f"only with --{flag} {_either(str(one).lower() for one in values)}")
-        usual = self.rule.usual if value is None else value
+            parts.append(f"only with --{flag} {_either(str(word).lower() for word in values)}")
+        default = self.rule.usual if value is None else value
         if self.is_group:
-            usual = next((name for name, one in named.items() if one == usual), MISSING)
-        if usual is None or self.kind is bool:
-            usual = str(usual).lower()
-        return "; ".join(parts) + ("" if usual is MISSING else f" (default: {usual})")
+            default = next((name for name, preset in named.items() if preset == default), MISSING)
+        if default is None or self.kind is bool:
+            default = str(default).lower()
+        return "; ".join(parts) + ("" if default is MISSING else f" (default: {default})")
 
     def checked(self, value: Any) -> Any:
         """Return a value as a Python object of the setting's kind; AntsError if not allowed."""
         word = self.kind is not str and isinstance(value, str) and value == "none"
         if self.optional and (value is None or word):
             return None  # files and command lines write "none", because they have no None
-        found = self._converted(value)
-        if found is None:
+        converted = self._converted(value)
+        if converted is None:
             self._refuse(value, self.allowed)
-        if self.kind in (int, float) and not self._in_range(found):
+        if self.kind in (int, float) and not self._in_range(converted):
             self._refuse(value, self._range)
-        return found
+        return converted
 
     def _converted(self, value: Any) -> Any:
         """Return the value converted to the setting's kind; None if that is impossible."""
@@ -198,11 +198,11 @@ class DeclaredSetting(NamedTuple):
     def _named(self, value: Mapping[Any, Any], start: Mapping[str, Any]) -> Named[Any]:
         """Return named settings in which `value` replaces or changes those of `start`."""
         entry, entries = self.entry, dict(start)
-        for name, one in value.items():
+        for name, new in value.items():
             check_word(f"a name in `{self.path}`", name)
             try:
                 kind = entry.entry_named(name)  # type: ignore[attr-defined]
-                entries[name] = one if isinstance(one, kind) else _entry(kind, one, start, name)
+                entries[name] = new if isinstance(new, kind) else _entry(kind, new, start, name)
             except AntsError as error:
                 raise AntsError(_placed(str(error), entry, f"{self.path}.{name}")) from None
         if len(entries) > (most := entry.most_entries):  # type: ignore[attr-defined]
@@ -281,10 +281,10 @@ class _Checked(type):
 @cache
 def _arguments(cls: type) -> tuple[str, ...] | None:
     """Return the names of the arguments of a class; None if it takes any name."""
-    every = signature(cls.__init__).parameters.values()  # type: ignore[misc]
-    if any(one.kind is one.VAR_KEYWORD for one in every):
+    parameters = signature(cls.__init__).parameters.values()  # type: ignore[misc]
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
         return None
-    return tuple(one.name for one in every)[1:]
+    return tuple(parameter.name for parameter in parameters)[1:]
 
 
 class Settings(metaclass=_Checked):
@@ -323,23 +323,23 @@ class Settings(metaclass=_Checked):
 
     def check(self) -> None:
         """Check each value, and convert it to its kind."""
-        for one in declared(type(self)):
-            object.__setattr__(self, one.name, one.checked(getattr(self, one.name)))
-        for one in declared(type(self)):
-            if one.rule.only is not None:
-                self._settle(one)
+        for setting in declared(type(self)):
+            object.__setattr__(self, setting.name, setting.checked(getattr(self, setting.name)))
+        for setting in declared(type(self)):
+            if setting.rule.only is not None:
+                self._fill_or_refuse(setting)
 
-    def _settle(self, one: DeclaredSetting) -> None:
+    def _fill_or_refuse(self, setting: DeclaredSetting) -> None:
         """Refuse a setting that has no effect; replace None by the usual value if it has one."""
-        assert one.rule.only is not None
-        other, *values = one.rule.only
-        value = getattr(self, one.name)
+        assert setting.rule.only is not None
+        other, *values = setting.rule.only
+        value = getattr(self, setting.name)
         if getattr(self, other) in values:
-            if value is None and one.rule.usual is not None:
-                object.__setattr__(self, one.name, one.rule.usual)
-        elif value != one.default:
+            if value is None and setting.rule.usual is not None:
+                object.__setattr__(self, setting.name, setting.rule.usual)
+        elif value != setting.default:
             raise AntsError(
-                f"`{one.path}` is {shown(value)}; leave it out unless `{other}` is "
+                f"`{setting.path}` is {shown(value)}; leave it out unless `{other}` is "
                 f"{_either(map(repr, values))}."
             )
 
@@ -372,26 +372,26 @@ class Settings(metaclass=_Checked):
         return self._changed(changes)
 
     def _changed(self: Self, changes: Mapping[str, Any]) -> Self:
-        known = {one.name: one for one in declared(type(self))}
-        made: dict[str, Any] = {}
+        known = {setting.name: setting for setting in declared(type(self))}
+        changed: dict[str, Any] = {}
         for name, value in changes.items():
             if name not in known:
                 path = _below(_alone(type(self)), name)
                 raise AntsError(f"`{path}` {not_a_setting(name, known)}")
-            one = known[name]
-            if one.kind is Named and isinstance(value, Mapping):
-                value = one._named(value, getattr(self, name))
-            elif one.is_group and isinstance(value, Mapping):
+            setting = known[name]
+            if setting.kind is Named and isinstance(value, Mapping):
+                value = setting._named(value, getattr(self, name))
+            elif setting.is_group and isinstance(value, Mapping):
                 inner = dict(value)
-                start = one.checked(inner.pop("")) if "" in inner else getattr(self, name)
+                start = setting.checked(inner.pop("")) if "" in inner else getattr(self, name)
                 value = start._changed(inner)
-            made[name] = value
-        for one in known.values():
-            if one.rule.only and one.name not in made:
-                other, *values = one.rule.only
-                if made.get(other, getattr(self, other)) not in values:
-                    made[one.name] = one.default
-        return replace(self, **made)  # type: ignore[type-var]
+            changed[name] = value
+        for setting in known.values():
+            if setting.rule.only and setting.name not in changed:
+                other, *values = setting.rule.only
+                if changed.get(other, getattr(self, other)) not in values:
+                    changed[setting.name] = setting.default
+        return replace(self, **changed)  # type: ignore[type-var]
 
     @classmethod
     def from_dict(cls: type[Self], facts: Any) -> Self:
@@ -417,8 +417,8 @@ def _placed(text: str, cls: Any, path: str) -> str:
     """Return a message that calls an entry and its groups by their classes, with their paths."""
     for end in ".`":
         text = text.replace(f"`{cls.__name__}{end}", f"`{path}{end}")
-    for one in declared(cls):
-        text = _placed(text, one.kind, f"{path}.{one.name}") if one.is_group else text
+    for setting in declared(cls):
+        text = _placed(text, setting.kind, f"{path}.{setting.name}") if setting.is_group else text
     return text
 
 
@@ -433,9 +433,7 @@ class Named(dict[str, Entry], Generic[Entry]):
     """
 
     def _refuse(self, *arguments: Any, **named: Any) -> Any:
-        raise TypeError(
-            "named settings are read-only; use `replace` of the settings that have them"
-        )
+        raise TypeError("named settings are read-only; use `replace` of what has them")
 
     __setitem__ = __delitem__ = __ior__ = _refuse
     clear = pop = popitem = setdefault = update = _refuse
@@ -455,26 +453,23 @@ class Named(dict[str, Entry], Generic[Entry]):
 
 def named_groups(cls: Any) -> Iterator[DeclaredSetting]:
     """Yield the settings of a class, and of its groups, that are mappings of named settings."""
-    return (one for one in all_of(cls) if one.kind is Named)
+    return (setting for setting in all_of(cls) if setting.kind is Named)
 
 
 def settings_of_entry(group: DeclaredSetting, name: str) -> dict[str, DeclaredSetting]:
     """Return the declarations of the entry of this name in a named group, by their full names."""
     entry: Any = group.entry.entry_named(name)  # type: ignore[attr-defined]
-    several = {
-        f"{group.path}.{name}{one.path.removeprefix(entry.path)}": one for one in all_of(entry)
+    of_entry = {
+        f"{group.path}.{name}{setting.path.removeprefix(entry.path)}": setting
+        for setting in all_of(entry)
     }
-    return {path: one._replace(path=path) for path, one in several.items()}
+    return {path: setting._replace(path=path) for path, setting in of_entry.items()}
 
 
-_DECLARED: dict[Any, tuple[DeclaredSetting, ...]] = {}
-
-
+@cache
 def declared(cls: Any) -> tuple[DeclaredSetting, ...]:
     """Return the settings of a class or function: its fields or arguments with a `Setting`."""
-    if cls not in _DECLARED:
-        _DECLARED[cls] = tuple(_read(cls))
-    return _DECLARED[cls]
+    return tuple(_read(cls))
 
 
 def _read(cls: Any) -> Iterator[DeclaredSetting]:
@@ -487,8 +482,8 @@ def _read(cls: Any) -> Iterator[DeclaredSetting]:
             continue
         kind, *rules = get_args(hint)
         rule = Setting()
-        for more in rules:
-            rule = rule.replace(more)
+        for other in rules:
+            rule = rule.replace(other)
         entry = get_args(kind)[0] if get_origin(kind) is Named else NoneType
         kind, words, optional = _kind_of(kind)
         path = _below(getattr(cls, "path", "world"), name)  # functions build worlds
@@ -497,9 +492,9 @@ def _read(cls: Any) -> Iterator[DeclaredSetting]:
 
 def _defaults(cls: Any) -> Iterator[tuple[str, Any]]:
     if isinstance(cls, type):
-        for one in fields(cls):
-            usual = one.default if one.default_factory is MISSING else one.default_factory()
-            yield one.name, usual
+        for attribute in fields(cls):
+            make = attribute.default_factory
+            yield attribute.name, attribute.default if make is MISSING else make()
     else:
         for name, argument in signature(cls).parameters.items():
             yield name, MISSING if argument.default is argument.empty else argument.default
@@ -515,13 +510,13 @@ def checked(function: Function, path: str = "world") -> Function:
 
     @wraps(function)
     def calls(*positional: Any, **named: Any) -> Any:
-        given = form.bind(*positional, **named).arguments
-        given |= {
-            one.name: one.checked(given[one.name])
-            for one in declared(function)
-            if one.name in given
+        arguments = form.bind(*positional, **named).arguments
+        arguments |= {
+            setting.name: setting.checked(arguments[setting.name])
+            for setting in declared(function)
+            if setting.name in arguments
         }
-        return function(**given)
+        return function(**arguments)
 
     return calls  # type: ignore[return-value]
 
@@ -531,18 +526,18 @@ checked_arguments = partial(checked, path="")  # for functions that do not build
 
 def all_of(cls: Any) -> Iterator[DeclaredSetting]:
     """Yield the settings of a class, each group followed by its own settings."""
-    for one in declared(cls):
-        yield one
-        if one.is_group:
-            yield from all_of(one.kind)
+    for setting in declared(cls):
+        yield setting
+        if setting.is_group:
+            yield from all_of(setting.kind)
 
 
 def not_a_setting(name: object, known: Iterable[str], group: str = "") -> str:
     """Return the end of a message about an unknown name, with the most similar known names."""
-    several = list(known)
+    names = list(known)
     # Longer names are similar by chance.
-    near = difflib.get_close_matches(str(name), several, 3, 0.6 if len(str(name)) < 9 else 0.75)
-    near = near or several
+    near = difflib.get_close_matches(str(name), names, 3, 0.6 if len(str(name)) < 9 else 0.75)
+    near = near or names
     of = f" of {group}" if group else ""
     if not near:
         return f"is not a setting{of}, which has none; leave it out."
@@ -560,7 +555,7 @@ def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
 
 
 def nested(named: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings by full names as nested mappings, the form that `Settings.but` takes."""
+    """Return settings by full names as nested mappings, the form that `Settings.replace` takes."""
     tree: dict[str, Any] = {}
     for path, value in named.items():
         *outer, last = path.split(".")
@@ -580,7 +575,7 @@ def nested(named: Mapping[str, Any]) -> dict[str, Any]:
 def _kind_of(hint: Any) -> tuple[type, tuple[str, ...], bool]:
     optional = get_origin(hint) in (Union, UnionType)
     if optional:
-        (hint,) = [one for one in get_args(hint) if one is not NoneType]
+        (hint,) = [part for part in get_args(hint) if part is not NoneType]
     if get_origin(hint) is Literal:
         return str, get_args(hint), optional
     if get_origin(hint) is Named:

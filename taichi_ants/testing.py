@@ -71,10 +71,10 @@ def check_rule(name: str, inputs: int = 4000) -> RuleCheck:
     rule = rules.get(name)
     checked_whole("inputs", inputs)
     runtime.start()
-    found, ticks = difference(rule, inputs), 0
-    if not found:
-        ticks, found = _compared(lambda seed: _task(rule, seed))
-    return RuleCheck(name, inputs, ticks, found, rule.fields)
+    fault, ticks = difference(rule, inputs), 0
+    if not fault:
+        ticks, fault = _compared(lambda seed: _task(rule, seed))
+    return RuleCheck(name, inputs, ticks, fault, rule.fields)
 
 
 def check_observation(name: str) -> RuleCheck:
@@ -91,8 +91,8 @@ def check_observation(name: str) -> RuleCheck:
     """
     observation = observations.get(name)
     runtime.start()
-    ticks, found = _compared(lambda seed: _task_of(observation, seed))
-    return RuleCheck(name, 0, ticks, found, observation.reads)
+    ticks, fault = _compared(lambda seed: _task_of(observation, seed))
+    return RuleCheck(name, 0, ticks, fault, observation.reads)
 
 
 def check_learner(name: str) -> str:
@@ -114,9 +114,9 @@ def _compared(task_of: Callable[[int], Task]) -> tuple[int, str]:
     ticks = 0
     try:
         for seed in range(SEEDS):
-            for found in _differences(task_of(seed), seed):
-                if found:
-                    return ticks, found
+            for fault in _differences(task_of(seed), seed):
+                if fault:
+                    return ticks, fault
                 ticks += 1
     except AntsError:
         raise
@@ -131,11 +131,11 @@ def _task(rule: Rule, seed: int) -> Task:
     Kernels are compiled for two tasks only, with one nest and with two; others differ in numbers.
     """
     rng, drawn, numbers = np.random.default_rng([seed, 17]), seed % 2, {}
-    for one in declared(rule.settings):
-        least, most = one.rule.least, one.rule.most
+    for setting in declared(rule.settings):
+        least, most = setting.rule.least, setting.rule.most
         if least is not None and most is not None and rng.random() < 0.5:
             value = float(rng.uniform(least, most))
-            numbers[one.name] = round(value) if one.kind is int else value
+            numbers[setting.name] = round(value) if setting.kind is int else value
     settings: dict = {"rules": {rule.name: numbers}, "evaporation_in_training": True}
     settings["fields"] = _fields(rule.fields)
     settings["traffic"] = ("blocking", "following")[drawn]
@@ -180,8 +180,8 @@ def _world(seed: int) -> World:
     world = worlds.open_world(seed, ranges=(5, 5, 5))
     if seed % 4 < 2:
         return world
-    far = np.where(world.ground() == EMPTY, world.distances(), 0)
-    other = world.grid.cells(far.argmax()).tolist()
+    distances = np.where(world.ground() == EMPTY, world.distances(), 0)
+    other = world.grid.cells(distances.argmax()).tolist()
     return World(world.ranges, [world.queen, other], world.foods, world.obstacles)
 
 
@@ -198,8 +198,8 @@ def _differences(task: Task, seed: int) -> Iterator[str]:
     for tick in range(TICKS):
         colony.tick()
         plain.tick(last=tick == TICKS - 1)
-        found = _difference(colony, plain)
-        yield found and f"seed {seed}, tick {tick}: {found}"
+        fault = _difference(colony, plain)
+        yield fault and f"seed {seed}, tick {tick}: {fault}"
 
 
 def _difference(colony: Colony, plain: ReferenceColony) -> str:

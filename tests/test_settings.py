@@ -25,9 +25,7 @@ from taichi_ants.settings import (
     all_of,
     declared,
     named_groups,
-    nested,
 )
-from taichi_ants.studies.command_line import Parser, add_settings, given_settings
 from taichi_ants.task import Caste, Field, Pheromone, Task, Threshold, Traffic
 from taichi_ants.worlds import double_bridge, open_world
 
@@ -190,22 +188,6 @@ def test_messages_of_named_settings_name_the_entry():
     assert refused(lambda: Kitchen({"first": 3})) == says
     says = "`kitchen.soups.first.flower` is not a setting; choose flour."
     assert refused(lambda: Kitchen({"first": {"flower": 3}})) == says
-
-
-def test_options_of_named_settings_take_any_name():
-    parser = Parser()
-    add_settings(parser, Kitchen())
-    given = given_settings(
-        parser.parse_args(["--kitchen.soups.first.salt", "5", "--kitchen.soups.b.kind=thick"])
-    )
-    assert given == {"kitchen": {"soups": {"first": {"salt": 5}, "b": {"kind": "thick"}}}}
-    assert "--kitchen.soups.NAME.SETTING: the soups" in " ".join(parser.format_help().split())
-
-
-def test_full_names_become_tables_in_any_order():
-    tree = {"task": {"traffic": {"": "following", "reward_pushed": False}}}
-    named = [("task.traffic", "following"), ("task.traffic.reward_pushed", False)]
-    assert nested(dict(named)) == nested(dict(named[::-1])) == tree
 
 
 def test_the_rules_of_a_task_that_depend_on_each_other():

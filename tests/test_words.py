@@ -99,7 +99,10 @@ class Docstring(NamedTuple):
 
     @property
     def returns(self) -> bool:
-        """Whether it is that of a public function that returns something, and no property."""
+        """Whether it is that of a public function that returns a value, and no property.
+
+        A `Change` of `engines.colony.interventions` is no value: it does something.
+        """
         node = self.node
         if (
             not isinstance(node, ast.FunctionDef)
@@ -108,7 +111,8 @@ class Docstring(NamedTuple):
         ):
             return False
         names = " ".join(ast.unparse(one) for one in node.decorator_list)
-        return "property" not in names and ast.unparse(node.returns) not in ("None", "NoReturn")
+        nothing = ("None", "NoReturn", "Change")
+        return "property" not in names and ast.unparse(node.returns) not in nothing
 
     def texts(self) -> Iterator[Text]:
         """Paragraphs and items, without code and names of items."""

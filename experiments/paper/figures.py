@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import cycle
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from paper.table2 import shown_position
 from taichi_ants.analysis import style
 from taichi_ants.analysis.behaviour import BEHAVIOURS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
+from taichi_ants.analysis.drawings import Drawing, drawings
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import BLUE, COLOURS, INK, ORANGE, WINE
 from taichi_ants.errors import count
@@ -42,24 +44,26 @@ def spans(episodes: int) -> np.ndarray:
     return np.unique(np.geomspace(1, end, n).round().astype(int)) - 1
 
 
-def curves_of(
-    comparison: Comparison, outcomes: Iterable[tuple[int, Mapping[str, np.ndarray]]]
-) -> dict[str, np.ndarray]:
+def sums(name: str) -> str:
+    """Return the name of the array with the sum of a curve's quantity over each span."""
+    return f"sum_{name}"
+
+
+def curves_of(comparison: Comparison, runs: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return the curves of all `comparison.learners`, float64 (learners, 3, spans) by name.
 
     The second axis has the interquartile mean over seeds and the ends of the middle half of the
-    seeds. For deliveries, which are 0 or 1 per episode, it has the mean instead. `outcomes` yields
-    indices of rows, which include those of `curve_row`, with arrays (seeds, episodes) by name.
+    seeds. For deliveries, which are 0 or 1 per episode, it has the mean instead. `runs` has the
+    `sums` of all runs, (rows, seeds, spans).
     """
-    places = [curve_row(comparison, *learner) for learner in comparison.learners]
-    edges = spans(comparison.episodes)
-    curves = {name: np.empty((len(places), 3, len(edges) - 1)) for name in CURVES}
-    for row, outcome in outcomes:
-        for name in CURVES if row in places else ():
-            sums = np.add.reduceat(outcome[name], edges[:-1], axis=1, dtype=float)
-            means = sums / np.diff(edges)
+    rows = [curve_row(comparison, *learner) for learner in comparison.learners]
+    lengths, curves = np.diff(spans(comparison.episodes)), {}
+    for name in CURVES:
+        found = []
+        for means in runs[sums(name)][rows] / lengths:
             middle = means.mean(axis=0) if name == "deliveries" else interquartile_mean(means.T)
-            curves[name][places.index(row)] = middle, *np.percentile(means, (25, 75), axis=0)
+            found.append([middle, *np.percentile(means, (25, 75), axis=0)])
+        curves[name] = np.array(found)
     return curves
 
 
@@ -163,3 +167,13 @@ FIGURES = (learning_curves, return_against_deliveries)
 def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
     """Return all figures by name."""
     return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}
+
+
+def save_all(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> None:
+    """Write all figures as files."""
+    style.save_all(draw_all(comparison, baselines), folder)
+
+
+def for_page(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
+    """Return new figures for the page, because saving a figure as a file changes its layout."""
+    return drawings(draw_all(comparison, baselines))

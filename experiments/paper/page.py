@@ -1,4 +1,4 @@
-"""The page of the paper's comparison, and its figures and recordings."""
+"""The page of the comparison, with its recordings, animations and policy sheet."""
 
 from __future__ import annotations
 
@@ -6,34 +6,50 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from policy_sheet import policy_sheet
 
 from paper import comparison as paper
-from paper import report
-from paper.claims import headlines
+from paper import figures, process, report
+from paper.claims import Audit, headlines
 from paper.comparison import Comparison
-from paper.figures import draw_all
-from paper.report import Results
-from paper.table2 import example_name, examples
+from paper.table2 import Line, example_name, summarise_behaviours
+from taichi_ants import files
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
-from taichi_ants.analysis.drawings import Drawing, drawings
+from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
-from taichi_ants.learners.policies import load_policy
-from taichi_ants.rendering import Episode
+from taichi_ants.rendering import PAUSE, Episode, frames, save_animation
 from taichi_ants.report.page import Picture, Player, Shown, Statement, Statements, fill
+from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint
-from taichi_ants.studies.runner import Study
 from taichi_ants.task import Task
 from taichi_ants.viewer import record_episode
 
 STEPS = 80  # the longest recording; a delivery takes 34 steps, walking to and fro on the trail 38
+SIZE = 720, 480  # of animations
 
-Begin = Callable[..., Callable[[], Any]]  # begins a call and returns a function that waits for it
+
+class Example(NamedTuple):
+    """A run that shows a behaviour: its place in the comparison, its point and final policy."""
+
+    row: int
+    run: int
+    point: RunPoint
+    seed: int
+    q_values: np.ndarray
+
+    def played(self) -> Episode:
+        """Return the first steps of the episode by which its behaviour was classified.
+
+        It has the evaporation of training, not that of the greedy evaluation.
+        """
+        steps, task = min(self.point.max_steps, STEPS), as_in_training(self.point.task)
+        given = {"seed": self.seed, "max_steps": steps, "task": task}
+        return Episode.play(self.point.world, self.q_values, **given)
 
 
 class Seen(NamedTuple):
@@ -49,70 +65,74 @@ def as_in_training(task: Task) -> Task:
     return replace(task, evaporation_in_evaluation=task.evaporation_in_training)
 
 
-def played(point: RunPoint, q_values: np.ndarray, seed: int) -> Episode:
-    """Return the first steps of the episode by which the behaviour of a policy was classified.
-
-    It has the evaporation of training, not that of the greedy evaluation.
-    """
-    steps, task = min(point.max_steps, STEPS), as_in_training(point.task)
-    return Episode.play(point.world, q_values, seed=seed, max_steps=steps, task=task)
-
-
-def what_is_seen(
-    policies: Path,
-    study: Study[RunPoint],
+def begin(
     comparison: Comparison,
     baselines: Sequence[Baseline],
-    play: Begin = partial,
-    draw: Begin = partial,
+    examples: Sequence[Example],
+    folder: Path,
+    renders: bool,
 ) -> Callable[[], Seen]:
-    """Return a function that waits for the figures, recordings and policy sheet of the page.
+    """Return a function that waits for all figures, recordings and, if `renders`, animations.
 
-    Examples whose policies are not in the folder are skipped. This process follows the policies,
-    because it has compiled the kernel. `play` and `draw` start the work of making recordings and
-    figures, for example in a worker process (`WorkerProcess.begin`).
+    This process follows the policies, because it has compiled the kernel. The second process draws
+    the animations or, without them, the figures.
     """
-    first: dict[int, tuple[int, int, Path]] = {}
-    for row, run in examples(comparison):
-        path = policies / f"{example_name(comparison, row, run)}.npz"
-        if path.exists():
-            first.setdefault(int(comparison.behaviours[row, run]), (row, run, path))
+    played = [one.played() for one in examples]
+    draw = partial if renders else process.begin
+    calls = [draw(figures.save_all, comparison, baselines, folder / "figures")]
+    for (row, run, point, *_), episode in zip(examples, played if renders else (), strict=False):
+        path = files.check_writable_folder(folder / "renders")
+        path /= f"{example_name(comparison, row, run)}.gif"
+        # The animation shows the name of the episode next to the world.
+        named = replace(episode, name=BEHAVIOURS[comparison.behaviours[row, run]])
+        title = f"{comparison.rows[row].variant.label}, {point.task.delivery}"
+        calls.append(process.begin(render, path, named, title))
+    first: dict[int, tuple[Example, Episode]] = {}
+    for one, episode in zip(examples, played, strict=True):
+        first.setdefault(int(comparison.behaviours[one.row, one.run]), (one, episode))
     done, recorded, sheets = counts(comparison.behaviours), [], []
-    for code, (row, run, path) in sorted(first.items()):
-        point, seed, (_, variant, grid) = study.points[row], study.seeds[run], comparison.rows[row]
-        policy = load_policy(path)
+    for code, (one, episode) in sorted(first.items()):
+        _, variant, grid = comparison.rows[one.row]
         whose = (
-            f"{variant.label}, delivery {point.task.delivery}, seed {seed}, {grid.label} (learning "
-            "rate / discount / epsilon / decay)"
+            f"{variant.label}, delivery {one.point.task.delivery}, seed {one.seed}, {grid.label} "
+            "(learning rate / discount / epsilon / decay)"
         )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
-        recording = play(record_episode, played(point, policy.q_values, seed), BEHAVIOURS[code])
+        recording = process.begin(record_episode, episode, BEHAVIOURS[code])
         recorded.append((sentence(BEHAVIOURS[code]), words, recording))
         if code == DELIVERS:
             title = f"{variant.label}: policy"
-            sheet = play(policy_sheet, policy.q_values, title, task=point.task)
+            sheet = process.begin(policy_sheet, one.q_values, title, task=one.point.task)
             sheets.append((f"The policy of an ant: {whose}", sheet))
-    drawn = draw(drawings_of, comparison, baselines)
-    return lambda: Seen(
-        drawn(),
-        [Player(title, words, one()) for title, words, one in recorded],
-        next((Picture(words, one()) for words, one in sheets), None),
-    )
+    drawn = draw(figures.for_page, comparison, baselines)
+
+    def wait() -> Seen:
+        with progress_bar("pictures") as progress:
+            process.results_of(calls, progress)
+        players = [Player(title, words, one()) for title, words, one in recorded]
+        sheet = next((Picture(words, one()) for words, one in sheets), None)
+        return Seen(drawn(), players, sheet)
+
+    return wait
 
 
-def drawings_of(comparison: Comparison, baselines: Sequence[Baseline]) -> list[Drawing]:
-    """Return new figures for the page, because saving a figure as a file changes its layout."""
-    return drawings(draw_all(comparison, baselines))
+def render(path: Path, episode: Episode, title: str) -> None:
+    """Write an animation of an episode."""
+    save_animation(path, frames(episode.snapshots(), SIZE, title=title), pause=PAUSE)
 
 
 def comparison_page(
-    results: Results, seen: Seen, *, facts: Mapping[str, str], files: Sequence[str]
+    comparison: Comparison,
+    baselines: Sequence[Baseline],
+    lines: Sequence[Line],
+    audit: Audit,
+    seen: Seen,
+    facts: Mapping[str, str],
+    files: Sequence[str],
 ) -> str:
     """Return the page as HTML; `facts` describe the method, and `files` are links to results."""
-    comparison = results.comparison
-    first, *others, notes = report.figure_tables(results.lines, comparison)
-    greedy, baselines = report.greedy_table(results.lines), report.baseline_table(results.baselines)
+    first, *others, notes = report.figure_tables(lines, comparison)
     seeds = len(comparison.seeds)
     return fill(
         Path(__file__).with_name("page.html"),
@@ -125,21 +145,21 @@ def comparison_page(
         deliveries=comparison.delivery_settings,
         world=comparison.world,
         in_paper_world=comparison.in_paper_world,
-        headlines=headlines(results.audit),
-        claims=_claims(results),
+        headlines=headlines(audit),
+        claims=_claims(comparison, audit),
         first_table=first,
         table_notes=notes,
-        more_tables=[*others, greedy, baselines],
-        behaviours=report.behaviour_table(results.lines, results.behaviours),
+        more_tables=[*others, report.greedy_table(lines), report.baseline_table(baselines)],
+        behaviours=report.behaviour_table(lines, summarise_behaviours(comparison)),
         **seen._asdict(),
         facts=facts,
         files=files,
     )
 
 
-def _claims(results: Results) -> Statements:
+def _claims(comparison: Comparison, audit: Audit) -> Statements:
     lines = []
-    for claim, findings in results.audit.items():
+    for claim, findings in audit.items():
         told = [
             Shown(f"delivery {setting}", one, one.contrast.label, claim.quantity.unit)
             for setting, one in findings.items()
@@ -147,5 +167,5 @@ def _claims(results: Results) -> Statements:
         facts = {"Tested on": claim.tested_on, "Criterion": claim.asked}
         verdicts = [one.verdict for one in findings.values()]
         lines.append(Statement(claim.statement, claim.section, verdicts, facts, told))
-    settings = map(sentence, results.comparison.delivery_settings)
+    settings = map(sentence, comparison.delivery_settings)
     return Statements(("The paper, in our words", "Section", *settings), lines, "claims")

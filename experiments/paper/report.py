@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from paper.claims import Audit, assess, headlines, tallies
+from paper.claims import Audit, headlines, tallies
 from paper.comparison import GREEDY_RETURN, GREEDY_STEPS, Comparison
 from paper.table2 import (
     FIGURES,
-    BehaviourMeans,
     Line,
-    Summary,
-    summarise,
-    summarise_behaviours,
-    table2,
 )
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
 from taichi_ants.analysis.bounds.baselines import Baseline
@@ -40,24 +35,6 @@ MOST_LINES = 12  # of the table in the report of one screen
 FEW_SEEDS = 50
 APART = "!"  # marks a mean outside of the interval of the IQM
 MIXED = "+ the runs behave in different ways, so their mean describes none of them."
-
-
-class Results(NamedTuple):
-    """A comparison, its baselines, and the tables and the audit that follow from them."""
-
-    comparison: Comparison
-    baselines: Sequence[Baseline]
-    summaries: Sequence[Summary]
-    behaviours: Sequence[BehaviourMeans]
-    lines: Sequence[Line]
-    audit: Audit
-
-    @classmethod
-    def of(cls, comparison: Comparison, baselines: Sequence[Baseline]) -> Results:
-        """Return the results of a comparison."""
-        summaries, behaviours = summarise(comparison), summarise_behaviours(comparison)
-        lines = table2(comparison, summaries)
-        return cls(comparison, baselines, summaries, behaviours, lines, assess(comparison))
 
 
 def report(comparison: Comparison, lines: Sequence[Line], audit: Audit) -> str:
@@ -226,19 +203,22 @@ def greedy_table(lines: Sequence[Line]) -> Table:
     return Table(title, ("Learner", "Delivery", *means), rows, [note], 2)
 
 
-def behaviour_table(lines: Sequence[Line], behaviours: Sequence[BehaviourMeans]) -> Table:
+def behaviour_table(lines: Sequence[Line], behaviours: Sequence[Mapping[str, Any]]) -> Table:
     """Return a table of the behaviours of the final policies of `lines`."""
     returns = ("Return\nin training", "Return\nfollowed", "Return\ngreedy")
     headers = ("Learner", "Delivery", "Behaviour", "Runs", *returns)
-    shown = ("return_last50", "policy_return", "greedy_return")
+    shown = ("return_last50_mean", "policy_return_mean", "greedy_return_mean")
     rows = [
         [
-            *(line.label, line.delivery, BEHAVIOURS[one.behaviour], str(one.runs)),
-            *(number(one.means[name]) for name in shown),
+            line.label,
+            line.delivery,
+            one["behaviour"],
+            str(one["runs"]),
+            *(number(one[n]) for n in shown),
         ]
         for line in lines
         for one in behaviours
-        if one.row == line.summary.row
+        if one.items() >= line.summary.row.columns().items()
     ]
     notes = (
         "Each policy is followed greedily once, with evaporation as in training.",

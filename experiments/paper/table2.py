@@ -57,30 +57,24 @@ def summarise(comparison: Comparison) -> list[Summary]:
     return [Summary(row, seeds, found, counts(done)) for row, found, done in rows]
 
 
-class BehaviourMeans(NamedTuple):
-    """A row of behaviours.csv: means over the runs of a configuration that show one behaviour."""
+def summarise_behaviours(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the rows of behaviours.csv: means over the runs of a configuration with one behaviour.
 
-    row: Row
-    behaviour: int
-    runs: int
-    means: Mapping[str, float]  # "policy_return": of the episode that shows the behaviour
-
-    def columns(self) -> dict[str, Any]:
-        """Return the columns of behaviours.csv."""
-        done = {"behaviour": BEHAVIOURS[self.behaviour], "runs": self.runs}
-        return self.row.columns() | done | {f"{name}_mean": x for name, x in self.means.items()}
-
-
-def summarise_behaviours(comparison: Comparison) -> list[BehaviourMeans]:
-    """Return means for each configuration and behaviour that occurs in it."""
+    "policy_return" is the return of the episode that shows the behaviour.
+    """
     names = ("return_last50", "policy_return", *_GREEDY)
     values = {"policy_return": comparison.policy_returns, **comparison.measures}
-    found = []
-    for place, (row, done) in enumerate(zip(comparison.rows, comparison.behaviours, strict=True)):
-        for code, runs in counts(done).items():
-            means = {name: float(values[name][place, done == code].mean()) for name in names}
-            found.append(BehaviourMeans(row, code, runs, means))
-    return found
+    return [
+        {
+            **row.columns(),
+            **{"behaviour": BEHAVIOURS[code], "runs": runs},
+            **{f"{name}_mean": float(values[name][place, done == code].mean()) for name in names},
+        }
+        for place, (row, done) in enumerate(
+            zip(comparison.rows, comparison.behaviours, strict=True)
+        )
+        for code, runs in counts(done).items()
+    ]
 
 
 def paper_row(comparison: Comparison, variant: Variant) -> PaperRow | None:

@@ -81,7 +81,7 @@ def _for_page(svg: str, title: str) -> str:
     # Coordinates and paths in tenths of a point.
     svg = re.sub(
         r' (?:d|x|y|transform)="[^"]*"',
-        lambda found: re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.1f}", found[0]),
+        lambda match: re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.1f}", match[0]),
         svg,
     )
     svg = re.sub(r"(?:<use [^>]*/>\s*){2,}", _marks, svg)
@@ -97,11 +97,11 @@ def _for_page(svg: str, title: str) -> str:
 _USE = re.compile(r'href="([^"]*)" x="([^"]*)" y="([^"]*)"(?: style="([^"]*)")?')
 
 
-def _marks(found: re.Match) -> str:
+def _marks(match: re.Match) -> str:
     """Return a group of equal marks that share one style attribute."""
-    uses = _USE.findall(found[0])
+    uses = _USE.findall(match[0])
     [(mark, look), *others] = {(mark, look) for mark, _, _, look in uses}
     if others or "opacity" not in look:
-        return found[0]
+        return match[0]
     marks = "".join(f'<use href="{mark}" x="{x}" y="{y}"/>' for _, x, y, _ in uses)
     return f'<g style="{look}">{marks}</g>\n'

@@ -197,7 +197,7 @@ def gaps_in_words(values: np.ndarray) -> str:
 def weakest(findings: Sequence[Finding]) -> Finding:
     """Return the finding with the strongest objection; its `by_mean` is chosen in the same way."""
     first = min(findings, key=_strength)
-    by_mean = [one.by_mean for one in findings if one.by_mean is not None]
+    by_mean = [finding.by_mean for finding in findings if finding.by_mean is not None]
     return replace(first, by_mean=min(by_mean, key=_strength) if by_mean else None)
 
 

@@ -132,7 +132,7 @@ def compare(
     both = ~np.isnan(values[0] - values[1])
     if not both.any():
         raise AntsError(f"no seed has a value of {measure!r} in both results; run more ticks.")
-    first, second = (one[both] for one in values)
+    first, second = (sample[both] for sample in values)
     differences = first - second
     low, high = (float(end[0]) for end in bootstrap_interval(differences[None], level))
     return Comparison(
@@ -168,7 +168,7 @@ def summary(result: Tidy, last: int | None = None) -> Summary:
         raise AntsError(_NO_NUMBERS)
     for name in table.values:
         for group, values in zip(table.groups, of_seeds(table, name, last), strict=True):
-            mean, low, high = (float(one[0]) for one in _means(values[None]))
+            mean, low, high = (float(bound[0]) for bound in _means(values[None]))
             rows.append({
                 "configuration": group, "measure": name, "unit": table.units.get(name, ""),
                 "seeds": int(np.count_nonzero(~np.isnan(values))),
@@ -252,7 +252,7 @@ def _together(tables: Mapping[str, Measured]) -> Measured:
             )
     every = tables.values()
     common = [name for name in first.values if all(name in table.values for table in every)]
-    groups = [f"{name} {group}".strip() for name, one in tables.items() for group in one.groups]
+    groups = [f"{name} {group}".strip() for name, table in tables.items() for group in table.groups]
     ends = list(itertools.accumulate(len(table.groups) for table in every))
     of_group = [t.of_group + end - len(t.groups) for t, end in zip(every, ends, strict=True)]
     return Measured(
@@ -324,16 +324,16 @@ def curves(table: Measured, measure: str, across: str) -> Iterator[tuple[np.ndar
 def _means(values: np.ndarray, resamples: int = RESAMPLES) -> tuple[np.ndarray, ...]:
     """Return the mean and the ends of its interval by row (rows, seeds), without nan."""
     known = ~np.isnan(values)
-    found = np.full((3, len(values)), math.nan)
+    intervals = np.full((3, len(values)), math.nan)
     whole = known.all(axis=1)
     if whole.any():
-        found[:, whole] = (
+        intervals[:, whole] = (
             values[whole].mean(axis=1),
             *bootstrap_interval(values[whole], resamples=resamples),
         )
     for row in np.flatnonzero(known.any(axis=1) & ~whole):
         some = values[row, known[row]][None]
-        found[:, row] = np.ravel(
+        intervals[:, row] = np.ravel(
             [some.mean(axis=1), *bootstrap_interval(some, resamples=resamples)]
         )
-    return tuple(found)
+    return tuple(intervals)

@@ -85,10 +85,10 @@ def seed_share(values: np.ndarray, n_settings: int) -> float:
     return min(1.0, float(noise / variance)) if variance > 0 else float("nan")
 
 
-def report(found: Mapping[str, Sequence[Index]], seeds: int) -> str:
+def report(indices: Mapping[str, Sequence[Index]], seeds: int) -> str:
     """Return the indices by measure as tables for a terminal, the largest total index first."""
     blocks: list[str | Table] = []
-    for measure, rows in found.items():
+    for measure, rows in indices.items():
         if not rows:
             words = f"{measure} has no indices: it has values at too few points, or is constant."
             blocks.append(words)

@@ -122,13 +122,13 @@ def estimates(values: np.ndarray, uses_iqm: bool = True) -> list[Estimator]:
     if uses_iqm:
         columns += [interquartile_mean(values), *bootstrap_interval(values, iqm=True)]
     exact = (without_noise(column, values).tolist() for column in columns)
-    found = [Estimator(*row) for row in zip(*exact, strict=True)]
+    estimators = [Estimator(*row) for row in zip(*exact, strict=True)]
     missing = np.isnan(values)
     for row in np.flatnonzero(missing.any(axis=1)):
         if not missing[row].all():
-            (found[row],) = estimates(values[row, ~missing[row]][None], uses_iqm)
-        found[row] = found[row]._replace(left_out=int(missing[row].sum()))
-    return found
+            (estimators[row],) = estimates(values[row, ~missing[row]][None], uses_iqm)
+        estimators[row] = estimators[row]._replace(left_out=int(missing[row].sum()))
+    return estimators
 
 
 def known_means(values: np.ndarray) -> np.ndarray:
@@ -293,8 +293,8 @@ def _resampled_means(deviations: np.ndarray, resamples: int, iqm: bool = False) 
 def _at_level(draws: np.ndarray, levels: np.ndarray) -> np.ndarray:
     """Sort `draws` (rows, resamples) in place; return Weibull's quantiles at `levels` (rows, k)."""
     last = draws.shape[1] - 1
-    place = np.clip(levels * (last + 2) - 1, 0, last)
-    left = np.nan_to_num(np.floor(place)).astype(int)
+    position = np.clip(levels * (last + 2) - 1, 0, last)
+    left = np.nan_to_num(np.floor(position)).astype(int)
     draws.sort(axis=1)
     low, high = (np.take_along_axis(draws, np.minimum(left + k, last), axis=1) for k in (0, 1))
-    return low + (place - left) * (high - low)
+    return low + (position - left) * (high - low)

@@ -47,8 +47,8 @@ def styled() -> AbstractContextManager:
     """
     from matplotlib import rc_context, rcParamsDefault
 
-    usual = {name: value for name, value in rcParamsDefault.items() if "backend" not in name}
-    return rc_context({**usual, **_settings()})
+    defaults = {name: value for name, value in rcParamsDefault.items() if "backend" not in name}
+    return rc_context({**defaults, **_settings()})
 
 
 @contextmanager

@@ -28,9 +28,9 @@ def seed_rows(
     settings: Sequence[Settings], seeds: Sequence[int], values: Mapping[str, np.ndarray]
 ) -> Iterator[dict[str, Any]]:
     """Yield a row for each point and seed: settings, seed and measures, from float64 (P, S)."""
-    for p, one in enumerate(settings):
+    for p, row in enumerate(settings):
         for s, seed in enumerate(seeds):
-            yield {**one, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
+            yield {**row, "seed": seed, **{n: float(array[p, s]) for n, array in values.items()}}
 
 
 def centre_columns(
@@ -42,9 +42,9 @@ def centre_columns(
     """
     return {
         f"{name}_{field}": value
-        for name, one in found.items()
-        for field, value in one._asdict().items()
-        if (one.iqm is not None or "iqm" not in field)
+        for name, estimator in found.items()
+        for field, value in estimator._asdict().items()
+        if (estimator.iqm is not None or "iqm" not in field)
         and (field != "left_out" or name in with_gaps)
     }
 
@@ -56,8 +56,8 @@ def centres_of(
 
     Only the measures in `with_iqm` get an interquartile mean.
     """
-    several = [estimates(array, name in with_iqm) for name, array in values.items()]
-    return [dict(zip(values, row, strict=True)) for row in zip(*several, strict=True)]
+    by_name = [estimates(array, name in with_iqm) for name, array in values.items()]
+    return [dict(zip(values, row, strict=True)) for row in zip(*by_name, strict=True)]
 
 
 def columns_of(rows: Sequence[Settings]) -> list[str]:
@@ -78,8 +78,8 @@ def report(
     """
     names = columns_of(settings)
     lines = []
-    for one, centres in zip(settings, centres_of(values), strict=True):
-        cells = [_shown(one.get(name, MISSING)) for name in names]
+    for row, centres in zip(settings, centres_of(values), strict=True):
+        cells = [_shown(row.get(name, MISSING)) for name in names]
         for centre in centres.values():
             ends = f" [{centre.ci_low:.4g}, {centre.ci_high:.4g}]"
             without = f" ({centre.left_out} left out)" if centre.left_out else ""
@@ -107,13 +107,13 @@ def draw(path: Path, settings: Sequence[Settings], values: np.ndarray, words: st
         AntsError: The file (.png) cannot be written.
     """
     names = columns_of(settings)
-    others = [name for name in names[1:] if len({str(one.get(name)) for one in settings}) > 1]
+    others = [name for name in names[1:] if len({str(row.get(name)) for row in settings}) > 1]
     alike = [f"{short(n, names)} {_shown(settings[0][n])}" for n in names[1:] if n not in others]
-    numbers = [(one.mean, one.ci_low, one.ci_high) for one in estimates(values, uses_iqm=False)]
+    means = [estimator[:3] for estimator in estimates(values, uses_iqm=False)]  # with intervals
     lines: dict[str, list[tuple[Any, ...]]] = {}
-    for one, point in zip(settings, numbers, strict=True):
-        label = ", ".join(f"{short(n, names)} {_shown(one[n])}" for n in others if n in one)
-        lines.setdefault(label or words, []).append((one.get(names[0]), *point))
+    for row, mean in zip(settings, means, strict=True):
+        label = ", ".join(f"{short(n, names)} {_shown(row[n])}" for n in others if n in row)
+        lines.setdefault(label or words, []).append((row.get(names[0]), *mean))
     with style.styled():
         figure = style.new_figure(4.5)
         axes = figure.subplots()
@@ -132,7 +132,7 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
     of panels with the same vertical axis, which is not logarithmic if a mean or an end is not
     positive.
     """
-    places = [place for points in lines.values() for place, *_ in points]
+    places = [value for points in lines.values() for value, *_ in points]
     numbers = are_numbers(places)
     ticks = list(dict.fromkeys(map(_shown, places)))
     looks = zip(itertools.cycle(style.COLOURS), itertools.cycle(_MARKERS), strict=False)
@@ -140,7 +140,7 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
     for shift, (label, points), look in zip(aside, lines.items(), looks, strict=False):
         colour, marker = look
         ordered = sorted(points, key=lambda point: point[0]) if numbers else points
-        x = [place if numbers else ticks.index(_shown(place)) + shift for place, *_ in ordered]
+        x = [value if numbers else ticks.index(_shown(value)) + shift for value, *_ in ordered]
         mean, low, high = np.array([point[1:] for point in ordered], float).reshape(-1, 3).T
         (line,) = axes.plot(
             x, mean, marker=marker, markersize=4.5, color=colour, label=style.label(label)
@@ -155,9 +155,9 @@ def draw_lines(axes: Axes, lines: Lines, shared: Sequence[Lines] = ()) -> None:
     elif _far_apart(places):
         style.logarithmic(axes.xaxis, (1,))
         axes.set_xticks(sorted(set(places)))
-    means = [one[1] for points in lines.values() for one in points if np.isfinite(one[1])]
-    drawn = (one for each in (lines, *shared) for points in each.values() for _, *one in points)
-    if numbers and _far_apart(means) and not any(y <= 0 for one in drawn for y in one):
+    means = [point[1] for points in lines.values() for point in points if np.isfinite(point[1])]
+    rows = [row for each in (lines, *shared) for points in each.values() for row in points]
+    if numbers and _far_apart(means) and not any(y <= 0 for _, *ys in rows for y in ys):
         style.logarithmic(axes.yaxis, (1, 2, 5) if max(means) < 1000 * min(means) else (1,))
 
 
@@ -167,13 +167,13 @@ def _far_apart(numbers: Sequence[float]) -> bool:
 
 def are_numbers(places: Sequence[Any]) -> bool:
     """Return whether all values of a setting are numbers, not flags."""
-    return all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in places)
+    return all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in places)
 
 
 def short(name: str, names: Sequence[str]) -> str:
     """Return the last part of a name if it is unique among `names`, else the whole name."""
     last = name.rpartition(".")[2]
-    return last if sum(one.rpartition(".")[2] == last for one in names) == 1 else name
+    return last if sum(other.rpartition(".")[2] == last for other in names) == 1 else name
 
 
 def _shown(value: Any) -> str:

@@ -93,7 +93,8 @@ Block = str | Table
 
 def markdown(blocks: Sequence[Block]) -> str:
     """Return blocks as a Markdown document."""
-    return "\n".join(one.markdown() if isinstance(one, Table) else f"{one}\n" for one in blocks)
+    texts = (item.markdown() if isinstance(item, Table) else f"{item}\n" for item in blocks)
+    return "\n".join(texts)
 
 
 def plain_text(blocks: Sequence[Block], width: int) -> str:

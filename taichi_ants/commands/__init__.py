@@ -13,8 +13,8 @@ from taichi_ants.studies.interruption import stoppable
 COMMANDS = {  # modules of this package with their help
     "colony": "run one colony of any size, or many in parallel",
     "sweep": "run every combination of the settings in a file, and compare them",
-    "merge": "join the shards of a sweep, a comparison or a colony study",
     "status": "show what is done in a folder of results, and how long is left",
+    "tables": "write the tables of the runs that a folder of results has",
     "archive": "pack a finished study, with all that repeats it, into one file",
     "reproduce": "repeat the study in an archive, and compare all of its files",
     "render": "draw an episode, a colony, learning, or a policy",

@@ -1,8 +1,8 @@
 """Put a finished study into one file with everything that repeats it.
 
-FOLDER is a folder of finished results of a sweep, a comparison or a colony study. The archive has
-the results, all files that the study has read, the versions of all packages, a description of the
-model, and checksums. See docs/archives.md.
+FOLDER is a folder of finished results. The archive has the folder, with the runs and all files that
+the study has read, the versions of all packages, and a description of the model. See
+docs/archives.md.
 """
 
 from __future__ import annotations
@@ -28,18 +28,16 @@ def archive(settings: argparse.Namespace) -> None:
     """Write the archive, and print what it contains."""
     from taichi_ants.files import check_writable_file, check_writable_folder
     from taichi_ants.report.odd import odd_of
-    from taichi_ants.studies.reproduction import checked_manifest, write_archive
+    from taichi_ants.studies.archive import finished, write
 
-    folder = settings.folder
-    out = settings.out or Path(f"{folder.resolve()}.zip")
-    manifest = checked_manifest(folder)
+    out = settings.out or Path(f"{settings.folder.resolve()}.zip")
+    manifest = finished(settings.folder)
     if out.exists() and not settings.force:
         raise AntsError(f"{str(out)!r} exists; choose another --out, or give --force.")
-    odd = odd_of(folder, manifest)
     check_writable_folder(out.parent, out)
-    write_archive(check_writable_file(out), folder, manifest, odd)
-    size, number = out.stat().st_size / 1e6, len(manifest["files"]) + 1
-    print(f"{out}: {number} files of results, ODD.md, requirements.txt ({size:.1f} MB)")
+    odd = odd_of(settings.folder, manifest)
+    number = write(check_writable_file(out), settings.folder, manifest, odd)
+    print(f"{out}: {number} files ({out.stat().st_size / 1e6:.1f} MB)")
     print(f"To repeat the study and compare: taichi-ants reproduce {out}")
 
 

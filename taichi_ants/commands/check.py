@@ -34,11 +34,12 @@ def check(settings: argparse.Namespace) -> None:
     """Try everything that the file registers."""
     from taichi_ants import learners, rules
     from taichi_ants.errors import AntsError
+    from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import observations
 
     registries = rules, observations, learners
     before = [set(registry.names()) for registry in registries]
-    command_line.load_plugin(settings.file)
+    load_plugin(settings.file)
     new = [
         [name for name in registry.names() if name not in known]
         for registry, known in zip(registries, before, strict=True)

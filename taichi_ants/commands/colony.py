@@ -15,6 +15,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import whole_number
 from taichi_ants.studies.interruption import held
+from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Task, queueing
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     parser = command_line.Parser(__doc__)
     kinds = parser.add_subparsers(metavar="live", required=True)
     about = "run one colony, or many in parallel"
-    one = kinds.add_parser("live", help=about, description=f"{about.capitalize()}.")
-    _add_live(one)
+    live = kinds.add_parser("live", help=about, description=f"{about.capitalize()}.")
+    _add_live(live)
     settings, given = parser.parse_given(arguments)
     _check_live(settings, given, parser.error)
     return settings
@@ -113,7 +114,7 @@ def live(settings: argparse.Namespace) -> None:
     from taichi_ants.studies.one_colony import check_places, summary
     from taichi_ants.studies.one_colony import live as run
 
-    command_line.load_plugin(settings.plugin)
+    load_plugin(settings.plugin)
     files = settings.save, settings.render, settings.figure
     check_places(*files)
     if settings.resume:

@@ -22,11 +22,11 @@ from taichi_ants.studies.command_line import (
     add_settings,
     given_settings,
     given_world,
-    load_plugin,
     progress_bar,
     run_command,
     whole_number,
 )
+from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Task
 
 if TYPE_CHECKING:
@@ -107,11 +107,11 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     kinds = parser.add_subparsers(metavar="|".join(KINDS), required=True)
     for kind, (shows, example) in KINDS.items():
         example = f"Example: %(prog)s {example}"
-        one = kinds.add_parser(
+        of_kind = kinds.add_parser(
             kind, help=shows, description=f"{shows.capitalize()}.", epilog=example
         )
         flags = OPTIONS.keys() - (_MANY if kind == "episode" else _LONE)
-        add_options(one, flags, kind=kind, **_DEFAULTS[kind])
+        add_options(of_kind, flags, kind=kind, **_DEFAULTS[kind])
     settings = parse(parser, arguments)
     for flag in ("follow", "title") if not settings.overlay else ():
         if getattr(settings, flag, None) is not None:

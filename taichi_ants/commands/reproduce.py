@@ -1,20 +1,16 @@
-"""Repeat the study in an archive, and compare all files of its results byte for byte.
+"""Repeat the study in an archive, and compare all of its tables and figures byte for byte.
 
-FILE is an archive that `taichi-ants archive` wrote. The command checks its checksums, computes the
-study again in a new folder, and prints a line for each file. It exits with status 1 if a file
-differs. See docs/archives.md.
+FILE is an archive that `taichi-ants archive` wrote. The command computes the study again in a new
+folder, and prints a line for each file. It exits with status 1 if a file differs. See
+docs/archives.md.
 """
 
 from __future__ import annotations
 
 import argparse
-import io
 import sys
-from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Any
 
-from taichi_ants.commands.merge import started
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 
@@ -26,60 +22,53 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("file", type=Path, metavar="FILE", help="archive (.zip)")
     place = "write the new results here (default: results/reproduced-NAME)"
     add("--out", type=Path, metavar="FOLDER", help=place)
-    trust = "run the plugins in the archive, which are Python code"
-    add("--trust-plugins", action="store_true", help=trust)
-    add(
-        "--threads", type=command_line.whole_number(1, 1024), metavar="N", help=command_line.THREADS
-    )
+    trust = "run the Python code in the archive: plugins, and the module of the study"
+    add("--trust-code", action="store_true", help=trust)
+    number = command_line.whole_number(1, 1024)
+    add("--threads", type=number, metavar="N", help=command_line.THREADS)
+    command_line.add_machines(parser)
     return parser.parse_args(arguments)
 
 
 def reproduce(settings: argparse.Namespace) -> None:
     """Repeat the study, print the comparison, and exit with status 1 if a file differs."""
-    from taichi_ants.files import bundles
-    from taichi_ants.files.results import MANIFEST
-    from taichi_ants.studies import reproduction
+    from taichi_ants.studies import archive, folder
+    from taichi_ants.studies.command import compute, opened
 
     out = settings.out or Path("results", f"reproduced-{settings.file.stem}")
-    if (out / MANIFEST).exists():
+    if folder.manifest_in(out):
         raise AntsError(f"{str(out)!r} has finished results; choose another --out.")
-    with bundles.reading(settings.file) as bundle:
-        manifest = reproduction.manifest_of(bundle)
-        if plugins := reproduction.plugins_of(manifest):
-            words = reproduction.plugins_in_words(bundle, plugins)
-            if not settings.trust_plugins:
+    with archive.unpacked(settings.file) as place:
+        asked, manifest = folder.asked_in(place) or {}, archive.finished(place)
+        if code := sorted(place.glob(f"{folder.INPUTS}/*/**/*.py")):
+            names = [f"{archive.RESULTS}/{path.relative_to(place).as_posix()}" for path in code]
+            words = ", ".join(
+                f"{name} (SHA-256 {folder.checksum_of(path)[:16]}...)"
+                for name, path in zip(names, code, strict=True)
+            )
+            if not settings.trust_code:
                 raise AntsError(
                     f"the study runs code of the archive, {words}; read it, for example with "
-                    f"`unzip -p`, and give --trust-plugins to run it."
+                    "`unzip -p`, and give --trust-code to run it."
                 )
             command_line.notice(f"Running code of the archive: {words}.")
-        if versions := reproduction.other_versions(manifest):
+        if versions := archive.other_versions(manifest):
             command_line.notice(f"These versions differ from those of the archive: {versions}.")
-        of_run = {"shard": None, "workers": None, "ray": None, "force": False, "text": None}
-        with reproduction.unpacked(bundle, manifest) as options, redirect_stdout(io.StringIO()):
-            asked: dict[str, Any] = {**options, **of_run, "threads": settings.threads, "out": out}
-            try:
-                started(manifest["asked"]["command"], asked)
-            except (TypeError, AttributeError, LookupError) as error:  # of options in the manifest
-                raise AntsError(
-                    f"the study in {str(settings.file)!r} cannot run here "
-                    f"({type(error).__name__}: {error}); install the versions in its "
-                    "requirements.txt, or get another copy of it."
-                ) from error
-        files = list(reproduction.compare(bundle, manifest, out))
-    _print(files)
-
-
-def _print(files: list[Any]) -> None:
-    """Print a line for each file and the verdict; exit with status 1 if a file differs."""
-    for name, difference, note in files:
-        words = f"({difference})" if difference else note and f"({note})"
+        with opened(place) as found:
+            folder.ask(out, asked, found.inputs, force=False)
+            settings.arch = asked["arch"]
+            how = manifest["figures"], manifest["parquet"]
+            if not compute(settings, found, out, *how):
+                print(f"Shard {settings.shard} is finished in {out}/.")
+                return
+        compared = list(archive.compare(place, out))
+    for name, difference, note in compared:
+        words = f"({difference or note})" if difference or note else ""
         print(f"{'DIFFERENT' if difference else 'equal':9}  {name} {words}".rstrip())
-    different = sum(bool(one.difference) for one in files)
-    if different:
-        print(f"{different} of {len(files)} files differ: the study is not reproduced.")
+    if different := sum(bool(difference) for _, difference, _ in compared):
+        print(f"{different} of {len(compared)} files differ: the study is not reproduced.")
         sys.exit(1)
-    print(f"All {len(files)} files are equal: the study is reproduced.")
+    print(f"All {len(compared)} files are equal: the study is reproduced.")
 
 
 def main(arguments: list[str] | None = None) -> None:

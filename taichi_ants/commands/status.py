@@ -22,12 +22,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 def status(settings: argparse.Namespace) -> None:
     """Print the state of each folder."""
-    from taichi_ants.studies.state import state
+    from taichi_ants.studies.folder import status as status_of
 
     wrong: list[AntsError] = []
     for folder in settings.folders:
         try:
-            lines = list(state(folder))
+            lines = list(status_of(folder))
         except AntsError as error:
             wrong.append(error)
             continue

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from taichi_ants.studies import command_line
 
@@ -26,42 +25,20 @@ def parse_arguments(
     command_line.add_machines(parser)
     name = f"sweep-{file.stem}" if file else "sweep-NAME for the file NAME.toml"
     command_line.add_results(parser, name, quick=False)
-    also = "write the tables as Parquet, too, while the sweep runs and at the end (extra parquet)"
+    also = "write the tables as Parquet, too (extra parquet)"
     parser.add_argument("--parquet", action="store_true", help=also)
     settings = parser.parse_args(arguments)
-    settings.command, settings.text = "sweep", None
     return command_line.with_folder(settings, f"sweep-{settings.file.stem}")
 
 
 def sweep(settings: argparse.Namespace) -> None:
     """Run the sweep, or show its results if it is finished."""
-    from taichi_ants.files import read_text
-    from taichi_ants.files.inputs import recorded
-    from taichi_ants.files.parquet import check_installed
-    from taichi_ants.studies.machines import chosen
-    from taichi_ants.studies.result_folder import work_or_show
-    from taichi_ants.studies.sweep import read_sweep
+    from taichi_ants.files.tables import check_parquet
+    from taichi_ants.studies.command import run_study
 
-    with recorded() as inputs:
-        command_line.load_plugin(settings.plugin)
-        settings.text = settings.text or read_text(settings.file)
-        with command_line.progress_bar("settings") as progress:
-            asked = read_sweep(settings.file, settings.text, progress)
     if settings.parquet:
-        check_installed()
-
-    def work(blocks: Path, ready: Path) -> None:
-        bar = command_line.progress_bar
-        with chosen(settings) as how, bar("sweep", how.get("executor")) as progress:
-            values = asked.measured(blocks, progress, settings.parquet, **how)
-        if settings.shard:
-            return
-        asked.write(values, ready, draws=not settings.no_figures)
-        asked.write_series(blocks, ready)
-
-    more: dict[str, Any] = {"study": asked.study, "take": asked.take, "inputs": inputs}
-    more |= {"as_parquet": asked.write_parquet}
-    work_or_show(settings, asked.facts(), work, **more)
+        check_parquet()
+    run_study(settings, "taichi_ants.studies.sweep")
 
 
 def main(

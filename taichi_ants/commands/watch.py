@@ -25,12 +25,12 @@ from taichi_ants.studies.command_line import (
     PLUGIN,
     THREADS,
     Parser,
-    load_plugin,
     progress_bar,
     run_command,
     whole_number,
 )
 from taichi_ants.studies.interruption import stop_if_noted
+from taichi_ants.studies.plugins import load_plugin
 from taichi_ants.task import Life, queueing
 
 if TYPE_CHECKING:
@@ -60,6 +60,10 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
+    row = "folder of results, of which --row plays a run, instead of the live page"
+    add("folder", type=Path, nargs="?", metavar="FOLDER", help=row)
+    row = "row of the table of runs to play, from 1: the first episode of its evaluation"
+    add("--row", type=whole_number(1), metavar="N", help=row)
     files: dict[str, Any] = {"action": "extend", "nargs": "+", "default": [], "metavar": "FILE"}
     offered = "policy files (.npz) to offer on the page, in addition to experiments/policies/"
     add("--policy", **files, help=offered)
@@ -76,7 +80,33 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--duration", type=whole_number(1), metavar="N", help="end after N seconds")
     add("--plugin", metavar="FILE", help=PLUGIN)
     add("--threads", type=whole_number(1, 1024), metavar="N", help=THREADS)
-    return parser.parse_args(arguments)
+    settings = parser.parse_args(arguments)
+    if (settings.folder is None) != (settings.row is None):
+        parser.error("FOLDER and --row belong together, so give both or neither")
+    return settings
+
+
+def play(settings: argparse.Namespace) -> None:
+    """Compute a run of a study again, and write a page that plays it."""
+    from taichi_ants.studies.command import opened
+    from taichi_ants.studies.replay import replay, run_of
+    from taichi_ants.studies.store import Store
+    from taichi_ants.viewer import save_page
+
+    folder, number = settings.folder, settings.row
+    with opened(folder) as found:
+        order = getattr(found.own, "order", [*range(len(found.study.points))])
+        point, seed = run_of(found.study, order, number)
+        where = {"threads": settings.threads, "arch": found.facts["arch"]}
+        title = f"Row {number} of {folder.name}"
+        recording, values = replay(found.study, Store(folder), point, seed, title, **where)
+    path = folder / f"row-{number}.html"
+    save_page(path, recording)
+    print(f"seed {found.study.seeds[seed]}")
+    for name, array in values.items():
+        if array[0, 0].ndim == 0:
+            print(f"{name} {array[0, 0]:g}")
+    print(f"The new numbers are those of the row. Open {path} to see its first episode.")
 
 
 def watch(settings: argparse.Namespace) -> None:
@@ -140,4 +170,5 @@ def _opened(url: str) -> Iterator[None]:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line."""
-    run_command(lambda: watch(parse_arguments(arguments)))
+    settings = parse_arguments(arguments)
+    run_command(lambda: watch(settings) if settings.folder is None else play(settings))

@@ -66,9 +66,9 @@ class Launch:
         memory = pack._ArgPack__argpack
         finalize(pack, _delete, ref(taichi), memory).atexit = False
         with runtime.quiet(), _naming_plugins():
-            one = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
-            compiled = program.compile_kernel(program.config(), program.get_device_caps(), one)
-        self._context = one.make_launch_context()
+            lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
+            compiled = program.compile_kernel(program.config(), program.get_device_caps(), lowered)
+        self._context = lowered.make_launch_context()
         self._context.set_arg_argpack((0,), memory)
         on_cpu = program.config().arch in (ti.x64, ti.arm64)
         self._compiled = compiled if on_cpu else None  # a GPU copies arrays at each launch
@@ -124,8 +124,8 @@ class _Pack(ArgPack):
     """
 
     def __init__(self, kind: Any, values: dict[str, Any]) -> None:
-        is_array = (isinstance(one, ndarray_type.NdarrayType) for one in kind.members.values())
-        self.places = list(accumulate((not one for one in is_array), initial=0))
+        is_number = (not isinstance(t, ndarray_type.NdarrayType) for t in kind.members.values())
+        self.places = list(accumulate(is_number, initial=0))
         super().__init__(kind.members, kind.dtype, values)
 
     def _calc_element_true_index(self, old_index: int) -> int:

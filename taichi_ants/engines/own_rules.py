@@ -67,12 +67,12 @@ _NAMES = {
 @cache
 def plain_function(rule: Rule) -> Callable[..., Any]:
     """Return a `ti.func` of the arguments of a rule, of any types, that returns an f64."""
-    place = f"<rule {rule.name} {id(rule)}>"
+    file = f"<rule {rule.name} {id(rule)}>"
     # Taichi reads the source of functions.
     lines = rule.source.splitlines(keepends=True)
-    linecache.cache[place] = (len(rule.source), None, lines, place)
+    linecache.cache[file] = (len(rule.source), None, lines, file)
     names: dict[str, Any] = dict(_NAMES)
-    exec(compile(rule.source, place, "exec"), names)
+    exec(compile(rule.source, file, "exec"), names)
     return ti.func(names["rule"])
 
 
@@ -118,20 +118,18 @@ def difference(rule: Rule, n: int = TRIES) -> str:
         np.float64,
     ).reshape(n, -1)
     try:
-        found = _results(rule, rows, lengths)
+        results = _results(rule, rows, lengths)
     except Exception as error:
         return last_line(error)
-    for (inputs, parameters), result in zip(drawn, found.tolist(), strict=True):
+    for (inputs, parameters), result in zip(drawn, results.tolist(), strict=True):
         try:
             reference = float(rule.reference(**inputs, **parameters))
         except Exception as error:
             said = f"{type(error).__name__}: {error}"
             return f"its Python function fails ({said}) for {values_shown(inputs, parameters)}"
         if result != reference:
-            given = values_shown(inputs, parameters)
-            return (
-                f"its kernel returns {result!r}, but its Python function {reference!r}, for {given}"
-            )
+            said = f"its kernel returns {result!r}, but its Python function {reference!r}"
+            return f"{said}, for {values_shown(inputs, parameters)}"
     return ""
 
 

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants import arguments
+from taichi_ants.arguments import checked_task
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Rollout, TablePolicy
@@ -48,14 +48,14 @@ class ColonyWorlds(Ants):
         self,
         n_worlds: int,
         task: Rules | None,
-        given: Arguments,
+        arguments: Arguments,
         ants: int,
         start: str,
         capacity: int | None = None,
         supports: Collection[str] = SUPPORTS,
     ) -> None:
-        task = arguments.checked_task(task_of(task), "this environment", supports)
-        super().__init__(n_worlds, task, given, supports, METADATA["render_modes"])
+        task = checked_task(task_of(task), "this environment", supports)
+        super().__init__(n_worlds, task, arguments, supports, METADATA["render_modes"])
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
             replace(task, evaporation_in_evaluation=self.evaporates),
@@ -84,8 +84,8 @@ class ColonyWorlds(Ants):
         new = np.array([seed is not None for seed in seeds]) & which
         if new.any():
             # As for one ant, seeds count modulo 2**64.
-            given = [seed % 2**64 for seed, one in zip(seeds, new, strict=True) if one]  # type: ignore[operator]
-            self.colony.reset_worlds(new, given)
+            new_seeds = [seed % 2**64 for seed, is_new in zip(seeds, new, strict=True) if is_new]  # type: ignore[operator]
+            self.colony.reset_worlds(new, new_seeds)
         if (which & ~new).any():
             self.colony.reset_worlds(which & ~new)
         self.events = np.where(which[:, None], Event.NONE, self.events)
@@ -271,12 +271,12 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
             raise AntsError(
                 f"num_envs is {num_envs}; it counts ants, so it must be a multiple of ants, {ants}."
             )
-        given = Arguments(
+        arguments = Arguments(
             world, max_steps, observation_format, evaporation, render_mode, max_episode_steps
         )
         # The number of ants is fixed.
         supports = SUPPORTS - {"life.births", "life.lifespan"}
-        worlds = ColonyWorlds(n // ants, task, given, ants, start, supports=supports)
+        worlds = ColonyWorlds(n // ants, task, arguments, ants, start, supports=supports)
         super().__init__(worlds, n // ants, n, autoreset_mode, render_mode)
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
         if worlds.task.delivery == "terminates" and not same_step:

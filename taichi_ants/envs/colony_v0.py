@@ -72,8 +72,8 @@ class HexColonyParallelEnv(ParallelEnv):
         evaporation: bool | None = None,
         render_mode: str | None = None,
     ) -> None:
-        given = Arguments(world, max_steps, observation_format, evaporation, render_mode)
-        self._worlds = ColonyWorlds(1, task, given, ants, start, capacity)
+        arguments = Arguments(world, max_steps, observation_format, evaporation, render_mode)
+        self._worlds = ColonyWorlds(1, task, arguments, ants, start, capacity)
         self.render_mode = render_mode
         colony = self._worlds.colony
         foods, life = len(colony.worlds[0].foods), colony.task.life
@@ -152,18 +152,18 @@ class HexColonyParallelEnv(ParallelEnv):
             raise AssertionError(
                 f"the actions are {shown(actions)}; give a dict with an action for each of agents."
             )
-        given = np.zeros((1, worlds.colony.capacity), np.int64)
-        given[0, slots] = [self._action(actions, name) for name in acting]
-        worlds.step(given)
+        chosen = np.zeros((1, worlds.colony.capacity), np.int64)
+        chosen[0, slots] = [self._action(actions, name) for name in acting]
+        worlds.step(chosen)
         living, ended = worlds.colony.living[0], bool(worlds.over()[0])
         born = np.setdiff1d(np.flatnonzero(living & (not ended)), slots).tolist()
-        told, seen = acting + self._names(born), slots + born
-        observations, infos = self._told(told, seen)
-        rewards = dict(zip(told, worlds.rewards[0, seen].tolist(), strict=True))
-        terminated = dict(zip(told, (~living[seen]).tolist(), strict=True))
-        truncated = dict.fromkeys(told, ended)
+        names, seen = acting + self._names(born), slots + born
+        observations, infos = self._told(names, seen)
+        rewards = dict(zip(names, worlds.rewards[0, seen].tolist(), strict=True))
+        terminated = dict(zip(names, (~living[seen]).tolist(), strict=True))
+        truncated = dict.fromkeys(names, ended)
         stay = [] if ended else [k for k, slot in enumerate(seen) if living[slot]]
-        self.agents, self._slots = [told[k] for k in stay], [seen[k] for k in stay]
+        self.agents, self._slots = [names[k] for k in stay], [seen[k] for k in stay]
         return observations, rewards, terminated, truncated, infos
 
     def _action(self, actions: dict[str, int], name: str) -> int:

@@ -11,9 +11,8 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants import arguments
+from taichi_ants.arguments import checked_task
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Rollout, TablePolicy
@@ -31,6 +30,7 @@ from taichi_ants.envs.vector import (
 )
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
 from taichi_ants.features import CHOICE, LONE
+from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
 from taichi_ants.worlds import text_map
 
@@ -58,26 +58,28 @@ _PACKED_MASKS = np.pad(ACTION_MASKS, ((0, 0), (0, 8 - N_ACTIONS))).view(np.int64
 class LoneAnts(Ants):
     """Many ants, each alone in its world; a single launch steps all of them."""
 
-    def __init__(self, n: int, task: Rules | None, delivery: str | None, given: Arguments) -> None:
-        task = arguments.checked_task(
+    def __init__(
+        self, n: int, task: Rules | None, delivery: str | None, arguments: Arguments
+    ) -> None:
+        task = checked_task(
             task_of(task), "an environment of one ant", SUPPORTS, "leave it out, or use a Colony"
         )
-        super().__init__(n, task, given, SUPPORTS, METADATA["render_modes"])
+        super().__init__(n, task, arguments, SUPPORTS, METADATA["render_modes"])
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size
         if n > most:
             raise AntsError(f"num_envs is {n}; it must be at most {most} for a world of this size.")
-        self._text = given.render_mode == "ansi"
+        self._text = arguments.render_mode == "ansi"
         self.batched = BatchedEnvironments(
             self.worlds, task, n, self.max_steps, delivery, self.evaporates
         )
 
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
         """Begin an episode of the ants `which`, bool (n,), with their seeds if they have one."""
-        given = {i: one for i, one in enumerate(seeds) if which[i] and one is not None}
-        if given:
-            self.batched.seed(list(given.values()), np.array(list(given)))
+        seed_of = {i: seed for i, seed in enumerate(seeds) if which[i] and seed is not None}
+        if seed_of:
+            self.batched.seed(list(seed_of.values()), np.array(list(seed_of)))
         self.batched.begin(which)
 
     def advance(
@@ -86,8 +88,8 @@ class LoneAnts(Ants):
         begins = waiting if mode is AutoresetMode.NEXT_STEP else 0
         self.batched.step(actions, begins, same_step=mode is AutoresetMode.SAME_STEP)
         arrays = self.batched.arrays
-        ends = (arrays[name].astype(bool) for name in ("terminations", "truncations"))
-        return arrays["rewards_of"].copy(), *ends
+        results = arrays["results"]
+        return arrays["rewards_of"].copy(), results & TERMINATED != 0, results & TRUNCATED != 0
 
     def play(
         self,
@@ -101,9 +103,9 @@ class LoneAnts(Ants):
         rows = {
             "taken": into.actions,
             "seen": into.observations[1:],
-            "paid": into.rewards,
-            "results": into.events,
-            "finals": finals,
+            "rewards_of": into.rewards,
+            "result_rows": into.events,
+            "final_states": finals,
         }
         self.batched.rollout(rows, self.shown.table, waiting, _AFTER_END[mode], policy)
         np.not_equal(into.events & TERMINATED, 0, out=into.terminated)
@@ -111,8 +113,7 @@ class LoneAnts(Ants):
         np.bitwise_and(into.events, TRUNCATED - 1, out=into.events)
 
     def over(self) -> np.ndarray:
-        arrays = self.batched.arrays
-        return (arrays["terminations"] | arrays["truncations"]) != 0
+        return self.batched.arrays["results"] >= TRUNCATED
 
     def states(self) -> np.ndarray:
         return self.batched.arrays["states"]
@@ -123,7 +124,7 @@ class LoneAnts(Ants):
         return {
             "state": arrays[f"{when}states"].astype(np.int64),
             "action_mask": packed.view(np.int8).reshape(-1, 8)[:, :N_ACTIONS],
-            "event": arrays["events"].astype(np.int64),
+            "event": (arrays["results"] & (TRUNCATED - 1)).astype(np.int64),
             "reason": arrays["reasons"].astype(np.int64),
             "deliveries": arrays[f"{when}deliveries"].astype(np.int64),
         }
@@ -148,9 +149,9 @@ class LoneAnts(Ants):
 
 def _text_of(now: Snapshot) -> str:
     """Return a text map, see `worlds.text_map`; the heading of the ant marks its cell."""
-    where = [(now.grid.exists & (now.ground == kind), mark) for kind, mark in _GROUNDS.items()]
-    where.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
-    marks = [(now.grid.cells(np.flatnonzero(cells)), mark) for cells, mark in where]
+    marked = [(now.grid.exists & (now.ground == kind), mark) for kind, mark in _GROUNDS.items()]
+    marked.append(((now.trail > 0) & (now.ground == EMPTY), text_map.TRAIL))
+    marks = [(now.grid.cells(np.flatnonzero(cells)), mark) for cells, mark in marked]
     on_trail = now.trail[now.ant_cells[0]] > 0
     letters = text_map.ANTS_ON_TRAIL if on_trail else text_map.ANTS
     marks.append((now.grid.cells(now.ant_cells), letters[now.ant_headings[0]]))
@@ -212,8 +213,8 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
         observation_format: ObservationFormat = "cells",
         render_mode: str | None = None,
     ) -> None:
-        given = Arguments(world, max_steps, observation_format, evaporation, render_mode)
-        self._ants = LoneAnts(1, task, delivery, given)
+        arguments = Arguments(world, max_steps, observation_format, evaporation, render_mode)
+        self._ants = LoneAnts(1, task, delivery, arguments)
         self._arrays, self.render_mode = self._ants.batched.arrays, render_mode
         self.observation_space, self.action_space = self._ants.shown.space, Discrete(N_ACTIONS)
         self._begun = False
@@ -251,21 +252,20 @@ class HexForageEnv(StepLimit, gymnasium.Env[Any, Any]):
             raise InvalidAction(f"the action is {shown(action)}; it must be 0, 1, 2, 3 or 4.")
         self._ants.batched.step(action)
         arrays = self._arrays
-        terminated, truncated = bool(arrays["terminations"][0]), bool(arrays["truncations"][0])
+        result, reward = int(arrays["results"][0]), float(arrays["rewards_of"][0])
         observation, info = self._seen()
-        return observation, float(arrays["rewards_of"][0]), terminated, truncated, info
+        return observation, reward, result & TERMINATED != 0, result & TRUNCATED != 0, info
 
     @property
     def _over(self) -> bool:
-        arrays = self._arrays
-        return not self._begun or bool(arrays["terminations"][0] or arrays["truncations"][0])
+        return not self._begun or bool(self._arrays["results"][0] >= TRUNCATED)
 
     def _seen(self) -> tuple[Any, dict[str, Any]]:
         arrays = self._arrays
         return self._ants.shown.show(arrays["states"])[0], {
             "state": np.int64(arrays["states"][0]),
             "action_mask": ACTION_MASKS[arrays["paper_states"][0]].copy(),
-            "event": np.int64(arrays["events"][0]),
+            "event": np.int64(arrays["results"][0] & (TRUNCATED - 1)),
             "reason": np.int64(arrays["reasons"][0]),
             "deliveries": np.int64(arrays["deliveries"][0]),
         }
@@ -314,8 +314,8 @@ class HexForageVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         max_episode_steps: int | None = None,
     ) -> None:
         n = checked_whole("num_envs", num_envs)
-        given = Arguments(
+        arguments = Arguments(
             world, max_steps, observation_format, evaporation, render_mode, max_episode_steps
         )
-        ants = LoneAnts(n, task, delivery, given)
+        ants = LoneAnts(n, task, delivery, arguments)
         super().__init__(ants, n, n, autoreset_mode, render_mode)

@@ -120,19 +120,19 @@ _COUNTS = np.array([mask.bit_count() for mask in range(_ALL_ACTIONS + 1)], np.ui
 def checked_actions(actions: Any, shape: tuple[int, ...]) -> np.ndarray:
     """Return actions as an array of integers of a shape; InvalidAction for others."""
     try:
-        given = np.asarray(actions)
+        chosen = np.asarray(actions)
     except ValueError:  # lists of several lengths
-        given = np.empty(0)
-    if given.shape != shape or given.dtype.kind not in "iu":
+        chosen = np.empty(0)
+    if chosen.shape != shape or chosen.dtype.kind not in "iu":
         raise InvalidAction(
             f"the actions are {shown(actions)}; they must be an array of an integer type and of "
             f"shape {shape}."
         )
     # A negative number is a large one without its sign.
-    if given.view(given.dtype.str.replace("i", "u")).max() >= N_ACTIONS:
-        wrong = given[(given < 0) | (given >= N_ACTIONS)][0]
+    if chosen.view(chosen.dtype.str.replace("i", "u")).max() >= N_ACTIONS:
+        wrong = chosen[(chosen < 0) | (chosen >= N_ACTIONS)][0]
         raise InvalidAction(f"an action is {wrong}; it must be 0, 1, 2, 3 or 4.")
-    return given
+    return chosen
 
 
 def checked_plan(
@@ -147,23 +147,23 @@ def checked_plan(
         table = frozen_policy(policy, task.observation)
     else:
         try:
-            given = np.asarray(getattr(policy, "q_values", policy))
+            plan = np.asarray(getattr(policy, "q_values", policy))
         except ValueError:  # lists of several lengths
-            given = np.empty(0)
-        if given.dtype.kind in "iu":
-            if given.ndim != 2 or not len(given):
+            plan = np.empty(0)
+        if plan.dtype.kind in "iu":
+            if plan.ndim != 2 or not len(plan):
                 raise InvalidAction(
                     f"the actions are {shown(policy)}; they must be an array of shape (steps, {n}) "
                     "with at least one step."
                 )
-            if steps not in (None, len(given)):
+            if steps not in (None, len(plan)):
                 raise AntsError(
-                    f"steps is {shown(steps)}, but there are actions for {len(given)} steps; leave "
+                    f"steps is {shown(steps)}, but there are actions for {len(plan)} steps; leave "
                     "steps out."
                 )
-            actions = checked_actions(given, (len(given), n))
-            return len(given), np.ascontiguousarray(actions, np.int64), None
-        if given.dtype.kind != "f" or given.shape[-2:] != (task.n_states, N_ACTIONS):
+            actions = checked_actions(plan, (len(plan), n))
+            return len(plan), np.ascontiguousarray(actions, np.int64), None
+        if plan.dtype.kind != "f" or plan.shape[-2:] != (task.n_states, N_ACTIONS):
             raise AntsError(
                 f"policy is {shown(policy)}; give actions, integers of shape (steps, {n}), or a "
                 f"policy: action values of shape ({task.n_states}, {N_ACTIONS}), a name, or the "

@@ -16,7 +16,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from taichi_ants import arguments
+from taichi_ants.arguments import check_ranges, checked_max_steps, checked_share, checked_world
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.envs.rollout import Rollout, TablePolicy, checked_actions, checked_plan
 from taichi_ants.errors import (
@@ -81,21 +81,21 @@ class Ants(ABC):
         self,
         n_worlds: int,
         task: Task,
-        given: Arguments,
+        arguments: Arguments,
         supports: Collection[str],
         render_modes: Sequence[str],
     ) -> None:
-        self.task, self.worlds = task, _worlds_of(given.world, n_worlds, supports)
+        self.task, self.worlds = task, _worlds_of(arguments.world, n_worlds, supports)
         self.evaporates = task.evaporation_in_training
-        if given.evaporation is not None:
-            self.evaporates = checked_flag("evaporation", given.evaporation)
-        if given.render_mode is not None:
-            check_one_of("render_mode", given.render_mode, render_modes)
-        self.max_steps = arguments.checked_max_steps(given.max_steps, task)
-        if given.max_episode_steps is not None:
-            limit = checked_whole("max_episode_steps", given.max_episode_steps)
+        if arguments.evaporation is not None:
+            self.evaporates = checked_flag("evaporation", arguments.evaporation)
+        if arguments.render_mode is not None:
+            check_one_of("render_mode", arguments.render_mode, render_modes)
+        self.max_steps = checked_max_steps(arguments.max_steps, task)
+        if arguments.max_episode_steps is not None:
+            limit = checked_whole("max_episode_steps", arguments.max_episode_steps)
             self.max_steps = min(self.max_steps, limit)
-        self.shown = Shown(task.sees, given.observation_format)
+        self.shown = Shown(task.sees, arguments.observation_format)
         self._scene: Scene | None = None
 
     @abstractmethod
@@ -152,41 +152,41 @@ class Ants(ABC):
 
 def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World, ...]:
     single = isinstance(world, (str, os.PathLike, Mapping, World))
-    given = [world] if single else world
-    if not isinstance(given, (list, tuple)) or not given:
+    entries = [world] if single else world
+    if not isinstance(entries, (list, tuple)) or not entries:
         raise AntsError(
             f"world is {shown(world)}; give the name of a world, a World, or a list of them."
         )
-    if len(given) > most:
-        raise AntsError(f"world lists {len(given)} worlds; it must list at most {most}.")
-    several = tuple(
-        arguments.checked_world(_world_of(one), what="the environment", supports=supports)
-        for one in given
+    if len(entries) > most:
+        raise AntsError(f"world lists {len(entries)} worlds; it must list at most {most}.")
+    checked = tuple(
+        checked_world(_world_of(entry), what="the environment", supports=supports)
+        for entry in entries
     )
-    arguments.check_ranges(several)
-    return several
+    check_ranges(checked)
+    return checked
 
 
-def _world_of(given: Any) -> Any:
-    if isinstance(given, Mapping):
+def _world_of(world: Any) -> Any:
+    if isinstance(world, Mapping):
         try:
-            return World.from_dict(given)
+            return World.from_dict(world)
         except (KeyError, TypeError) as error:
             raise AntsError(
-                f"the world is {shown(given)}; give a World or its `as_dict()`."
+                f"the world is {shown(world)}; give a World or its `as_dict()`."
             ) from error
-    text = isinstance(given, str) and "\n" in given
-    return given if isinstance(given, World) else from_text(given) if text else build(given)
+    text = isinstance(world, str) and "\n" in world
+    return world if isinstance(world, World) else from_text(world) if text else build(world)
 
 
-def task_of(given: Rules | None) -> Task:
+def task_of(task: Rules | None) -> Task:
     """Return the task that is given as one, as its `as_dict()` or by its name, or the paper's."""
-    if isinstance(given, Mapping):
-        return Task.from_dict(given)
-    if isinstance(given, str):
-        check_one_of("task", given, tuple(Task.named()))
-        return Task.named()[given]
-    return Task() if given is None else given
+    if isinstance(task, Mapping):
+        return Task.from_dict(task)
+    if isinstance(task, str):
+        check_one_of("task", task, tuple(Task.named()))
+        return Task.named()[task]
+    return Task() if task is None else task
 
 
 def check_options(options: Any, *allowed: str) -> dict[str, Any]:
@@ -217,11 +217,11 @@ class StepLimit:
         return self._spec
 
     @spec.setter
-    def spec(self, given: EnvSpec | None) -> None:
-        if given is not None:
-            kwargs = {name: _as_json(value) for name, value in given.kwargs.items()}
-            given = replace(given, max_episode_steps=self.max_steps, kwargs=kwargs)
-        self._spec = given
+    def spec(self, spec: EnvSpec | None) -> None:
+        if spec is not None:
+            kwargs = {name: _as_json(value) for name, value in spec.kwargs.items()}
+            spec = replace(spec, max_episode_steps=self.max_steps, kwargs=kwargs)
+        self._spec = spec
 
     @property
     def max_steps(self) -> int:
@@ -232,7 +232,7 @@ class StepLimit:
 def _as_json(value: Any) -> Any:
     """Return an argument as JSON has it, in a form that the environments accept."""
     if isinstance(value, (list, tuple)):
-        return [_as_json(one) for one in value]
+        return [_as_json(entry) for entry in value]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if isinstance(value, (World, Task)):
@@ -257,9 +257,9 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         render_mode: str | None,
     ) -> None:
         self._ants, self._n_worlds, self.num_envs = ants, n_worlds, num_envs
-        given = getattr(autoreset_mode, "value", autoreset_mode)
-        check_one_of("autoreset_mode", given, [one.value for one in AutoresetMode])
-        self.autoreset_mode, self.render_mode = AutoresetMode(given), render_mode
+        mode = getattr(autoreset_mode, "value", autoreset_mode)
+        check_one_of("autoreset_mode", mode, [allowed.value for allowed in AutoresetMode])
+        self.autoreset_mode, self.render_mode = AutoresetMode(mode), render_mode
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.single_observation_space = ants.shown.space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -289,13 +289,13 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             ResetNeeded: The first reset has a mask that leaves out worlds.
         """
         mask = self._mask(options)
-        which = mask.reshape(self._n_worlds, -1)[:, 0]
+        resets = mask.reshape(self._n_worlds, -1)[:, 0]
         super().reset(seed=int(seed) if isinstance(seed, (int, np.integer)) else None)
         seeds = seeds_of(seed, self._n_worlds)
         if not self._begun:
             drawn = self.np_random.integers(2**63, size=self._n_worlds).tolist()
             seeds = [a if b is None else b for a, b in zip(drawn, seeds, strict=True)]
-        self._ants.begin(which, seeds)
+        self._ants.begin(resets, seeds)
         self._begun = True
         facts = self._ants.facts()
         return self._ants.shown.show(facts["state"]), self._infos(facts, mask)
@@ -330,8 +330,8 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
             InvalidAction: The number of actions is wrong, or an action does not exist.
         """
         waiting, ants, mode = self._waiting("step"), self._ants, self.autoreset_mode
-        given = checked_actions(actions, (self.num_envs,))
-        rewards, terminated, truncated = ants.advance(given, mode, waiting)
+        chosen = checked_actions(actions, (self.num_envs,))
+        rewards, terminated, truncated = ants.advance(chosen, mode, waiting)
         over, final = terminated | truncated, {}
         facts = ants.facts()
         if mode is AutoresetMode.SAME_STEP and over.any():
@@ -398,7 +398,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         """
         waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
         length, actions, q_values = checked_plan(policy, steps, n, ants.task)
-        epsilon, choices = arguments.checked_share("epsilon", epsilon), None
+        epsilon, choices = checked_share("epsilon", epsilon), None
         if q_values is None and (epsilon or seed is not None):
             raise AntsError(
                 f"epsilon is {epsilon} and seed is {seed}, but the actions are given; leave both "
@@ -426,7 +426,8 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         infos: dict[str, Any] = dict(facts)
         if not have.all():
             infos = {
-                k: one * (have if one.ndim == 1 else have[:, None]) for k, one in facts.items()
+                k: array * (have if array.ndim == 1 else have[:, None])
+                for k, array in facts.items()
             }
         return infos | {f"_{name}": have.copy() for name in facts}
 
@@ -440,7 +441,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         if not self._begun:
             raise ResetNeeded("no episode has begun; call reset() before render().")
         drawn = map(self._ants.draw, range(self._n_worlds))
-        return tuple(one for one in drawn for _ in range(self.num_envs // self._n_worlds))
+        return tuple(picture for picture in drawn for _ in range(self.num_envs // self._n_worlds))
 
 
 def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
@@ -451,10 +452,10 @@ def seeds_of(seed: Any, n: int) -> Sequence[int | None]:
         return range(int(seed), int(seed) + n)
     if not isinstance(seed, (list, tuple, np.ndarray)) or np.shape(seed)[:1] != (n,):
         raise ValueError(f"seed is {shown(seed)}; give a whole number, or a list of {n}.")
-    for one in seed:
-        if one is None:
+    for entry in seed:
+        if entry is None:
             continue
-        if not isinstance(one, (int, np.integer)):
-            raise ValueError(f"a seed is {shown(one)}; it must be a whole number, at least 0.")
-        seeding.np_random(int(one))  # raises Gymnasium's error for negative seeds
-    return [None if one is None else int(one) for one in seed]
+        if not isinstance(entry, (int, np.integer)):
+            raise ValueError(f"a seed is {shown(entry)}; it must be a whole number, at least 0.")
+        seeding.np_random(int(entry))  # raises Gymnasium's error for negative seeds
+    return [None if entry is None else int(entry) for entry in seed]

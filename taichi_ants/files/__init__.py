@@ -1,7 +1,7 @@
 """Atomic writing of files, and reading with limits on their size.
 
 All functions raise an AntsError that names the file if it cannot be written or read. `archives`
-stores arrays with metadata (.npz), and `results` manages folders of results.
+stores arrays with metadata (.npz), and `tables` writes typed columns.
 """
 
 from __future__ import annotations
@@ -49,10 +49,10 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> No
     """
     with writing(path):
         target = _target_of(path)
-        with unfinished(target) as place:
-            with open(place, "wb") as file:
+        with unfinished(target) as temporary:
+            with open(temporary, "wb") as file:
                 writer(file)
-            os.replace(place, target)
+            os.replace(temporary, target)
 
 
 @contextmanager
@@ -64,28 +64,28 @@ def unfinished(target: Path) -> Iterator[Path]:
     """
     # A hash, because the name itself can already have the greatest length allowed.
     name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
-    for left in _left_in(target.parent):
+    for leftover in _left_in(target.parent):
         with suppress(OSError):
             if (
-                left.name.startswith(f".{name}.")
-                and time.time() - left.stat().st_mtime > _ABANDONED
+                leftover.name.startswith(f".{name}.")
+                and time.time() - leftover.stat().st_mtime > _ABANDONED
             ):
-                _remove(left)
-    place = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
+                _remove(leftover)
+    temporary = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
     try:
-        yield place
+        yield temporary
     finally:
         with suppress(OSError):
-            _remove(place)
+            _remove(temporary)
 
 
 def _left_in(folder: Path) -> list[Path]:
     """Return the unfinished files that a folder had at most a minute ago."""
-    when, found = _listed.get(folder, (0.0, []))
+    when, names = _listed.get(folder, (0.0, []))
     if not when or time.monotonic() - when > _LISTED_FOR:
-        found = list(folder.glob(".*.tmp"))
-        _listed[folder] = time.monotonic(), found
-    return found
+        names = list(folder.glob(".*.tmp"))
+        _listed[folder] = time.monotonic(), names
+    return names
 
 
 def _remove(path: Path) -> None:
@@ -105,7 +105,7 @@ def check_writable_file(path: PathLike) -> Path:
         target = _target_of(path)
         folder = target.parent
         if not os.path.islink(path):
-            folder = next(one for one in target.parents if one.exists())
+            folder = next(parent for parent in target.parents if parent.exists())
         _try_to_write(folder)
     return Path(path)
 
@@ -141,54 +141,15 @@ def write_csv(path: PathLike, rows: Iterable[Mapping[str, Any]], columns: Sequen
     Raises ValueError if a row has a key that is not a column.
     """
 
-    write_atomically(path, lambda file: _write_rows(file, rows, columns, header=True))
-
-
-class GrowingTable:
-    """A file as `write_csv` writes it, to which rows are appended while others read it.
-
-    The file contains whole rows after each `append`. Raises AntsError if it cannot be written.
-    """
-
-    def __init__(self, path: PathLike, columns: Sequence[str]) -> None:
-        self._path, self._columns = path, columns
-        with writing(path):
-            Path(path).unlink(missing_ok=True)  # another process may write to it
-            self._file = open(path, "wb", buffering=0)  # noqa: SIM115
-        self.append((), header=True)
-
-    def __enter__(self) -> GrowingTable:
-        return self
-
-    def __exit__(self, *raised: object) -> None:
-        self._file.close()
-
-    def append(self, rows: Iterable[Mapping[str, Any]], header: bool = False) -> None:
-        """Append rows, all at once."""
-        text = csv_text(rows, self._columns, header)
-        with writing(self._path):
-            self._file.write(text)
-
-
-def csv_text(
-    rows: Iterable[Mapping[str, Any]], columns: Sequence[str], header: bool = True
-) -> bytes:
-    """Return the text that `write_csv` writes, with or without the header."""
-    text = io.BytesIO()
-    _write_rows(text, rows, columns, header)
-    return text.getvalue()
-
-
-def _write_rows(
-    file: BinaryIO, rows: Iterable[Mapping[str, Any]], columns: Sequence[str], header: bool
-) -> None:
-    text = codecs.getwriter("utf-8")(file)
-    table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
-    if header:
+    def save(file: BinaryIO) -> None:
+        text = codecs.getwriter("utf-8")(file)
+        table = csv.DictWriter(text, fieldnames=columns, restval="", lineterminator="\n")
         table.writeheader()
-    for row in rows:
-        values = {n: v.item() if isinstance(v, np.generic) else v for n, v in row.items()}
-        table.writerow({n: None if v != v else v for n, v in values.items()})
+        for row in rows:
+            values = {n: v.item() if isinstance(v, np.generic) else v for n, v in row.items()}
+            table.writerow({n: None if v != v else v for n, v in values.items()})
+
+    write_atomically(path, save)
 
 
 @contextmanager
@@ -203,8 +164,8 @@ def opened(path: PathLike, most: float = math.inf) -> Iterator[BinaryIO]:
             raise OSError("it contains a null character")
         # Without O_NONBLOCK, opening a pipe would wait for a writer.
         no_wait = getattr(os, "O_NONBLOCK", 0)
-        place = inputs.place_of(path)
-        with open(place, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
+        copy = inputs.place_of(path)
+        with open(copy, "rb", opener=lambda name, flags: os.open(name, flags | no_wait)) as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
                 raise OSError("it is a device or a pipe")
@@ -244,12 +205,6 @@ def read_csv(path: PathLike) -> list[dict[str, Any]]:
         raise AntsError(f"{named(path)} is not a table (CSV); name another file.") from error
 
 
-def csv_columns(path: PathLike) -> list[str]:
-    """Return the names of the columns of a file that `write_csv` wrote."""
-    with opened(path) as file:
-        return next(csv.reader([file.readline().decode("utf-8", "replace")]), [])
-
-
 def smallest(array: np.ndarray) -> np.ndarray:
     """Return integers as an array of the smallest integer type that can hold them."""
     low, high = int(array.min(initial=0)), int(array.max(initial=0))
@@ -268,19 +223,6 @@ def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Pat
         folder.mkdir(parents=True, exist_ok=True)
         _try_to_write(folder)
     return folder
-
-
-def check_room(folder: PathLike, needed: int) -> None:
-    """Check that the disk of a folder has `needed` bytes free, before long work."""
-    with writing(folder):
-        free = shutil.disk_usage(folder).free
-    if needed > free:
-        from rich.filesize import decimal
-
-        raise AntsError(
-            f"this needs {decimal(needed)} on the disk of {named(folder)}, and {decimal(free)} "
-            "are free; free some space, write less, or choose another place."
-        )
 
 
 @contextmanager

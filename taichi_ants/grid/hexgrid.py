@@ -32,14 +32,14 @@ def _cells(values: object) -> np.ndarray:
 
 def normal_form(cells: object) -> np.ndarray:
     """Return cube coordinates shifted so that their minimum is 0, int64 (..., 3)."""
-    given = _cells(cells)
-    return given - given.min(axis=-1, keepdims=True)
+    coordinates = _cells(cells)
+    return coordinates - coordinates.min(axis=-1, keepdims=True)
 
 
 def axial(cells: object) -> np.ndarray:
     """Return the axial coordinates (q, r), int64 (..., 2), of cube coordinates (..., 3)."""
-    given = _cells(cells)
-    return given[..., :2] - given[..., 2:]
+    coordinates = _cells(cells)
+    return coordinates[..., :2] - coordinates[..., 2:]
 
 
 def cube(axials: np.ndarray) -> np.ndarray:

@@ -103,12 +103,12 @@ def learn_by(td_error: Any) -> Callable[..., object]:
 
     @ti.func
     def learn(memory: ti.template(), at, step, rates, random_state):
-        place = at.table + step.state * ROW + step.action
-        value = memory.q[place]
+        entry = at.table + step.state * ROW + step.action
+        value = memory.q[entry]
         discount = discount_of(rates, step.terminated)
         next_values = values_of(memory.q, at.table, step.next_state)
         error = error_of(value, step.reward, discount, next_values, step.next_action, rates.epsilon)
-        memory.q[place] = value + rates.learning_rate * error
+        memory.q[entry] = value + rates.learning_rate * error
         return error, random_state
 
     return learn

@@ -74,21 +74,21 @@ def remember(memory: ti.template(), at, pair, transition):
     """Store the latest transition of a pair, and return its slot."""
     state, action = (pair & _PAIRS) // ROW, (pair & _PAIRS) % ROW
     key = at.integers + 2 + (2 * memory.n_states + state) * N_ACTIONS + action
-    place = memory.integers[key]
-    if place == 0:
-        place = memory.integers[at.integers] + 1
-        memory.integers[at.integers] = place
-        memory.integers[key] = place
-        memory.integers[at.integers + 2 * place] = pair
-    memory.integers[at.integers + 2 * place + 1] = transition
-    return place - 1
+    entry = memory.integers[key]
+    if entry == 0:
+        entry = memory.integers[at.integers] + 1
+        memory.integers[at.integers] = entry
+        memory.integers[key] = entry
+        memory.integers[at.integers + 2 * entry] = pair
+    memory.integers[at.integers + 2 * entry + 1] = transition
+    return entry - 1
 
 
 @ti.func
 def recall(memory: ti.template(), at, slot):
     """Return the pair in a slot, and its transition."""
-    place = at.integers + 2 + 2 * (slot & _PAIRS)
-    return memory.integers[place] & _PAIRS, memory.integers[place + 1]
+    entry = at.integers + 2 + 2 * (slot & _PAIRS)
+    return memory.integers[entry] & _PAIRS, memory.integers[entry + 1]
 
 
 @ti.func

@@ -47,8 +47,8 @@ def learn(memory: ti.template(), at, step, rates, random_state):
     while waiting == rates.n_steps or (ends == 1 and waiting > 0):
         worth = step.reward + discount * memory.q[after]
         for back in range(1, waiting):
-            place = (oldest + waiting - 1 - back) % rates.n_steps
-            worth = memory.floats[at.floats + place] + rates.discount * worth
+            entry = (oldest + waiting - 1 - back) % rates.n_steps
+            worth = memory.floats[at.floats + entry] + rates.discount * worth
         updated = at.table + memory.integers[at.integers + 2 + oldest]
         memory.q[updated] = memory.q[updated] + rates.learning_rate * (worth - memory.q[updated])
         oldest = (oldest + 1) % rates.n_steps

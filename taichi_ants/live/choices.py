@@ -47,30 +47,31 @@ def fields() -> Iterator[dict[str, Any]]:
     Each has "path", "kind", "words", "least", "most", "above", "unit", "help", "optional" and
     "default". "only" (a path and its values), "world" and "learner" limit a field to these.
     """
-    for one in all_of(Task):
+    for setting in all_of(Task):
         # The page has no castes, which labour requires.
-        is_labour = one.path.startswith(f"{Labour.path}.")
-        if not one.is_group and one.kind is not Named and not one.is_text and not is_labour:
-            yield _field(one)
-    for one in declared(TrainingConfig)[1:]:
-        yield {**_field(one), "default": _LEARNING.get(one.name, one.default), "learner": ""}
+        has_no_field = setting.is_group or setting.is_text or setting.kind is Named
+        if not has_no_field and not setting.path.startswith(f"{Labour.path}."):
+            yield _field(setting)
+    for setting in declared(TrainingConfig)[1:]:
+        default = _LEARNING.get(setting.name, setting.default)
+        yield {**_field(setting), "default": default, "learner": ""}
     for name in learners.names():
-        for one in declared(learners.get(name).hyperparameters):
-            yield {**_field(one), "learner": name}
+        for setting in declared(learners.get(name).hyperparameters):
+            yield {**_field(setting), "learner": name}
     for name in WORLDS.keys() - {"map"}:
-        for one in worlds.settings_of(name):
-            if one.name != "ranges":
-                yield {**_field(one), "world": name}
+        for setting in worlds.settings_of(name):
+            if setting.name != "ranges":
+                yield {**_field(setting), "world": name}
 
 
-def _field(one: DeclaredSetting) -> dict[str, Any]:
-    rule, group = one.rule, one.path.rpartition(".")[0]
-    usual = one.default if rule.usual is None else rule.usual
+def _field(setting: DeclaredSetting) -> dict[str, Any]:
+    rule, group = setting.rule, setting.path.rpartition(".")[0]
+    default = setting.default if rule.usual is None else rule.usual
     return {
-        **{"path": one.path, "kind": one.kind.__name__, "words": one.allowed_words},
+        **{"path": setting.path, "kind": setting.kind.__name__, "words": setting.allowed_words},
         **{"least": rule.least, "most": rule.most, "above": rule.above},
-        **{"unit": rule.unit, "help": rule.help, "optional": one.optional and not rule.only},
-        "default": None if usual is MISSING else usual,
+        **{"unit": rule.unit, "help": rule.help, "optional": setting.optional and not rule.only},
+        "default": None if default is MISSING else default,
         "only": rule.only and [f"{group}.{rule.only[0]}", *rule.only[1:]],
     }
 
@@ -145,7 +146,7 @@ class Choices:
         if policy == BY_HAND:
             table = trail_follower(task.observation)
         elif not name:
-            check_one_of("the policy", policy, [f"{FOLLOWS}{one}" for one in self.policies])
+            check_one_of("the policy", policy, [f"{FOLLOWS}{name}" for name in self.policies])
             file = self.policies[policy.removeprefix(FOLLOWS)]
             task, table = task.replace(observation=file.observation), file.q_values
         size = checked_whole("the size", chosen["size"], *SIZES)
@@ -176,7 +177,9 @@ class Choices:
             )
             settings |= {f"training.{n}": v for n, v in numbers.items() if type(v) in (int, float)}
         else:
-            same = (n for n, one in self.policies.items() if np.array_equal(one.q_values, table))
+            same = (
+                n for n, policy in self.policies.items() if np.array_equal(policy.q_values, table)
+            )
             policy = next((FOLLOWS + name for name in same), BY_HAND)
         return {
             "world": "map" if is_map else setup.world,
@@ -191,24 +194,26 @@ class Choices:
         }
 
 
-def _settings(given: Any, world: str, learner: str) -> dict[str, Any]:
+def _settings(values: Any, world: str, learner: str) -> dict[str, Any]:
     """Return a page's settings by group; raise AntsError if the form lacks one of them."""
-    expect("settings", given, dict)
+    expect("settings", values, dict)
     # Tasks have defaults of settings that the form lacks.
     lacking = {
-        one.path: one.default
-        for one in all_of(Task)
-        if one.is_text or one.path.startswith(f"{Labour.path}.")
+        setting.path: setting.default
+        for setting in all_of(Task)
+        if setting.is_text or setting.path.startswith(f"{Labour.path}.")
     }
-    given = {
-        path: one for path, one in given.items() if path not in lacking or one != lacking[path]
+    values = {
+        path: value
+        for path, value in values.items()
+        if path not in lacking or value != lacking[path]
     }
     offered = {
-        one["path"]
-        for one in fields()
-        if one.get("world", world) == world and one.get("learner", "") in ("", learner)
+        field["path"]
+        for field in fields()
+        if field.get("world", world) == world and field.get("learner", "") in ("", learner)
     }
-    for path in given:
+    for path in values:
         if path not in offered:
             raise AntsError(f"{shown(path)} is not a setting of this form; leave it out.")
-    return nested(given)
+    return nested(values)

@@ -40,33 +40,33 @@ def values(interventions: Interventions) -> dict[str, Value]:
     - evaporation: 1 if trails evaporate, else 0.
     """
     colony, pheromone = interventions.colony, interventions.colony.pheromone
-    found = {"ants": Value(max(interventions.living, 1), 1, colony.capacity, 1, "ants")}
+    values = {"ants": Value(max(interventions.living, 1), 1, colony.capacity, 1, "ants")}
     if colony.task.choice.needs_table:
-        found["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
+        values["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
     if colony.sharing != "frozen":
-        found["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001, "learning_rate")
+        values["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001, "learning_rate")
     if pheromone.deposit != "none":
-        found["deposit"] = Value(
+        values["deposit"] = Value(
             int(pheromone.level), 1, max(1000, int(pheromone.level)), 1, _path("level")
         )
-    for name, usual in (("slope", 100), ("cap", 10_000)):
+    for name, largest in (("slope", 100), ("cap", 10_000)):
         if (number := getattr(pheromone, name)) is not None:
-            found[name] = Value(int(number), 1, max(usual, int(number)), 1, _path(name))
+            values[name] = Value(int(number), 1, max(largest, int(number)), 1, _path(name))
     falls = pheromone.evaporation != "none"
     if _with_evaporation(interventions, not falls)[0].dense == pheromone.dense:
         edits = {str(n): _switch(interventions, n == 1) for n in (0, 1)}
-        found["evaporation"] = Value(int(falls), 0, 1, 1, "task", edits)
+        values["evaporation"] = Value(int(falls), 0, 1, 1, "task", edits)
     if pheromone.half_life is not None:
         half_life = float(pheromone.half_life)
-        found["half_life"] = Value(
+        values["half_life"] = Value(
             half_life, min(1.0, half_life), max(1000.0, half_life), 0.5, _path("half_life")
         )
     if pheromone.dense:  # integer trails cannot diffuse, and dense trails cannot become integers
         least = 0.0 if pheromone.evaporation == "exponential" else min(0.01, pheromone.diffusion)
-        found["diffusion"] = Value(
+        values["diffusion"] = Value(
             float(pheromone.diffusion), float(least), 1.0, 0.01, _path("diffusion")
         )
-    return found
+    return values
 
 
 def _path(name: str) -> str:
@@ -100,17 +100,19 @@ def checked(edit: object, interventions: Interventions) -> Intervention:
             "a session cannot change the policy of its ants; begin a session with the other "
             "policy, or use a Colony."
         )
-    one, colony = language.from_dict(edit), interventions.colony
-    if (cells := getattr(one, "cells", None)) is None:
-        return one
+    intervention, colony = language.from_dict(edit), interventions.colony
+    if (cells := getattr(intervention, "cells", None)) is None:
+        return intervention
     if isinstance(cells, str):
         flat = colony.worlds[0].region(cells).tolist()
     else:
         flat = [language.flat_index(colony.grid, cell) for cell in cells]
-    one = replace(cast(language.Clear, one), cells=flat)  # or another one with cells
-    if one.facts().get("place", {}).get("what") == "queen" and not interventions.is_empty(flat[0]):
-        where = tuple(colony.grid.cells(flat[0]).tolist())
+    # `Clear` stands for any intervention with cells.
+    intervention = replace(cast(language.Clear, intervention), cells=flat)
+    places_queen = intervention.facts().get("place", {}).get("what") == "queen"
+    if places_queen and not interventions.is_empty(flat[0]):
+        cell = tuple(colony.grid.cells(flat[0]).tolist())
         raise AntsError(
-            f"the queen cannot move to cell {where}, because it is not empty; choose an empty cell."
+            f"the queen cannot move to cell {cell}, because it is not empty; choose an empty cell."
         )
-    return one
+    return intervention

@@ -33,8 +33,8 @@ def gif_bytes(log: Log, progress: Progress | None = None, most_frames: int = 300
     from taichi_ants.rendering import colony_snapshots, frames, save_animation
 
     passed = _snapshots(log, most_frames, progress)
-    shown = (one for session, _ in passed for one in colony_snapshots(session.colony))
-    pictures = frames(shown, task=log.setup.task)
+    snapshots = (now for session, _ in passed for now in colony_snapshots(session.colony))
+    pictures = frames(snapshots, task=log.setup.task)
     return bytes_of("session.gif", lambda path: save_animation(path, pictures, fps=12.0))
 
 
@@ -58,35 +58,35 @@ SLOW: dict[str, tuple[str, Callable[[Log, Progress], bytes]]] = {
 }
 
 
-class Undoing:
-    """The replay of a session without its last change; it has the attributes of `Making`."""
+class UndoJob:
+    """The replay of a session without its last change; it has the attributes of `WorkerJob`."""
 
     page = None
 
     def __init__(self, session: Session) -> None:
-        self._pieces, self._last = session.undone(), session
+        self._replay, self._last = session.undone(), session
         self.done, (self.total, _) = 0, session.edits[session.changes[-1]]
-        self.made: Session | str | None = None
+        self.result: Session | str | None = None
 
-    def go_on(self) -> None:
-        """Continue for a moment; AntsError and MemoryError become messages in `made`."""
+    def proceed(self) -> None:
+        """Continue for a moment; AntsError and MemoryError become messages in `result`."""
         until = time.monotonic() + _SLICE
         try:
-            for session in self._pieces:
+            for session in self._replay:
                 self._last, self.done = session, session.steps
                 if time.monotonic() > until:
                     return
-            self.made = self._last
+            self.result = self._last
         except AntsError as error:
-            self.made = str(error)
+            self.result = str(error)
         except MemoryError:
-            self.made = "undoing needs more memory than is available."
+            self.result = "undoing needs more memory than is available."
 
     def cancel(self) -> None:
         """Do nothing, because the session has not changed."""
 
 
-class Making:
+class WorkerJob:
     """A worker process that makes a file of `SLOW`, or replays a session (`LOAD`).
 
     `content` is a session file, `total` its number of ticks. The process calls `prepare` first, for
@@ -94,7 +94,7 @@ class Making:
 
     Attributes:
         done: The number of ticks that have been replayed.
-        made: The result, or a message if there is none; None before the end.
+        result: The result, or a message if there is none; None before the end.
     """
 
     def __init__(
@@ -106,15 +106,15 @@ class Making:
         page: Any = None,
     ) -> None:
         self._kind, self.done, self.total, self.page = kind, 0, total, page
-        self.made: bytes | str | Session | None = None
+        self.result: bytes | str | Session | None = None
         self._cancelled = False
         context = multiprocessing.get_context("spawn")
         self._answers, answers = context.Pipe(duplex=False)
-        given = (kind, content, prepare, answers)
-        self._process = context.Process(target=_make, args=given, daemon=True)
+        arguments = (kind, content, prepare, answers)
+        self._process = context.Process(target=_make, args=arguments, daemon=True)
         threading.Thread(target=self._run, args=(answers,), daemon=True).start()
 
-    def go_on(self) -> None:
+    def proceed(self) -> None:
         """Do nothing, because the process continues by itself."""
 
     def cancel(self) -> None:
@@ -135,7 +135,7 @@ class Making:
         if isinstance(answer, int):
             answer = "the worker process has ended early, perhaps for lack of memory."
         faulty = isinstance(answer, str) and self._kind == LOAD
-        self.made = _of_page(answer) if faulty else answer
+        self.result = _of_page(answer) if faulty else answer
 
 
 def _make(

@@ -6,7 +6,7 @@ open page; a socket requires the server's own page and its token. Pages send req
 
 One thread serves the sockets. Another one, which calls `SessionServer.run`, owns the session.
 Requests pass through a queue to it, and messages for pages return to the socket thread. Further
-threads check uploaded files, and worker processes replay them, see `exports.Making`.
+threads check uploaded files, and worker processes replay them, see `exports.WorkerJob`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from taichi_ants.errors import AntsError, imported
 from taichi_ants.live.choices import Choices
-from taichi_ants.live.exports import LOAD, QUICK, SLOW, Making, Undoing, uploaded
+from taichi_ants.live.exports import LOAD, QUICK, SLOW, UndoJob, WorkerJob, uploaded
 from taichi_ants.live.session import Log, Session
 from taichi_ants.viewer.page import assemble
 
@@ -48,13 +48,13 @@ FASTEST = 1000.0  # ticks/s; at this speed the session runs as fast as possible
 _MOST_PAGES = 24
 _MOST_TEXT = 2**18  # bytes of a request
 _MOST_UPLOAD = 2**22  # bytes of a session file
-_MOST_UNSEEN = 12  # frames sent to a page before it has drawn the first of them
+_MOST_IN_FLIGHT = 12  # frames sent to a page before it has drawn the first of them
 _MOST_WAITING = 2**27  # bytes buffered for a page that does not read
 _FEW = 4  # with fewer frames per episode, each frame shows another episode
 _PHASES = 24  # number of such frames that together show the course of an episode
 _STATE_EVERY = 0.5  # seconds
 _PROGRESS_EVERY = 0.2  # seconds
-_BREATH = 0.004  # seconds of waiting after each frame, so that the socket thread can run
+_PAUSE = 0.004  # seconds of waiting after each frame, so that the socket thread can run
 _LONGEST_WAIT = 0.2  # seconds to wait for a request before the next check for the end
 _QUIET = logging.getLogger("taichi_ants.live")  # keeps foreign requests out of the terminal
 _QUIET.addHandler(logging.NullHandler())
@@ -81,8 +81,8 @@ def live_page(server: str) -> str:
     """Return the HTML of the viewer with controls; it connects only to `server`."""
     folder = resources.files(__package__)
     controls, style, *scripts = (folder.joinpath(name).read_text("utf-8") for name in PARTS)
-    more = {"controls": controls, "style": style, "script": "\n".join(scripts)}
-    return assemble("Taichi Ants, live", **more, connect=server)
+    parts = {"controls": controls, "style": style, "script": "\n".join(scripts)}
+    return assemble("Taichi Ants, live", **parts, connect=server)
 
 
 class Closed(Exception):  # noqa: N818
@@ -94,10 +94,10 @@ class Page:
 
     def __init__(self, connection: ServerConnection) -> None:
         self.connection = connection
-        self.unseen = 0  # frames that were sent, but not drawn yet
+        self.in_flight = 0  # frames that were sent, but not drawn yet
         self.behind = False  # if True, the next frame must be a complete one
 
-    def tell(self, *messages: str | bytes) -> None:
+    def send(self, *messages: str | bytes) -> None:
         """Send messages without waiting; disconnect pages that never read."""
         from websockets.asyncio.server import broadcast
 
@@ -109,20 +109,20 @@ class Page:
 
     def show(self, frame: bytes) -> None:
         """Send a frame of changes, unless too many frames are unseen: then the page is behind."""
-        self.behind = self.behind or self.unseen >= _MOST_UNSEEN
+        self.behind = self.behind or self.in_flight >= _MOST_IN_FLIGHT
         if not self.behind:
-            self.unseen += 1
-            self.tell(frame)
+            self.in_flight += 1
+            self.send(frame)
 
-    def has_seen(self, frames: int) -> bool:
+    def acknowledge(self, frames: int) -> bool:
         """Return whether the page was behind and, after drawing `frames` more, no longer is."""
-        self.unseen = max(0, self.unseen - frames)
-        return self.behind and self.unseen == 0
+        self.in_flight = max(0, self.in_flight - frames)
+        return self.behind and self.in_flight == 0
 
     def begin(self, *messages: str | bytes) -> None:
         """Send messages that end with a complete frame."""
-        self.unseen, self.behind = 1, False
-        self.tell(*messages)
+        self.in_flight, self.behind = 1, False
+        self.send(*messages)
 
 
 class SessionServer:
@@ -161,15 +161,15 @@ class SessionServer:
         self._requests = queue.Queue()
         self._loop = asyncio.new_event_loop()
         self._over, self._leave = threading.Event(), asyncio.Event()
-        self._pace, self._piece, self._due = 0.0, 1.0, 0.0  # see _pass
+        self._ticks_due, self._frame_steps, self._due = 0.0, 1.0, 0.0  # see _advance_frame
         self._prepare = prepare
-        self._former: Session | None = None  # the session before the present one
+        self._previous: Session | None = None  # the session before the present one
         self._undone: tuple[int, int] | None = None  # its steps and edits, after an undo
         self._stroke: tuple[Page, float] | None = None  # page and number of the last edit's stroke
-        self._works: dict[str, Making | Undoing] = {}  # running work: LOAD, or a file of SLOW
+        self._jobs: dict[str, WorkerJob | UndoJob] = {}  # running job: LOAD, or a file of SLOW
         self._loaded: Session | None = None  # from a worker process, before its first step here
         self._compiles = False  # whether the first step of a session is running
-        self._tells = 0.0  # time of the next state message
+        self._next_state = 0.0  # time of the next state message
 
     @property
     def url(self) -> str:
@@ -203,8 +203,8 @@ class SessionServer:
                 self._turn()
         finally:
             self._over.set()
-            for work in self._works.values():
-                work.cancel()
+            for job in self._jobs.values():
+                job.cancel()
             with contextlib.suppress(RuntimeError):  # the loop has already ended
                 self._loop.call_soon_threadsafe(self._leave.set)
             sockets.join(2)
@@ -212,69 +212,69 @@ class SessionServer:
     @property
     def _runs(self) -> bool:
         """Whether the session runs; it pauses during a replay of the session that replaces it."""
-        return self.playing and LOAD not in self._works
+        return self.playing and LOAD not in self._jobs
 
     def _turn(self) -> None:
         """Advance by a frame if one is due, and handle requests."""
         runs = self._runs and bool(self._pages)  # pause if no page is open
-        for kind, work in [*self._works.items()]:
-            work.go_on()
-            if work.made is not None:
-                self._end_work(kind, work)
+        for kind, job in [*self._jobs.items()]:
+            job.proceed()
+            if job.result is not None:
+                self._finish_job(kind, job)
         if runs and time.monotonic() >= self._due:
-            self._pass()
+            self._advance_frame()
         now = time.monotonic()
-        if now >= self._tells:
-            every = _PROGRESS_EVERY if self._works else _STATE_EVERY if runs else math.inf
-            self._tells = now + every
-            self._tell(self._state())
-        undoes = isinstance(self._works.get(LOAD), Undoing)
+        if now >= self._next_state:
+            interval = _PROGRESS_EVERY if self._jobs else _STATE_EVERY if runs else math.inf
+            self._next_state = now + interval
+            self._send(self._state())
+        undoes = isinstance(self._jobs.get(LOAD), UndoJob)
         due = now if undoes else self._due if runs else math.inf
-        wait = min(due - now, self._tells - now, _LONGEST_WAIT)
+        wait = min(due - now, self._next_state - now, _LONGEST_WAIT)
         with contextlib.suppress(queue.Empty):
             for _ in range(1 + len(self._pages)):  # about one request per page
-                self._answer(*self._requests.get(timeout=max(wait, _BREATH)))
+                self._answer(*self._requests.get(timeout=max(wait, _PAUSE)))
                 wait = 0.0
 
-    def _end_work(self, kind: str, work: Making | Undoing) -> None:
+    def _finish_job(self, kind: str, job: WorkerJob | UndoJob) -> None:
         """Begin the finished session, send the finished file to its page, or send an error."""
-        del self._works[kind]
-        self._tells = 0.0
-        if isinstance(work.made, Session):
-            self._begin(work.made, undoes=isinstance(work, Undoing))
-            self._loaded = work.made if isinstance(work, Making) else None
-        elif isinstance(work.made, bytes):
-            self._tell(_say("file", name=SLOW[kind][0]), work.made, to=work.page)
+        del self._jobs[kind]
+        self._next_state = 0.0
+        if isinstance(job.result, Session):
+            self._begin(job.result, undoes=isinstance(job, UndoJob))
+            self._loaded = job.result if isinstance(job, WorkerJob) else None
+        elif isinstance(job.result, bytes):
+            self._send(_message("file", name=SLOW[kind][0]), job.result, to=job.page)
         else:
-            self._tell(_say("error", words=work.made), to=work.page)
+            self._send(_message("error", words=job.result), to=job.page)
 
-    def _pass(self) -> None:
+    def _advance_frame(self) -> None:
         """Advance by the ticks of one frame, and show it."""
         began, before = time.monotonic(), self.session.steps
         if self.speed >= FASTEST:
-            ticks = self._leap()
+            ticks = self._steps_per_frame()
         else:
-            self._pace += max(1.0, self.speed / FRAMES_A_SECOND)
-            ticks = int(self._pace)
-            self._pace -= ticks
+            self._ticks_due += max(1.0, self.speed / FRAMES_A_SECOND)
+            ticks = int(self._ticks_due)
+            self._ticks_due -= ticks
         try:
             self._advance(ticks)
         except AntsError as error:  # for example if a learner's values are no longer finite
             self.playing = False
-            self._tell(_say("error", words=str(error)))
+            self._send(_message("error", words=str(error)))
         took, passed = time.monotonic() - began, self.session.steps - before
         if passed == ticks and took > 0:
-            self._piece = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
-        usual = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
-        self._due = max(self._due + usual, began + took)  # do not catch up on lost time
+            self._frame_steps = min(2.0 * passed, max(1.0, passed / (took * FRAMES_A_SECOND)))
+        interval = 0.0 if self.speed >= FASTEST else 1 / min(self.speed, FRAMES_A_SECOND)
+        self._due = max(self._due + interval, began + took)  # do not catch up on lost time
 
-    def _leap(self) -> int:
+    def _steps_per_frame(self) -> int:
         """Return the estimated number of steps that fill the time of a frame.
 
         If this is a large part of an episode, each frame shows another episode, at a slightly later
         tick. So pages show the course of an episode slowly.
         """
-        steps, length = int(self._piece), self.session.setup.ticks_per_episode
+        steps, length = int(self._frame_steps), self.session.setup.ticks_per_episode
         if not length or _FEW * steps < length:
             return steps
         cycle = length + 1  # including the step that begins the next episode
@@ -284,13 +284,13 @@ class SessionServer:
         """Advance by ticks, and show them; the first call compiles kernels, which takes seconds."""
         if self.session.steps == 0 or self.session is self._loaded:
             self._compiles, self._loaded = True, None
-            self._tell(self._state())
-            time.sleep(_BREATH)  # so that the socket thread sends this state first
+            self._send(self._state())
+            time.sleep(_PAUSE)  # so that the socket thread sends this state first
         try:
             self._show(self.session.advance() if ticks == 1 else self.session.leap(ticks))
         finally:
             if self._compiles:
-                self._compiles, self._tells = False, 0.0  # send the new state at once
+                self._compiles, self._next_state = False, 0.0  # send the new state at once
 
     def _answer(self, page: Page, act: Callable[[], None], answered: asyncio.Future[None]) -> None:
         """Perform a request or send its page an error; then send the state to all pages soon."""
@@ -302,14 +302,14 @@ class SessionServer:
         except (AntsError, MemoryError) as error:
             no_memory = isinstance(error, MemoryError)
             words = "this needs more memory than is available." if no_memory else str(error)
-            self._tell(_say("error", words=words), to=page)
+            self._send(_message("error", words=words), to=page)
 
         def answer() -> None:
             if not answered.done():  # it is done if the page has disconnected
                 answered.set_exception(refused) if refused else answered.set_result(None)
 
         self._post(answer)
-        self._tells = min(self._tells, time.monotonic() + 1 / FRAMES_A_SECOND)
+        self._next_state = min(self._next_state, time.monotonic() + 1 / FRAMES_A_SECOND)
 
     def _do(self, page: Page, request: dict[str, Any]) -> None:
         """Perform a JSON request of a page."""
@@ -333,13 +333,13 @@ class SessionServer:
                 self._show(self.session.apply(request["edit"], goes_on=stroke == self._stroke))
                 self._stroke = stroke
             case "undo":
-                self._works[LOAD] = Undoing(self.session)
+                self._jobs[LOAD] = UndoJob(self.session)
             case "back":  # return to the session before the present one
-                if self._former is None:
+                if self._previous is None:
                     raise AntsError(
                         "there is no session before this one to return to; continue with this one."
                     )
-                self._begin(self._former, comes_back=True)
+                self._begin(self._previous, comes_back=True)
             case "begin":  # {"chosen": see `Choices.setup`}
                 self._begin(Session(self.choices.setup(request.get("chosen"))))
             case "restart":
@@ -348,39 +348,39 @@ class SessionServer:
                 self._export(page, str(request.get("kind")))
             case "cancel":  # {"kind": LOAD or of `SLOW`}; it may have ended already
                 kind = str(request.get("kind"))
-                if kind in self._works:
-                    self._works.pop(kind).cancel()
-                    self._tell(_say("cancelled", kind=kind))
+                if kind in self._jobs:
+                    self._jobs.pop(kind).cancel()
+                    self._send(_message("cancelled", kind=kind))
             case "quit":
                 self.end()
             case _:
                 raise Closed("this request does not exist")
 
     def _check_free(self) -> None:
-        if LOAD in self._works:
+        if LOAD in self._jobs:
             raise AntsError("a session is being replayed; wait until it ends, or cancel it.")
 
     def _load(self, log: Log, content: bytes) -> None:
         self._check_free()
-        self._works[LOAD] = Making(LOAD, content, log.steps, self._prepare)
+        self._jobs[LOAD] = WorkerJob(LOAD, content, log.steps, self._prepare)
 
     def _forget(self, page: Page) -> None:
         """Cancel the files that a disconnected page has asked for."""
-        for kind, work in [*self._works.items()]:
-            if work.page is page:
-                self._works.pop(kind).cancel()
+        for kind, job in [*self._jobs.items()]:
+            if job.page is page:
+                self._jobs.pop(kind).cancel()
 
     def _export(self, page: Page, kind: str) -> None:
         if kind in QUICK:
             name, make = QUICK[kind]
-            self._tell(_say("file", name=name), make(self.session), to=page)
+            self._send(_message("file", name=name), make(self.session), to=page)
         elif kind not in SLOW:
             raise Closed("this kind of file does not exist")
-        elif self._works.keys() & SLOW.keys():
+        elif self._jobs.keys() & SLOW.keys():
             raise AntsError("another file is being made; wait for it, or cancel it.")
         else:
             content, ticks = self.session.to_bytes(), self.session.ticks
-            self._works[kind] = Making(kind, content, ticks, self._prepare, page)
+            self._jobs[kind] = WorkerJob(kind, content, ticks, self._prepare, page)
 
     def _begin(self, session: Session, undoes: bool = False, comes_back: bool = False) -> None:
         """Replace the session; pages can return to the previous one with the request "back".
@@ -391,36 +391,36 @@ class SessionServer:
         before = self.session
         in_a_row = undoes and self._undone == (before.steps, len(before.edits))
         if comes_back or not (in_a_row or before.same(session)):
-            self._former = before
+            self._previous = before
         self._undone = (session.steps, len(session.edits)) if undoes else None
         self.session, self._shown = session, secrets.token_hex(8)
-        self.playing, self._piece, self._stroke = False, 1.0, None
-        self._tell_whole()
+        self.playing, self._frame_steps, self._stroke = False, 1.0, None
+        self._send_whole()
 
-    def _tell_whole(self, page: Page | None = None, begins: bool = True) -> None:
+    def _send_whole(self, page: Page | None = None, begins: bool = True) -> None:
         """Send a complete frame to a page, or to all; with `begins`, also facts of the session."""
-        messages: list[str | bytes] = [_say("snapshot"), self.session.snapshot()]
+        messages: list[str | bytes] = [_message("snapshot"), self.session.snapshot()]
         if begins:
             header, setup, choices = self.session.header(), self.session.setup, self.choices
             offered = {"choices": choices.as_dict(), "chosen": choices.chosen(setup)}
-            begin = _say("begin", session=self._shown, header=header, **offered)
+            begin = _message("begin", session=self._shown, header=header, **offered)
             messages = [begin, self._state(), *messages]
 
         def show() -> None:
             self._pages.update([page] if page else [])
-            for one in [page] if page else self._pages:
-                one.begin(*messages)
+            for receiver in [page] if page else self._pages:
+                receiver.begin(*messages)
 
         self._post(show)
 
     def _show(self, frame: bytes) -> None:
         """Send a frame to all pages except those that are behind."""
-        news = self.session.news()
+        new_names = self.session.new_state_names()
 
         def show() -> None:
             for page in self._pages:
-                if news:
-                    page.tell(_say("names", names=news))
+                if new_names:
+                    page.send(_message("names", names=new_names))
                 page.show(frame)
 
         self._post(show)
@@ -428,27 +428,26 @@ class SessionServer:
     def _state(self) -> str:
         session = self.session
         works = [
-            {"kind": kind, "done": work.done, "total": work.total}
-            for kind, work in self._works.items()
+            {"kind": kind, "done": job.done, "total": job.total} for kind, job in self._jobs.items()
         ]
-        return _say(
+        return _message(
             "state",
             playing=self._runs,
             speed=self.speed,
             pages=len(self._pages),
             ticks=session.ticks,
             can_undo=bool(session.changes),
-            can_go_back=self._former is not None,
+            can_go_back=self._previous is not None,
             values=session.values(),
             works=works + [{"kind": "kernels", "done": 0, "total": 0}] * self._compiles,
         )
 
-    def _tell(self, *messages: str | bytes, to: Page | None = None) -> None:
-        def tell() -> None:
+    def _send(self, *messages: str | bytes, to: Page | None = None) -> None:
+        def send() -> None:
             for page in self._pages if to is None else [to]:
-                page.tell(*messages)
+                page.send(*messages)
 
-        self._post(tell)
+        self._post(send)
 
     def _post(self, act: Callable[[], Any]) -> None:
         """Call a function in the socket thread, in the order of these calls."""
@@ -473,10 +472,10 @@ class SessionServer:
             **{"open_timeout": 10, "ping_interval": 20, "ping_timeout": 20, "close_timeout": 0.3},
             **{"process_request": self._open, "logger": _QUIET},
         }
-        async with serve(self._hear, sock=self._socket, **settings):
+        async with serve(self._handle_messages, sock=self._socket, **settings):
             await self._leave.wait()
             for page in self._pages:
-                page.tell(_say("over"))
+                page.send(_message("over"))
 
     def _open(self, connection: ServerConnection, request: Request) -> Response | None:
         """Return the page or an error; None opens a socket.
@@ -484,23 +483,23 @@ class SessionServer:
         The page does not contain a secret; a socket requires the token.
         """
         method = getattr(request, "method", "GET")  # websockets before 17 accepts only GET
-        asked = urlsplit(request.path)
+        url = urlsplit(request.path)
         hosts = {f"{name}:{self.port}" for name in (HOST, "localhost")}
         host, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
-        opens, tokens = asked.path == "/socket", parse_qs(asked.query).get("token", [])
+        opens, tokens = url.path == "/socket", parse_qs(url.query).get("token", [])
         mine = len(host) == 1 and host[0] in hosts
         # The origin of a socket must be this server. The page must not be requested by other pages.
         mine = mine and (origins == [f"http://{host[0]}"] or (not origins and not opens))
         knows = hmac.compare_digest("".join(tokens[:1]).encode(), self.token.encode())
         if method not in ("GET", "HEAD")[: 1 if opens else 2]:
             response = connection.respond(405, "Only GET is allowed here.\n")
-        elif not mine or not (knows or (asked.path == "/" and not tokens)):
+        elif not mine or not (knows or (url.path == "/" and not tokens)):
             response = connection.respond(403, "Open the address that the command printed.\n")
         elif opens:
             if self._joined < _MOST_PAGES:
                 return None
             response = connection.respond(503, "Too many pages are open.\n")
-        elif asked.path != "/":
+        elif url.path != "/":
             response = connection.respond(404, "This page does not exist.\n")
         else:
             response = connection.respond(200, live_page(f"ws://{host[0]}"))
@@ -512,23 +511,23 @@ class SessionServer:
             response.body = b""
         return response
 
-    async def _hear(self, connection: ServerConnection) -> None:
+    async def _handle_messages(self, connection: ServerConnection) -> None:
         """Handle the messages of a page, one after the other."""
         from websockets.exceptions import ConnectionClosed
 
         page = Page(connection)
         self._joined += 1
         try:
-            await self._ask(page, partial(self._tell_whole, page))
+            await self._request(page, partial(self._send_whole, page))
             async for message in connection:
                 if isinstance(message, bytes):
                     await self._upload(page, message)
                     continue
                 request = _read(message)
                 if request["do"] != "seen":
-                    await self._ask(page, partial(self._do, page, request))
-                elif page.has_seen(int(_number(request, "frames", 0, 1000))):
-                    await self._ask(page, partial(self._tell_whole, page, begins=False))
+                    await self._request(page, partial(self._do, page, request))
+                elif page.acknowledge(int(_number(request, "frames", 0, 1000))):
+                    await self._request(page, partial(self._send_whole, page, begins=False))
         except Closed as error:
             await connection.close(1008, str(error))
         except ConnectionClosed:
@@ -543,17 +542,17 @@ class SessionServer:
         try:
             log = await asyncio.to_thread(uploaded, content)
         except AntsError as error:
-            page.tell(_say("error", words=str(error)))
+            page.send(_message("error", words=str(error)))
         else:
-            await self._ask(page, partial(self._load, log, content))
+            await self._request(page, partial(self._load, log, content))
 
-    async def _ask(self, page: Page, act: Callable[[], None]) -> None:
+    async def _request(self, page: Page, act: Callable[[], None]) -> None:
         answered = self._loop.create_future()
         self._requests.put((page, act, answered))
         await answered
 
 
-def _say(kind: str, /, **facts: Any) -> str:
+def _message(kind: str, /, **facts: Any) -> str:
     return json.dumps({"say": kind, **facts}, separators=(",", ":"))
 
 

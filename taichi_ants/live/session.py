@@ -31,8 +31,8 @@ MOST_CELLS = 400_000  # cells in all edits together
 # Sessions within these limits fit into `most`, so reading a file takes little time and memory.
 _WRITER = "Session.save, or Save session on its page,"
 KIND = Kind("session", 4, _WRITER, most=5_000_000, most_lists=100_000)
-_PIECE = 0.02  # seconds of a piece of a replay
-_BETWEEN = 0.1  # seconds of simulation between snapshots, the longest replay of an undo
+_REPLAY_SLICE = 0.02  # seconds of a piece of a replay
+_SNAPSHOT_INTERVAL = 0.1  # seconds of simulation between snapshots, the longest replay of an undo
 _MOST_KEPT = 1 << 28  # bytes of all snapshots
 _LARGEST = 1 << 26  # bytes of a colony above which there are no snapshots
 
@@ -40,7 +40,7 @@ _LARGEST = 1 << 26  # bytes of a colony above which there are no snapshots
 def cells_of(edit: Any) -> int:
     """Return the number of cells that an edit names, 0 if it names none."""
     settings = list(edit.values()) if isinstance(edit, dict) else []
-    lists = [one.get("cells") for one in settings if isinstance(one, dict)]
+    lists = [setting.get("cells") for setting in settings if isinstance(setting, dict)]
     return sum(len(cells) for cells in lists if isinstance(cells, list))
 
 
@@ -167,7 +167,7 @@ class Session:
         """Return facts about all frames, see `Recorder.header`."""
         return self._recorder.header()
 
-    def news(self) -> dict[int, tuple[str, str, list[str]]]:
+    def new_state_names(self) -> dict[int, tuple[str, str, list[str]]]:
         """Return the names of states that ants have visited since the last call."""
         if len(self._named) == self.colony.task.n_states:
             return {}
@@ -184,7 +184,7 @@ class Session:
 
         If the episode has ended, the next one begins instead, without a tick.
         """
-        return self._pass(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
+        return self._run(checked_whole("n", n), self._recorder.tick) or self._recorder.snapshot()
 
     def leap(self, n: int) -> bytes:
         """Return a frame of all changes after running n more steps, which may span episodes.
@@ -193,10 +193,10 @@ class Session:
         """
         until = self.steps + checked_whole("n", n)
         while self.steps < until:
-            self._pass(until - self.steps, self.colony.tick)
+            self._run(until - self.steps, self.colony.tick)
         return self._recorder.snapshot()
 
-    def _pass(self, n: int, tick: Callable[[int], Any]) -> Any:
+    def _run(self, n: int, tick: Callable[[int], Any]) -> Any:
         """Advance with the function `tick`; return its result, None if no tick passes."""
         progress = self._recorder.progress
         if self.ended:
@@ -225,8 +225,8 @@ class Session:
         return self._recorder.snapshot()
 
     def _do(self, edit: object, goes_on: bool = False) -> None:
-        one = edits.checked(edit, self.interventions)
-        plain = one.facts()
+        intervention = edits.checked(edit, self.interventions)
+        plain = intervention.facts()
         check_room(len(self.edits) + 1, self._cells + cells_of(plain))
         begins = not (goes_on and self.changes)
         if begins:
@@ -242,7 +242,7 @@ class Session:
         self._cells += cells_of(plain)
         self._episodes += "episode" in plain
         try:
-            one.apply(self.interventions)
+            intervention.apply(self.interventions)
         except AntsError:
             del self.edits[known[0] :], self.changes[known[1] :]
             self._cells, self._episodes = known[2:]
@@ -254,18 +254,18 @@ class Session:
 
         If snapshots take too much memory, drop the one whose neighbours are closest in time.
         """
-        kept = self._snapshots
-        is_near = kept and self._spent - kept[-1].spent < _BETWEEN
+        snapshots = self._snapshots
+        is_near = snapshots and self._spent - snapshots[-1].spent < _SNAPSHOT_INTERVAL
         if is_near or self.colony.nbytes > _LARGEST:
             return
         bare: Any = copy.copy(self)
         bare.setup, bare.edits, bare.changes, bare._snapshots = None, [], [], []
         content = zlib.compress(pickle.dumps(bare, pickle.HIGHEST_PROTOCOL), 1)
-        kept.append(_Snapshot(len(self.edits), self._spent, content))
-        while len(kept) > 1 and sum(len(one.content) for one in kept) > _MOST_KEPT:
-            spent = [0.0, *(one.spent for one in kept)]
+        snapshots.append(_Snapshot(len(self.edits), self._spent, content))
+        while len(snapshots) > 1 and sum(len(kept.content) for kept in snapshots) > _MOST_KEPT:
+            spent = [0.0, *(snapshot.spent for snapshot in snapshots)]
             gaps = [later - before for before, later in zip(spent, spent[2:], strict=False)]
-            del kept[gaps.index(min(gaps))]
+            del snapshots[gaps.index(min(gaps))]
 
     def values(self) -> dict[str, dict[str, Any]]:
         """Return the values that sliders can change, by name, see `edits.Value`."""
@@ -316,18 +316,18 @@ class Session:
     ) -> Iterator[Session]:
         """Advance to a number of steps and apply the edits, in short pieces."""
         for at, edit in edits:
-            yield from self._pieces(at)
+            yield from self._advance_to(at)
             self._do(edit)
             yield self
-        yield from self._pieces(steps)
+        yield from self._advance_to(steps)
         self.changes = list(changes)
         self._recorder.snapshot()
         yield self
 
     def same(self, other: Session) -> bool:
         """Return whether both sessions have the same setup, edits and state."""
-        one, two = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
-        return one == two and self.interventions.state() == other.interventions.state()
+        mine, others = ((it.steps, it.edits, it.setup.to_json()) for it in (self, other))
+        return mine == others and self.interventions.state() == other.interventions.state()
 
     def undone(self) -> Iterator[Session]:
         """Return an iterator like `replay` that ends before the last change; it uses a snapshot.
@@ -337,11 +337,11 @@ class Session:
         if not self.changes:
             raise AntsError("there is nothing to undo: this session has no interventions.")
         *changes, last = self.changes
-        kept = [one for one in self._snapshots if one.edits <= last]
-        if kept:
-            session = pickle.loads(zlib.decompress(kept[-1].content))
-            session.setup, session._snapshots = self.setup, kept
-            session.edits = self.edits[: kept[-1].edits]
+        snapshots = [snapshot for snapshot in self._snapshots if snapshot.edits <= last]
+        if snapshots:
+            session = pickle.loads(zlib.decompress(snapshots[-1].content))
+            session.setup, session._snapshots = self.setup, snapshots
+            session.edits = self.edits[: snapshots[-1].edits]
         else:
             session = Session(self.setup)
         steps, _ = self.edits[last]
@@ -357,28 +357,29 @@ class Session:
         every = max(1, -(-(log.steps + changes) // most))
         session = cls(log.setup)
         yield session, session.snapshot()
-        for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda one: one[0]):
+        for steps, edits_then in groupby([*log.edits, (log.steps, None)], lambda edit: edit[0]):
             while session.steps < steps:
                 if every == 1:
                     yield session, session.advance()
                     continue
-                for _ in session._pieces(min(steps, session.steps + every - session.steps % every)):
+                until = min(steps, session.steps + every - session.steps % every)
+                for _ in session._advance_to(until):
                     pass
                 if session.steps % every == 0:
                     yield session, session._recorder.snapshot()
-            wanted = [edit for _, edit in edits_then if edit is not None]
-            for edit in wanted:
+            edits_here = [edit for _, edit in edits_then if edit is not None]
+            for edit in edits_here:
                 session._do(edit)
-            if wanted if every == 1 else steps == log.steps:
+            if edits_here if every == 1 else steps == log.steps:
                 yield session, session._recorder.snapshot()
 
-    def _pieces(self, steps: int) -> Iterator[Session]:
-        """Advance to a number of steps, in pieces of about `_PIECE` seconds."""
+    def _advance_to(self, steps: int) -> Iterator[Session]:
+        """Advance to a number of steps, in pieces of about `_REPLAY_SLICE` seconds."""
         ticks = 1
         while self.steps < steps:
             began = time.perf_counter()
-            self._pass(min(ticks, steps - self.steps), self.colony.tick)
-            ticks = max(1, 2 * ticks if time.perf_counter() - began < _PIECE else ticks // 2)
+            self._run(min(ticks, steps - self.steps), self.colony.tick)
+            ticks = max(1, 2 * ticks if time.perf_counter() - began < _REPLAY_SLICE else ticks // 2)
             yield self
 
     def policy_bytes(self) -> bytes:
@@ -392,11 +393,11 @@ class Session:
             )
         if colony.n_nests > 1:
             table = table[0]  # all nests follow the same policy
-        told = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
+        metadata = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
         if learns:
-            told["training"] = colony.training.as_dict()
-        given = (table, told, colony.task.observation)
-        return bytes_of("policy.npz", lambda path: save_policy(path, *given))
+            metadata["training"] = colony.training.as_dict()
+        arguments = (table, metadata, colony.task.observation)
+        return bytes_of("policy.npz", lambda path: save_policy(path, *arguments))
 
     def colony_bytes(self) -> bytes:
         """Return the bytes of a file from which `Colony.load` resumes the colony.

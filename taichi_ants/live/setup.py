@@ -142,7 +142,7 @@ class Setup:
 
     def to_json(self) -> dict[str, Any]:
         """Return the setup, JSON-compatible; a table of action values becomes the word "table"."""
-        facts = {one.name: getattr(self, one.name) for one in fields(self)}
+        facts = {attribute.name: getattr(self, attribute.name) for attribute in fields(self)}
         policy = self.policy.as_dict() if isinstance(self.policy, TrainingConfig) else "table"
         settings = dict(self.world_settings)
         return {**facts, "task": self.task.as_dict(), "policy": policy, "world_settings": settings}
@@ -155,7 +155,7 @@ class Setup:
         """
         expect("a setup", facts, Mapping)
         assert isinstance(facts, Mapping)
-        known = [one.name for one in fields(cls)]
+        known = [attribute.name for attribute in fields(cls)]
         for name in facts.keys() - known:
             raise AntsError(
                 f"{shown(name)} is not a field of a setup; choose one of {', '.join(known)}."

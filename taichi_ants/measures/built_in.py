@@ -1,4 +1,4 @@
-"""The measures of the package of the state of a colony: one function each.
+"""The measures of the package of the state of a colony, of its counts, and of series.
 
 Measures of `counts` take numbers or arrays, so they also measure lone ants and finished runs.
 """
@@ -6,7 +6,7 @@ Measures of `counts` take numbers or arrays, so they also measure lone ants and 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,29 +14,17 @@ import numpy as np
 from taichi_ants.errors import AntsError
 from taichi_ants.measures.measure import COUNTS, Measure
 from taichi_ants.measures.paths import shortest_path
+from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import OBSTACLE
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.records import Snapshot
+    from taichi_ants.records import Snapshot
     from taichi_ants.task import Task
     from taichi_ants.worlds.world import World
 
 Counts = Mapping[str, Any]
-Function = Callable[..., Any]
-BUILT_IN: dict[str, Measure] = {}
-
-
-def _measure(unit: str, summary: str, of: str | None = None, **more: Any) -> Callable[..., Any]:
-    """Return a decorator that adds a function to `BUILT_IN`; the arguments are those of Measure."""
-
-    def add(function: Function) -> Function:
-        name = function.__name__
-        BUILT_IN[name] = Measure(name, function, unit, summary, of, **more)
-        return function
-
-    return add
 
 
 def ratio(part: Any, whole: Any) -> Any:
@@ -49,26 +37,17 @@ def share_of(which: np.ndarray) -> float:
     return int(np.count_nonzero(which)) / len(which) if len(which) else math.nan
 
 
-@_measure("food items", "deliveries since the start of the episode", COUNTS)
-def deliveries(counts: Counts) -> Any:
-    """Return the number of deliveries since the start of the episode."""
-    return counts["deliveries"]
-
-
-@_measure("food items", "deliveries since the last row of the series", "deliveries")
-def new_deliveries(values: np.ndarray, snapshot: Snapshot) -> float:
-    """Return the number of deliveries since the last row of the series; see `deliveries`."""
+def _new_deliveries(values: np.ndarray, snapshot: Snapshot) -> float:
     return values[-1] - values[-2] if len(values) > 1 else values[-1]
 
 
 def _owners(world: World, task: Task) -> tuple[str, ...]:
+    """Return the names of the parts of `deliveries_by`."""
     numbers = {"nest": len(world.queens), "food": len(task.foods), "caste": len(task.castes)}
     return tuple(f"{owner}_{i}" for owner, n in numbers.items() for i in range(max(n, 1)))
 
 
-@_measure("food items", "deliveries by nest, kind of food and caste", COUNTS, parts=_owners)
-def deliveries_by(counts: Counts) -> dict[str, Any]:
-    """Return the number of deliveries since the start of the episode by "nest_0", "food_0", ..."""
+def _deliveries_by(counts: Counts) -> dict[str, Any]:
     return {
         f"{owner}_{i}": number
         for owner in ("nest", "food", "caste")
@@ -76,7 +55,6 @@ def deliveries_by(counts: Counts) -> dict[str, Any]:
     }
 
 
-@_measure("ticks", "first passage time; if there is none, ticks so far", COUNTS)
 def first_delivery(counts: Counts) -> Any:
     """Return the first passage time: the ticks up to the first delivery of the episode.
 
@@ -87,36 +65,19 @@ def first_delivery(counts: Counts) -> Any:
     return np.where(np.asarray(first) < 0, counts["ticks"], first)
 
 
-@_measure("per ant and tick", "deliveries per living ant and tick", COUNTS)
-def efficiency(counts: Counts) -> Any:
-    """Return the deliveries of the episode per tick and ant that lives now; nan without any."""
-    return ratio(counts["deliveries"], counts["ticks"] * counts["living"])
-
-
-@_measure("ticks", "mean ticks with food of a delivered load", COUNTS)
 def path_length(counts: Counts) -> Any:
     """Return the mean ticks from pick-up to delivery, of all loads delivered in the episode.
 
     An ant that walks straight to the queen from a pick-up k moves away from her needs k + 1 ticks.
-    The value is nan before the first delivery.
     """
     return ratio(counts["carried"], counts["deliveries"])
 
 
-@_measure("", "path length divided by that of the shortest path")
-def path_ratio(snapshot: Snapshot) -> float:
-    """Return `path_length` divided by the fewest ticks that a load of this world needs, at least 1.
-
-    The fewest ticks are those of `shortest_path`. The value is nan before the first delivery.
-    """
+def _path_ratio(snapshot: Snapshot) -> float:
     shortest = math.nan if snapshot.world is None else shortest_path(snapshot.world)
     return path_length(snapshot.counts) / shortest
 
 
-@_measure(
-    *("", "entropy of each pheromone field, 0 (one cell) to 1 (equal levels)"),
-    parts=lambda world, task: (TRAIL, *task.fields),
-)
 def entropy(snapshot: Snapshot) -> dict[str, float]:
     """Return the normalised entropy of the levels of each pheromone field, by its name.
 
@@ -148,23 +109,12 @@ def _evenness(levels: np.ndarray) -> float:
     return max(0.0, -summed / math.log(len(levels)))
 
 
-@_measure("", "share of the moves that failed", COUNTS)
-def blocked_share(counts: Counts) -> Any:
-    """Return the share of the moves of the episode that failed; nan before the first move."""
-    return ratio(counts["blocked"], counts["moves"])
-
-
-@_measure("", "share of the ants that moved in the last tick")
 def activity(snapshot: Snapshot) -> float:
-    """Return the share of the ants that entered a cell by their own move in the last tick.
-
-    Ants that were pushed do not count. The value is nan without ants.
-    """
+    """Return the share of the ants that entered a cell by their own move in the last tick."""
     events = snapshot.ant_events
     return share_of((events == Event.ENTERED_EMPTY) | (events == Event.ENTERED_CUE))
 
 
-@_measure("", "variance of the activity, relative to independent ants", "activity")
 def synchrony(values: np.ndarray, snapshot: Snapshot) -> float:
     """Return how much more the `activity` varies over time than that of independent ants.
 
@@ -188,33 +138,7 @@ def synchrony(values: np.ndarray, snapshot: Snapshot) -> float:
     return n * variance / (mean * (1 - mean))
 
 
-@_measure("ants", "number of living ants", COUNTS)
-def living(counts: Counts) -> Any:
-    """Return the number of living ants."""
-    return counts["living"]
-
-
-@_measure("ants", "births that wait for a free cell or slot", COUNTS)
-def waiting_births(counts: Counts) -> Any:
-    """Return the number of food items that wait at the queens to become ants."""
-    return counts["waiting_births"]
-
-
-@_measure("", "share of the ants that carry food")
-def carriers(snapshot: Snapshot) -> float:
-    """Return the share of the living ants that carry food; nan without ants."""
-    return share_of(snapshot.ant_carries)
-
-
-@_measure("", "share of the ants that forage, which are not idle")
-def foraging(snapshot: Snapshot) -> float:
-    """Return the share of the living ants that are not idle; nan without ants."""
-    return share_of(~snapshot.ant_idle)
-
-
-@_measure("steps", "mean distance of the ants to the nearest queen")
-def distance(snapshot: Snapshot) -> float:
-    """Return the mean distance of the ants to the nearest queen in steps; nan without ants."""
+def _distance(snapshot: Snapshot) -> float:
     if not len(snapshot.ant_cells):
         return math.nan
     return int(snapshot.distances[snapshot.ant_cells].sum(dtype=np.int64)) / len(snapshot.ant_cells)
@@ -230,28 +154,50 @@ def regions_of(world: World | None) -> Mapping[str, np.ndarray]:
     return world.regions
 
 
-@_measure(
-    *("", "share of the ants in each region of the world"),
-    parts=lambda world, task: tuple(regions_of(world)),
-)
-def regions(snapshot: Snapshot) -> dict[str, float]:
-    """Return the share of the living ants in each region of the world, by its name.
-
-    The shares refer to the living ants on any cell, and are nan without ants. AntsError if the
-    world has no regions.
-    """
-    return shares_in(regions_of(snapshot.world), snapshot)
-
-
-def shares_in(cells_of: Mapping[str, np.ndarray], snapshot: Snapshot) -> dict[str, float]:
-    """Return the share of the living ants in each region, whose cells are given by its name."""
+def _regions(snapshot: Snapshot) -> dict[str, float]:
     return {
         name: share_of(np.isin(snapshot.ant_cells, snapshot.grid.index(cells)))
-        for name, cells in cells_of.items()
+        for name, cells in regions_of(snapshot.world).items()
     }
 
 
-@_measure("ants", "number of ants on each cell (an array)", is_array=True)
-def occupancy(snapshot: Snapshot) -> np.ndarray:
-    """Return the number of ants on each cell, int32 (grid.size,)."""
+def _occupancy(snapshot: Snapshot) -> np.ndarray:
     return np.bincount(snapshot.ant_cells, minlength=snapshot.grid.size).astype(np.int32)
+
+
+_LISTED = (
+    Measure("deliveries", lambda c: c["deliveries"], "food items",
+            "deliveries since the start of the episode", COUNTS),
+    Measure("new_deliveries", _new_deliveries, "food items",
+            "deliveries since the last row of the series", "deliveries"),
+    Measure("deliveries_by", _deliveries_by, "food items",
+            "deliveries by nest, kind of food and caste", COUNTS, parts=_owners),
+    Measure("first_delivery", first_delivery, "ticks",
+            "first passage time; if there is none, ticks so far", COUNTS),
+    Measure("efficiency", lambda c: ratio(c["deliveries"], c["ticks"] * c["living"]),
+            "per ant and tick", "deliveries per living ant and tick", COUNTS),
+    Measure("path_length", path_length, "ticks", "mean ticks with food of a delivered load",
+            COUNTS),
+    Measure("path_ratio", _path_ratio, "", "path length divided by that of the shortest path"),
+    Measure("entropy", entropy, "",
+            "entropy of each pheromone field, 0 (one cell) to 1 (equal levels)",
+            parts=lambda world, task: (TRAIL, *task.fields)),
+    Measure("blocked_share", lambda c: ratio(c["blocked"], c["moves"]), "",
+            "share of the moves that failed", COUNTS),
+    Measure("activity", activity, "", "share of the ants that moved in the last tick"),
+    Measure("synchrony", synchrony, "", "variance of the activity, relative to independent ants",
+            "activity"),
+    Measure("living", lambda c: c["living"], "ants", "number of living ants", COUNTS),
+    Measure("waiting_births", lambda c: c["waiting_births"], "ants",
+            "births that wait for a free cell or slot", COUNTS),
+    Measure("carriers", lambda s: share_of(s.ant_carries), "",
+            "share of the ants that carry food"),
+    Measure("foraging", lambda s: share_of(~s.ant_idle), "",
+            "share of the ants that forage, which are not idle"),
+    Measure("distance", _distance, "steps", "mean distance of the ants to the nearest queen"),
+    Measure("regions", _regions, "", "share of the ants in each region of the world",
+            parts=lambda world, task: tuple(regions_of(world))),
+    Measure("occupancy", _occupancy, "ants", "number of ants on each cell (an array)",
+            is_array=True),
+)  # fmt: skip
+BUILT_IN: dict[str, Measure] = {measure.name: measure for measure in _LISTED}

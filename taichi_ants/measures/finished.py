@@ -1,17 +1,17 @@
 """Measures of finished runs: one number for each run, before any statistics.
 
 A run of kind "runs" is the training of a lone ant with the greedy rollouts of its final policy. One
-of kind "colony" is the evaluation of a colony. For lone ants, each measure of counts has a measure
-of the episodes in each window, their fluctuation, and a measure of the greedy rollouts. If a run
-has fewer than 50 episodes, "last 50" means all of them. Measures of the first or second 50 episodes
-need 100 episodes, so that early and late measures never share an episode.
+of kind "colony" is the evaluation of a colony. For lone ants, each measure of counts has measures
+of the episodes in each window and of the greedy rollouts. If a run has fewer than 50 episodes,
+"last 50" means all of them. Measures of the first or second 50 episodes need 100 episodes, so that
+early and late measures never share an episode.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -23,7 +23,6 @@ from taichi_ants.measures.measure import COUNTS, RUN, Measure
 from taichi_ants.measures.registry import MEASURES, get
 
 WINDOW = 50
-RESULTS = ("returns", "steps", "deliveries")  # of an episode of a lone ant
 # Windows of episodes: slice, words, fewest episodes of a run.
 _WINDOWS = {
     "first50": (slice(0, WINDOW), "the first 50 episodes", 2 * WINDOW),
@@ -31,6 +30,7 @@ _WINDOWS = {
     "last50": (slice(-WINDOW, None), "the last 50 episodes", 1),
     "all": (slice(None), "all episodes", 1),
 }
+_COLONY_COUNTS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 # The outcome of a `RunPoint` or a `ColonyPoint`: arrays (..., episodes or rollouts) by name.
 Outcome = Mapping[str, np.ndarray]
 Counts = Mapping[str, Any]
@@ -62,41 +62,33 @@ class Run:
     @classmethod
     def of_colony(cls, outcome: Outcome, ants: int, ticks: int) -> Run:
         """Return the runs of an outcome of a `ColonyPoint`."""
-        counts = {name: array for name, array in outcome.items() if name in _COLONY_COUNTS}
+        counts = {name: outcome[name] for name in _COLONY_COUNTS}
         counts["ticks"] = np.broadcast_to(np.int32(ticks), outcome["deliveries"].shape)
         return cls({}, counts, ants, ticks)
-
-
-_COLONY_COUNTS = ("deliveries", "first_delivery", "moves", "blocked", "returns")
 
 
 def counts_of_lone_ant(outcome: Outcome, before: str = "") -> Counts:
     """Return the counts of the episodes of lone ants from their returns, steps and deliveries."""
     steps, deliveries = outcome[f"{before}steps"], outcome[f"{before}deliveries"]
-    return {
-        "returns": outcome[f"{before}returns"],
-        "ticks": steps,
-        "deliveries": deliveries,
-        # An episode ends at its first delivery, or without one.
-        "first_delivery": np.where(deliveries > 0, steps, np.int32(-1)),
-        "living": 1,
-    }
+    # An episode ends at its first delivery, or without one.
+    first = np.where(deliveries > 0, steps, np.int32(-1))
+    counts = {"returns": outcome[f"{before}returns"], "ticks": steps, "deliveries": deliveries}
+    return {**counts, "first_delivery": first, "living": 1}
 
 
-def computed(measure: Measure, counts: Counts) -> np.ndarray:
+def of_episodes(measure: Measure, counts: Counts) -> np.ndarray:
     """Return a measure of counts of the episodes of lone ants, an array (..., episodes).
 
     Raises:
         AntsError: The measure reads a count that lone ants do not have, or does not work on arrays.
     """
     try:
-        values = np.asarray(measure.function(counts))
+        return np.broadcast_to(measure.function(counts), np.shape(counts["ticks"]))
     except Exception as error:
         raise AntsError(
             f"the measure {measure.name!r} failed with {type(error).__name__}: {error}; a measure "
             f"of lone ants must compute with arrays of the counts {', '.join(counts)}."
         ) from error
-    return np.broadcast_to(values, np.shape(counts["ticks"]))
 
 
 def of_lone_ants(counts: Counts) -> dict[str, np.ndarray]:
@@ -105,40 +97,34 @@ def of_lone_ants(counts: Counts) -> dict[str, np.ndarray]:
     values = {}
     for measure in (get("first_delivery"), get("efficiency"), *yours):
         with suppress(AntsError):  # it reads counts of colonies
-            values[measure.name] = computed(measure, counts)
+            values[measure.name] = of_episodes(measure, counts)
     return values
 
 
-def _mean(quantity: Measure, of: str, episodes: slice, run: Run) -> np.ndarray:
-    return computed(quantity, getattr(run, of))[..., episodes].mean(axis=-1, dtype=float)
+def _mean(measure: Measure, of: str, episodes: slice, run: Run) -> np.ndarray:
+    return of_episodes(measure, getattr(run, of))[..., episodes].mean(axis=-1, dtype=float)
 
 
-def _fluctuation(quantity: Measure, episodes: slice, run: Run) -> np.ndarray:
+def _fluctuation(measure: Measure, episodes: slice, run: Run) -> np.ndarray:
     """Return the root mean square change between successive episodes, divided by sqrt(2).
 
     For independent episodes this is their standard deviation; a slow trend hardly changes it.
     """
-    changes = np.diff(computed(quantity, run.training)[..., episodes].astype(float))
+    changes = np.diff(of_episodes(measure, run.training)[..., episodes].astype(float))
     return np.sqrt(np.einsum("...i,...i", changes, changes) / changes.shape[-1] / 2)
 
 
-def _windows(quantity: Measure) -> Iterator[tuple[str, Measure]]:
-    """Yield the measures of runs of lone ants for a measure of counts, with their names."""
-    name, words = quantity.name, quantity.summary
-    of_run = partial(Measure, unit=quantity.unit, of=RUN)
+def _windows(measure: Measure, words: str) -> Iterator[Measure]:
+    """Yield the measures of runs of lone ants for a measure of counts."""
+    name, unit, of_run = measure.name, measure.unit, partial(Measure, of=RUN)
     for window, (episodes, when, least) in _WINDOWS.items():
-        mean = partial(_mean, quantity, "training", episodes)
-        yield (
-            f"{name}_{window}",
-            of_run(*(f"{name}_{window}", mean), summary=f"mean {words} of {when}", episodes=least),
-        )
-        fluctuation = partial(_fluctuation, quantity, episodes)
-        text = f"fluctuation of the {words} from episode to episode in {when}"
-        full = f"{name}_fluctuation_{window}"
-        yield full, of_run(full, fluctuation, summary=text, episodes=max(2, least))
-    mean = partial(_mean, quantity, "evaluation", slice(None))
-    text = f"mean {words} of the greedy rollouts"
-    yield f"greedy_{name}", of_run(f"greedy_{name}", mean, summary=text)
+        mean = partial(_mean, measure, "training", episodes)
+        yield of_run(f"{name}_{window}", mean, unit, f"mean {words} of {when}", episodes=least)
+        changes = f"fluctuation of the {words} from episode to episode in {when}"
+        full, of_window = f"{name}_fluctuation_{window}", partial(_fluctuation, measure, episodes)
+        yield of_run(full, of_window, unit, changes, episodes=max(2, least))
+    mean = partial(_mean, measure, "evaluation", slice(None))
+    yield of_run(f"greedy_{name}", mean, unit, f"mean {words} of the greedy rollouts")
 
 
 def _repeats(run: Run) -> np.ndarray:
@@ -162,47 +148,41 @@ def _blocked(run: Run) -> np.ndarray:
     return run.evaluation["blocked"].sum(axis=-1) / np.where(moves > 0, moves, np.nan)
 
 
-def _named(listed: Iterable[tuple[str, Callable[[Run], Any], str, str, int]]) -> dict[str, Measure]:
-    """Return measures of finished runs by name."""
-    return {
-        name: Measure(name, function, unit, summary, RUN, episodes=episodes)
-        for name, function, unit, summary, episodes in listed
-    }
+def _measure(
+    name: str, function: Callable[[Run], Any], summary: str, unit: str = "", episodes: int = 0
+) -> Measure:
+    return Measure(name, function, unit, summary, RUN, episodes=episodes)
 
 
-_SHARE = "share of runs"
-# The counts of lone ants that `compare` measures.
-_QUANTITIES = (
-    Measure("return", lambda counts: counts["returns"], "reward", "return"),
-    Measure("steps", lambda counts: counts["ticks"], "steps", "length"),
-    Measure(
-        *("deliveries", lambda counts: counts["deliveries"]),
-        *("deliveries per episode", "deliveries"),
+_LONE = (
+    *_windows(Measure("return", lambda counts: counts["returns"], "reward"), "return"),
+    *_windows(Measure("steps", lambda counts: counts["ticks"], "steps"), "length"),
+    *_windows(
+        Measure("deliveries", lambda counts: counts["deliveries"], "deliveries per episode"),
+        "deliveries",
     ),
-)
-LONE: dict[str, Measure] = {
-    **{name: measure for quantity in _QUANTITIES for name, measure in _windows(quantity)},
-    **_named([
-        ("shortest_episode", lambda run: run.training["ticks"].min(axis=-1).astype(float), "steps",
-         "length of the shortest training episode", 1),
-        ("improved", _improved, _SHARE,
-         "whether the last 50 episodes return more than the first 50", 2 * WINDOW),
-        ("greedy_repeats", _repeats, _SHARE,
-         "whether all greedy rollouts of a run are equal in return and length", 0),
-    ]),
-}  # fmt: skip
-COLONY: dict[str, Measure] = _named([
-    ("deliveries", partial(_per_1000_ticks, "deliveries"), "", "deliveries per 1000 ticks", 0),
-    ("per_ant", lambda run: _per_1000_ticks("deliveries", run) / run.ants, "",
-     "deliveries per ant and 1000 ticks", 0),
-    ("first_delivery", lambda run: first_delivery(run.evaluation).mean(axis=-1), "",
-     "ticks to the first delivery", 0),
-    ("no_delivery_rate", lambda run: (run.evaluation["first_delivery"] < 0).mean(axis=-1), "",
-     "share of episodes without a delivery", 0),
-    ("blocked", _blocked, "", "share of blocked moves", 0),
-    ("reward", lambda run: _per_1000_ticks("returns", run) / run.ants, "",
-     "reward per ant and 1000 ticks", 0),
-])  # fmt: skip
+    _measure("shortest_episode", lambda run: run.training["ticks"].min(axis=-1).astype(float),
+             "length of the shortest training episode", "steps", 1),
+    _measure("improved", _improved, "whether the last 50 episodes return more than the first 50",
+             "share of runs", 2 * WINDOW),
+    _measure("greedy_repeats", _repeats,
+             "whether all greedy rollouts of a run are equal in return and length",
+             "share of runs"),
+)  # fmt: skip
+_COLONY = (
+    _measure("deliveries", partial(_per_1000_ticks, "deliveries"), "deliveries per 1000 ticks"),
+    _measure("per_ant", lambda run: _per_1000_ticks("deliveries", run) / run.ants,
+             "deliveries per ant and 1000 ticks"),
+    _measure("first_delivery", lambda run: first_delivery(run.evaluation).mean(axis=-1),
+             "ticks to the first delivery"),
+    _measure("no_delivery_rate", lambda run: (run.evaluation["first_delivery"] < 0).mean(axis=-1),
+             "share of episodes without a delivery"),
+    _measure("blocked", _blocked, "share of blocked moves"),
+    _measure("reward", lambda run: _per_1000_ticks("returns", run) / run.ants,
+             "reward per ant and 1000 ticks"),
+)  # fmt: skip
+LONE = {measure.name: measure for measure in _LONE}
+COLONY = {measure.name: measure for measure in _COLONY}
 FINISHED = {"runs": LONE, "colony": COLONY}
 
 
@@ -210,38 +190,33 @@ def of_runs(kind: str, name: str) -> Measure:
     """Return the measure of finished runs of a kind with this name.
 
     For colonies, also a measure of a state or of a series, whose value is the mean of those at the
-    ends of rollouts.
-
-    Raises:
-        AntsError: There is no such measure; the message lists all names.
+    ends of rollouts. Raises AntsError, with a list of all names, if there is none.
     """
-    if isinstance(name, str):
-        if name in FINISHED[kind]:
-            return FINISHED[kind][name]
-        if name.partition(".")[0] in registered(kind):
-            return get(name)
-        for quantity in map(get, MEASURES.names() if kind == "runs" else ()):
-            windows = dict(_windows(replace(quantity, summary=quantity.name.replace("_", " "))))
-            if quantity.of == COUNTS and name in windows:
-                computed(quantity, counts_of_lone_ant(dict.fromkeys(RESULTS, np.ones(1, int))))
-                return windows[name]
+    if isinstance(name, str) and name in FINISHED[kind]:
+        return FINISHED[kind][name]
+    if isinstance(name, str) and name.partition(".")[0] in _registered(kind):
+        return get(name)
+    for measure in map(get, MEASURES.names()):
+        windows = _windows(measure, measure.name.replace("_", " "))
+        found = next((window for window in windows if window.name == name), None)
+        if kind == "runs" and measure.of == COUNTS and found:
+            episode = dict.fromkeys(("returns", "steps", "deliveries"), np.ones(1, int))
+            of_episodes(measure, counts_of_lone_ant(episode))  # raises an error if it cannot
+            return found
     raise AntsError(f"measures is {shown(name)}; it must be one of {names_of(kind)}.")
 
 
-def registered(kind: str) -> set[str]:
-    """Return the names of registered measures that finished runs of this kind can have as such."""
-    return {
-        name
-        for name in MEASURES.names()
-        if get(name).of == RUN or (kind == "colony" and not get(name).is_array)
-    }
+def _registered(kind: str) -> set[str]:
+    """Return the names of registered measures that are measures of runs of a kind as they are."""
+    is_state = kind == "colony"
+    every = {name: get(name) for name in MEASURES.names()}
+    return {name for name, m in every.items() if m.of == RUN or (is_state and not m.is_array)}
 
 
 def names_of(kind: str) -> str:
     """Return the names of all measures of finished runs of this kind, for a message."""
-    yours = registered(kind) - FINISHED[kind].keys()
     more = ", or the name of a measure of a plugin (--plugin FILE)" if kind == "colony" else ""
-    return ", ".join([*FINISHED[kind], *sorted(yours)]) + more
+    return ", ".join([*FINISHED[kind], *sorted(_registered(kind) - FINISHED[kind].keys())]) + more
 
 
 def values_of(run: Run, names: Iterable[str] | None = None) -> dict[str, np.ndarray]:
@@ -249,12 +224,10 @@ def values_of(run: Run, names: Iterable[str] | None = None) -> dict[str, np.ndar
 
     If the runs have fewer episodes of training than a measure needs, it is nan.
     """
-    kind = "runs" if run.ticks is None else "colony"
+    kind, runs = "runs" if run.ticks is None else "colony", run.evaluation["returns"].shape[:-1]
     episodes = run.training["returns"].shape[-1] if run.training else 0
-    measures = {name: of_runs(kind, name) for name in names or FINISHED[kind]}
+    measures = [of_runs(kind, name) for name in names or FINISHED[kind]]
     return {
-        name: measure.computed(run)
-        if episodes >= measure.episodes
-        else np.full(run.evaluation["returns"].shape[:-1], np.nan)
-        for name, measure in measures.items()
+        m.name: m.computed(run) if episodes >= m.episodes else np.full(runs, np.nan)
+        for m in measures
     }

@@ -92,14 +92,14 @@ class Measure:
                 f"the measure {self.name!r} is an array of shape {value.shape}; choose one that "
                 "gives a number."
             )
-        if not isinstance(value, Mapping):
-            return value
-        if len(value) != 1:
-            parts = ", ".join(f"{self.name}.{part}" for part in value)
-            raise AntsError(
-                f"the measure {self.name!r} has {len(value)} parts; name one of {parts}."
-            )
-        return next(iter(value.values()))
+        if isinstance(value, Mapping):
+            if len(value) != 1:
+                parts = ", ".join(f"{self.name}.{part}" for part in value)
+                raise AntsError(
+                    f"the measure {self.name!r} has {len(value)} parts; name one of {parts}."
+                )
+            (value,) = value.values()
+        return value
 
     def read(self, snapshot: Any, values: np.ndarray | None = None) -> Value:
         """Return the value in a state: a float, floats by part, or an array.
@@ -109,10 +109,8 @@ class Measure:
         Raises:
             AntsError: The function fails or returns something else, or the part does not exist.
         """
-        if self.of == COUNTS:
-            value = self.computed(snapshot.counts)
-        else:
-            value = self.computed(*([] if self.of is None else [values]), snapshot)
+        arguments = {None: [snapshot], COUNTS: [snapshot.counts]}.get(self.of, [values, snapshot])
+        value = self.computed(*arguments)
         if isinstance(value, Mapping):
             if not self.part:
                 return {str(part): self._number(number) for part, number in value.items()}
@@ -147,15 +145,9 @@ class Measure:
             value = value[()]
         if value is None:
             return math.nan
-        if not isinstance(value, (Real, np.bool_)):
+        if not isinstance(value, (Real, np.bool_)) or math.isinf(value):
             raise AntsError(
-                f"the measure {self.name!r} returned {shown(value)}; it must return a number, "
-                "numbers by the names of parts, or an array."
+                f"the measure {self.name!r} returned {shown(value)}; it must return a finite "
+                "number, nan if it has no value, numbers by the names of parts, or an array."
             )
-        number = float(value)
-        if math.isinf(number):
-            raise AntsError(
-                f"the measure {self.name!r} returned {number}; it must return a finite number, or "
-                "nan if it has no value."
-            )
-        return number
+        return float(value)

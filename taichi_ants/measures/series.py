@@ -12,6 +12,7 @@ import numpy as np
 from taichi_ants.errors import AntsError, checked_whole, entries_of, shown
 from taichi_ants.measures.measure import RUN, Measure, Value
 from taichi_ants.measures.registry import get
+from taichi_ants.records import Record, Snapshot
 
 
 class Colony(Protocol):
@@ -20,11 +21,11 @@ class Colony(Protocol):
     @property
     def episode_ticks(self) -> np.ndarray: ...
 
-    def snapshot(self, world: int) -> Any: ...
+    def snapshot(self, world: int) -> Snapshot: ...
 
 
-@dataclass(frozen=True, eq=False)
-class Series:
+@dataclass(frozen=True, eq=False, repr=False)
+class Series(Record):
     """The values of measures in R rows, each for one world at one tick of an episode.
 
     Attributes:
@@ -45,21 +46,6 @@ class Series:
 
     def __len__(self) -> int:
         return len(self.ticks)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Series):
-            return NotImplemented
-        ours, theirs = self._arrays(), other._arrays()
-        return ours.keys() == theirs.keys() and all(
-            np.array_equal(array, theirs[name], equal_nan=array.dtype.kind == "f")
-            for name, array in ours.items()
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def _arrays(self) -> dict[str, np.ndarray]:
-        indices = {"world": self.worlds, "episode": self.episodes, "tick": self.ticks}
-        return indices | {f".{n}": array for n, array in (*self.values.items(), *self.maps.items())}
 
     def __repr__(self) -> str:
         return f"Series({len(self)} rows of {', '.join([*self.values, *self.maps])})"

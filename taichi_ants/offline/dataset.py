@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.arguments import checked_seeds, checked_share
-from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, as_array, checked_whole, expect
 from taichi_ants.files import PathLike, smallest
 from taichi_ants.files.archives import Kind
+from taichi_ants.records import Record
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 from taichi_ants.worlds.world import World
@@ -128,11 +128,11 @@ class Dataset(Record):
         """Return the first transitions or episodes of each run; a cut episode is truncated."""
         keep = np.ones(len(self), bool)
         # The first row of each row's run.
-        where = np.searchsorted(self.run, np.arange(len(self.seeds)))[self.run]
+        first = np.searchsorted(self.run, np.arange(len(self.seeds)))[self.run]
         if transitions is not None:
-            keep &= np.arange(len(self)) - where < checked_whole("transitions", transitions)
+            keep &= np.arange(len(self)) - first < checked_whole("transitions", transitions)
         if episodes is not None:
-            keep &= self.episode - self.episode[where] < checked_whole("episodes", episodes)
+            keep &= self.episode - self.episode[first] < checked_whole("episodes", episodes)
         return self._take(keep)
 
     def of_run(self, run: int) -> Dataset:

@@ -14,12 +14,12 @@ import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.analysis.statistics import resampling_counts
-from taichi_ants.engines.records import Record
 from taichi_ants.errors import AntsError, expect
 from taichi_ants.learners.config import InitialValue
 from taichi_ants.learners.policies import action_probabilities, checked_values
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.offline.learners import Discount, EmpiricalModel
+from taichi_ants.records import Record
 from taichi_ants.settings import Flag, Setting, Share, checked_arguments
 
 Resamples = Annotated[int, Setting(least=0, most=100_000)]

@@ -88,9 +88,9 @@ def iterate(
                 for k in range(successors_begin[pair], successors_begin[pair + 1]):
                     later += probabilities[k] * values[base + successors[k]]
                 backed_up = ti.max(rewards[pair] + discount * later, lowest)
-                place = base * N_ACTIONS + pairs[pair]
-                change = ti.max(change, ti.abs(backed_up - q[place]))
-                q[place] = backed_up
+                entry = base * N_ACTIONS + pairs[pair]
+                change = ti.max(change, ti.abs(backed_up - q[entry]))
+                q[entry] = backed_up
 
 
 @ti.kernel

@@ -148,14 +148,14 @@ class EmpiricalModel:
         n_states = data.task.n_states
         pair = data.state.astype(np.int64) * N_ACTIONS + data.action
         pairs, successors, _, _, triple = _tally(data, pair)
-        several = []
+        models = []
         for number, of_episode in enumerate(times):
             rows = of_episode[data.episode].astype(np.float64)  # sums of integers stay exact
             counts = np.bincount(triple, rows, len(pairs))
             rewards, there = np.bincount(triple, rows * data.reward, len(pairs)), counts > 0
             moved = pairs + number * n_states * N_ACTIONS
-            several.append([one[there] for one in (moved, successors, counts, rewards)])
-        return cls._counted(data, len(times), *map(np.concatenate, zip(*several, strict=True)))
+            models.append([array[there] for array in (moved, successors, counts, rewards)])
+        return cls._counted(data, len(times), *map(np.concatenate, zip(*models, strict=True)))
 
     @classmethod
     def _counted(
@@ -225,9 +225,9 @@ def _tally(data: Dataset, pair: np.ndarray) -> tuple[np.ndarray, ...]:
     """
     ends = data.task.n_states
     key = pair * (ends + 1) + np.where(data.terminated, ends, data.next_state)
-    keys, which = np.unique(key, return_inverse=True)
-    counts, rewards = np.bincount(which), np.bincount(which, data.reward)
-    return keys // (ends + 1), keys % (ends + 1), counts, rewards, which
+    keys, group = np.unique(key, return_inverse=True)
+    counts, rewards = np.bincount(group), np.bincount(group, data.reward)
+    return keys // (ends + 1), keys % (ends + 1), counts, rewards, group
 
 
 def tolerance(largest: float, discount: float, initial_q: float) -> float:

@@ -68,7 +68,7 @@ def record(
     facts: dict[str, Any]
     if isinstance(behaviour, TrainingConfig):
         configs = arguments.checked_configs(behaviour, task)
-        state = RunState.fresh(configs, numbers, task.n_states).part([0])
+        state = RunState.initial(configs, numbers, task.n_states).part([0])
         runs = Runs.learning(configs, numbers, state)
         facts = {"policy": "learner", **configs[0].as_dict()}
     else:
@@ -88,15 +88,15 @@ def record(
     pieces = []
     for columns, chances, run in record_steps(world, task, max_steps, runs, episodes, progress):
         piece = {name: columns[there] for name, there in _FROM_TRACE.items()}
-        more = {"run": run, "behaviour_probability": chances, "agent": np.zeros_like(run)}
-        pieces.append(_typed({**piece, **more}))
+        constants = {"run": run, "behaviour_probability": chances, "agent": np.zeros_like(run)}
+        pieces.append(_typed({**piece, **constants}))
     return _dataset(pieces, world=world, task=task, seeds=numbers, behaviour=facts)
 
 
 def _typed(piece: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Convert columns to their types, except `truncated`, which follows from the others."""
-    given = {name: dtype for name, dtype in COLUMNS.items() if name != "truncated"}
-    return {name: piece[name].astype(dtype) for name, dtype in given.items()}
+    columns = {name: dtype for name, dtype in COLUMNS.items() if name != "truncated"}
+    return {name: piece[name].astype(dtype) for name, dtype in columns.items()}
 
 
 def record_colony(
@@ -181,9 +181,9 @@ def _dataset(pieces: list[dict[str, np.ndarray]], **known: Any) -> Dataset:
     # Episodes are in the order in which they began.
     begins = order[np.append(0, np.flatnonzero(last)[:-1] + 1)]
     by_age = np.lexsort([rows[name][begins] for name in ("agent", "step", "episode", "run")])
-    place = np.argsort(by_age)[number]
-    of_place = np.argsort(place, kind="stable")
-    rows = {name: array[order[of_place]] for name, array in rows.items()}
-    rows["episode"] = place[of_place].astype(np.int32)
-    last = last[of_place]
+    rank = np.argsort(by_age)[number]
+    sorted_by_rank = np.argsort(rank, kind="stable")
+    rows = {name: array[order[sorted_by_rank]] for name, array in rows.items()}
+    rows["episode"] = rank[sorted_by_rank].astype(np.int32)
+    last = last[sorted_by_rank]
     return Dataset(**known, **rows, truncated=last & ~rows["terminated"])

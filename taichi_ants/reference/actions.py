@@ -40,7 +40,7 @@ PAID = {
 
 @dataclass(frozen=True, slots=True)
 class Intent:
-    """An ant's action, 0 to 4, and its effect if the ant prevails.
+    """An ant's action, 0 to 4, and its effect if the ant wins.
 
     Attributes:
         heading: The heading of a move or a pick-up, towards its target.
@@ -124,17 +124,19 @@ def resolve_moves(
 
     def moves(intent: Intent) -> bool:
         """Return whether an ant enters its target, which is empty or which another ant leaves."""
-        one = intent
-        while one.enters and one.ant.slot in winning:
-            ahead = standing.get(one.target)
+        mover = intent
+        while mover.enters and mover.ant.slot in winning:
+            ahead = standing.get(mover.target)
             if ahead is None:
                 return True
             if not traffic.follow or ahead is intent:
                 return False
-            one = ahead
+            mover = ahead
         return False
 
-    entered = {one.ant.slot: one.target for one in intents if one.target and moves(one)}
+    entered = {
+        intent.ant.slot: intent.target for intent in intents if intent.target and moves(intent)
+    }
     pushed: dict[int, Cell] = {}
     for intent in intents:
         ant = intent.ant

@@ -25,12 +25,12 @@ def shares_of(castes: Sequence[Caste], nest: int) -> list[float | None]:
 
     Castes with neither divide the remaining share equally.
     """
-    here = [caste for caste in castes if caste.nest is None or caste.nest == nest]
-    taken = sum([caste.share for caste in here if caste.share is not None])
-    neither = [caste for caste in here if caste.share is None and caste.ants is None]
+    of_nest = [caste for caste in castes if caste.nest is None or caste.nest == nest]
+    taken = sum([caste.share for caste in of_nest if caste.share is not None])
+    neither = [caste for caste in of_nest if caste.share is None and caste.ants is None]
     shares: list[float | None] = []
     for caste in castes:
-        if not any(caste is one for one in here) or caste.ants is not None:
+        if not any(caste is other for other in of_nest) or caste.ants is not None:
             shares.append(None)
         elif caste.share is not None:
             shares.append(caste.share)
@@ -56,8 +56,8 @@ def castes_at_start(castes: Sequence[Caste], nest: int, n: int) -> list[int]:
     quotas = [round(share * rest, 9) if share is not None else 0.0 for share in shares]
     numbers = [fixed + int(quota) for fixed, quota in zip(numbers, quotas, strict=True)]
     while sum(numbers) < n:
-        left = [quota - int(quota) for quota in quotas]
-        largest = left.index(max(left))
+        remainders = [quota - int(quota) for quota in quotas]
+        largest = remainders.index(max(remainders))
         numbers[largest] += 1
         quotas[largest] = 0.0
     return [caste for caste, number in enumerate(numbers) for _ in range(number)]
@@ -110,10 +110,10 @@ def draw_trait(seed: int, number: int) -> float:
     return high / _WORDS
 
 
-def epsilon_of(caste: Caste, ant: Ant, usual: float) -> float:
+def epsilon_of(caste: Caste, ant: Ant, default: float) -> float:
     """Return the exploration rate of an ant, whose caste can have another one than `usual`."""
     if caste.epsilon is None:
-        return usual
+        return default
     if not caste.epsilon_spread:
         return caste.epsilon
     return caste.epsilon + caste.epsilon_spread * (2.0 * ant.trait - 1.0)
@@ -145,5 +145,5 @@ def lays(task: Task, ant: Ant, name: str) -> bool:
     if not task.castes:
         return True
     caste = list(task.castes.values())[ant.caste]
-    names = [one.strip() for one in caste.lays.split(",")]
+    names = [name.strip() for name in caste.lays.split(",")]
     return names == ["all"] or name in names

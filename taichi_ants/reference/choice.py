@@ -118,5 +118,5 @@ def misread_codes(
     for code, turn in zip(codes, turns, strict=True):
         high, low = stream.draw()
         if high < int(misread * _WORDS):
-            seen[turn] = [one for one in range(4) if one != code][pick(low, 3)]
+            seen[turn] = [other for other in range(4) if other != code][pick(low, 3)]
     return seen

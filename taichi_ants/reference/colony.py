@@ -71,7 +71,7 @@ class EpisodeRecord:
     births: int = 0
     deaths: int = 0
     regrown: int = 0
-    apart: Counter[tuple[int, int]] = field(default_factory=Counter)  # by nest and kind of food
+    delivered: Counter[tuple[int, int]] = field(default_factory=Counter)  # by nest, kind of food
     by_caste: Counter[int] = field(default_factory=Counter)
 
 
@@ -92,7 +92,7 @@ class ReferenceColony:
         next_number: The number of the next ant that is added.
         stores: Food items that each queen will turn into ants.
         queen_stream: The queen's random stream, which continues; wandering food also uses it.
-        minds: The tables; see `sharing`.
+        learners: The tables; see `sharing`.
         epsilon, learning_rate: Values in the present episode, float64.
         episode: The number of the episode in the run, from 0; -1 before the first.
         record: The sums of the present or latest episode.
@@ -128,7 +128,7 @@ class ReferenceColony:
             task.evaporation_in_evaluation if sharing == "frozen" else task.evaporation_in_training
         )
         self.pheromone = task.pheromone if falls else task.pheromone.lasting
-        self.fields = {n: one if falls else one.lasting for n, one in task.fields.items()}
+        self.fields = {n: field if falls else field.lasting for n, field in task.fields.items()}
         if task.observation in OBSERVATIONS:
             self._row = OBSERVATIONS[task.observation]
             self._turns = TURNS.get(task.observation, AHEAD)
@@ -144,13 +144,13 @@ class ReferenceColony:
         self.castes = list(task.castes.values())
         groups = len(queens_of(world)) * max(1, len(self.castes))
         if sharing == "independent" or (groups == 1 and not self.castes):
-            self.minds = SHARING[sharing](make, self.slots, q_values)
+            self.learners = SHARING[sharing](make, self.slots, q_values)
         else:
             tables = [q_values] * groups
             if q_values is not None and q_values.ndim > 2:
                 tables = list(q_values.reshape(groups, *q_values.shape[-2:]))
-            several = [self._mind(make, g, table) for g, table in enumerate(tables)]
-            self.minds = ByGroup(several, self.castes)
+            of_groups = [self._learner(make, g, table) for g, table in enumerate(tables)]
+            self.learners = ByGroup(of_groups, self.castes)
         self.epsilon, self.learning_rate = training.epsilon, training.learning_rate
         self.episode = -1
         self.records: list[EpisodeRecord] = []
@@ -166,7 +166,9 @@ class ReferenceColony:
         """The kinds of food of the task; none for the usual food."""
         return list(self.task.foods.values())
 
-    def _mind(self, make: Callable[..., ReferenceLearner], group: int, table: Any) -> FrozenTable:
+    def _learner(
+        self, make: Callable[..., ReferenceLearner], group: int, table: Any
+    ) -> FrozenTable:
         """Return the table of a group of ants, frozen if its caste follows a policy."""
         policy = self.castes[group % len(self.castes)].policy if self.castes else None
         if policy is None:
@@ -180,15 +182,15 @@ class ReferenceColony:
     def take_castes(self) -> None:
         """Take the numbers of castes from the task."""
         self.castes = list(self.task.castes.values())
-        self.minds.take(self.castes, self._training.discount)
+        self.learners.take(self.castes, self._training.discount)
         self.world.cues = self._cues()
 
     def _cues(self) -> list[tuple[str, str]]:
         """Return the names of the cues by caste."""
         task = self.task
         return [
-            (one.outbound_cue or task.outbound_cue, one.homing_cue or task.homing_cue)
-            for one in self.castes or [NO_CASTE]
+            (caste.outbound_cue or task.outbound_cue, caste.homing_cue or task.homing_cue)
+            for caste in self.castes or [NO_CASTE]
         ]
 
     def _set_up(self) -> None:
@@ -232,7 +234,7 @@ class ReferenceColony:
     @property
     def q_values(self) -> np.ndarray:
         """A copy of the table, float32 (n_states, 5), or of all tables, (slots, n_states, 5)."""
-        tables = np.array([learner.table() for learner in self.minds.tables])
+        tables = np.array([learner.table() for learner in self.learners.tables])
         if self.sharing == "independent":
             return tables
         axes = [n for n in (len(self.world.queens), len(self.castes)) if n > 1]
@@ -251,7 +253,7 @@ class ReferenceColony:
         self.start_world = world or self.start_world
         self.episode += 1
         self._set_up()
-        for learner in self.minds.tables:
+        for learner in self.learners.tables:
             learner.begin()
 
     def end_episode(self) -> None:
@@ -261,7 +263,7 @@ class ReferenceColony:
         self.epsilon = max(least, self.epsilon * training.epsilon_decay)
         least = min(training.min_learning_rate, training.learning_rate)
         self.learning_rate = max(least, self.learning_rate * training.learning_rate_decay)
-        self.minds.set_learning_rate(self.learning_rate)
+        self.learners.set_learning_rate(self.learning_rate)
         self.records.append(self.record)
 
     def run_episode(self, ticks: int) -> Iterator[list[Transition]]:
@@ -334,17 +336,21 @@ class ReferenceColony:
                     stopping.add(ant.slot)
         for ant in [*self.ants.values(), *dying]:
             self.observe(ant)
-        both = [(was, ant) for was, ant, f in zip(before, acting, foraged, strict=True) if f]
-        self._pay(both, tick)
+        pairs = [(was, ant) for was, ant, f in zip(before, acting, foraged, strict=True) if f]
+        self._pay(pairs, tick)
         self.over = self._ends_at_delivery and self.record.deliveries > 0
-        self._learn([was for was, _ in both], [ant for _, ant in both], stopping, last or self.over)
+        self._learn(
+            [was for was, _ in pairs], [ant for _, ant in pairs], stopping, last or self.over
+        )
         for ant in acting:
             if ant.slot in stopping:
                 ant.idle, ant.chosen = True, None
                 if self.sharing == "independent":
-                    self.minds.of(ant).begin()
+                    self.learners.of(ant).begin()
         if self.task.labour.rule == "thresholds":
-            self.stimuli[:] = [one + (self.task.labour.demand or 0.0) for one in self.stimuli]
+            self.stimuli[:] = [
+                stimulus + (self.task.labour.demand or 0.0) for stimulus in self.stimuli
+            ]
         self.record.ticks += 1
 
     def _pay(self, pairs: Sequence[tuple[Ant, Ant]], tick: int) -> None:
@@ -363,20 +369,20 @@ class ReferenceColony:
     def _draw_action(self, ant: Ant, tick: int) -> int:
         choice = self._choice_of(ant)
         if choice.own_rule is not None:
-            values = self.minds.of(ant).rows[ant.state] if choice.needs_table else []
+            values = self.learners.of(ant).rows[ant.state] if choice.needs_table else []
             epsilon = self._epsilon_of(ant)
             return choose_by_rule(self.world, ant, self.task, values, epsilon, tick)
         if choice.rule == "deneubourg":
             return choose_cell(self.world, ant, choice, self.task.traffic)
-        values = self.minds.of(ant).rows[ant.state]
+        values = self.learners.of(ant).rows[ant.state]
         return choose_action(values, self._epsilon_of(ant), ant.stream, choice)
 
     def _choice_of(self, ant: Ant) -> Choice:
         """Return the rule of choice with the numbers of the ant's caste."""
         caste = self.caste_of(ant)
-        own = {name: getattr(caste, name) for name in ("temperature", "k", "exponent")}
-        own = {name: number for name, number in own.items() if number is not None}
-        return replace(self.task.choice, **own) if own else self.task.choice
+        numbers = {name: getattr(caste, name) for name in ("temperature", "k", "exponent")}
+        numbers = {name: number for name, number in numbers.items() if number is not None}
+        return replace(self.task.choice, **numbers) if numbers else self.task.choice
 
     def _epsilon_of(self, ant: Ant) -> float:
         return epsilon_of(self.caste_of(ant), ant, self.epsilon)
@@ -393,7 +399,7 @@ class ReferenceColony:
         record.deliveries += delivered
         for ant in acting:
             if ant.event is Event.DELIVERED:
-                record.apart[ant.nest, ant.kind] += 1
+                record.delivered[ant.nest, ant.kind] += 1
                 record.by_caste[ant.caste] += 1
         if record.deliveries and record.first_delivery < 0:
             record.first_delivery = record.ticks + 1
@@ -422,7 +428,7 @@ class ReferenceColony:
         stream = RandomStream(state)
         ant = Ant(cell, heading, slot=slot, number=number, stream=stream, nest=nest, caste=caste)
         self.add(ant)
-        self.minds.born(slot)
+        self.learners.born(slot)
         self.next_number += 1
 
     def _deaths(self, acting: Sequence[Ant]) -> list[Ant]:
@@ -450,7 +456,7 @@ class ReferenceColony:
         for was, ant in zip(before, after, strict=True):
             terminated = ant.event is Event.DELIVERED and self.task.delivery == "terminates"
             # After a delivery that terminates, the ant chooses at the start of its next tick.
-            if self.minds.draws_ahead(ant) and not terminated:
+            if self.learners.draws_ahead(ant) and not terminated:
                 ant.chosen = self._draw_action(ant, self.record.ticks + 1)
             self.transitions.append(
                 Transition(
@@ -475,15 +481,15 @@ class ReferenceColony:
                 )
             )
         if self.sharing != "independent":
-            self.minds.learn(self.transitions, [ant.stream for ant in after], self.epsilon)
+            self.learners.learn(self.transitions, [ant.stream for ant in after], self.epsilon)
             return
         for step, ant in zip(self.transitions, after, strict=True):
-            mind, caste = self.minds.of(ant), self.caste_of(ant)
+            learner, caste = self.learners.of(ant), self.caste_of(ant)
             rate, discount = caste.learning_rate, caste.discount
-            mind.learning_rate = np.float32(self.learning_rate if rate is None else rate)
-            mind.discount = np.float32(self._training.discount if discount is None else discount)
+            learner.learning_rate = np.float32(self.learning_rate if rate is None else rate)
+            learner.discount = np.float32(self._training.discount if discount is None else discount)
             epsilon = self.epsilon if caste.epsilon is None else caste.epsilon
-            self.minds.learn([step], [ant.stream], epsilon)
+            self.learners.learn([step], [ant.stream], epsilon)
 
 
 def beginner(

@@ -45,20 +45,20 @@ class FoodSources:
         source, a new one is appended. It joins the pile of the first adjacent food source, or
         forms a new pile.
         """
-        here = [source for source in self.food_sources if source.cell == cell]
-        if not here:
+        sources = [source for source in self.food_sources if source.cell == cell]
+        if not sources:
             around = [neighbour(cell, heading) for heading in range(N_HEADINGS)]
             beside = next((source for source in self.food_sources if source.cell in around), None)
-            here = [FoodSource(cell, waiting_since=0)]
-            self.food_sources += here
+            sources = [FoodSource(cell, waiting_since=0)]
+            self.food_sources += sources
             for pile in self._piles:
                 if any(source is beside for source in pile):
-                    pile += here
+                    pile += sources
             if beside is None:
-                self._piles.append(list(here))
-        if all(source.waiting_since is not None for source in here):
-            here[0].waiting_since = None
-        for source in here:
+                self._piles.append(list(sources))
+        if all(source.waiting_since is not None for source in sources):
+            sources[0].waiting_since = None
+        for source in sources:
             if source.waiting_since is None:
                 source.kind = kind
 
@@ -122,11 +122,11 @@ def _connected(food_sources: list[FoodSource]) -> list[list[FoodSource]]:
     for source in food_sources:
         if source.cell not in missing:
             continue
-        found = [missing.pop(source.cell)]
-        for member in found:  # the list grows during this loop
+        pile = [missing.pop(source.cell)]
+        for member in pile:  # the list grows during this loop
             around = (neighbour(member.cell, heading) for heading in range(N_HEADINGS))
-            found += [missing.pop(cell) for cell in around if cell in missing]
-        piles.append(sorted(found, key=food_sources.index))
+            pile += [missing.pop(cell) for cell in around if cell in missing]
+        piles.append(sorted(pile, key=food_sources.index))
     return piles
 
 

@@ -43,8 +43,8 @@ class Interventions:
         self._first = colony.start_world
         self._pheromone = colony.task.pheromone
         self._falls = colony.pheromone.evaporation == self._pheromone.evaporation
-        for name, one in colony.fields.items():
-            self._falls = self._falls and one == colony.task.fields[name]
+        for name, field in colony.fields.items():
+            self._falls = self._falls and field == colony.task.fields[name]
         world = colony.start_world
         # The content of the cells that are not empty when later episodes start.
         self._queens = list(colony.world.queens)  # when later episodes start
@@ -132,8 +132,8 @@ class Interventions:
         bare = World(self._first.ranges, world.queen, obstacles=rocks)
         rules = self.colony.task.rules
         world.trail = self._copy(world.trail, Trail(bare, world.pheromone, rules=rules))
-        for name, one in self.colony.fields.items():
-            world.fields[name] = self._copy(world.fields[name], Trail(bare, one, rules=rules))
+        for name, field in self.colony.fields.items():
+            world.fields[name] = self._copy(world.fields[name], Trail(bare, field, rules=rules))
 
     def _copy(self, old: Trail, new: Trail) -> Trail:
         """Return a new trail after setting it to the levels of an old one."""
@@ -159,7 +159,7 @@ class Interventions:
         """
         queens = self.colony.world.queens
         nests = [
-            min(range(len(queens)), key=lambda one: distance(cell, queens[one]))
+            min(range(len(queens)), key=lambda queen: distance(cell, queens[queen]))
             if nest is None
             else nest
             for cell in cells
@@ -184,15 +184,15 @@ class Interventions:
     def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> None:
         """Put n ants on free cells, in the order of `ants.starts`; without a nest, by turns."""
         colony, world = self.colony, self.colony.world
-        wanted = range(len(world.queens)) if nest is None else [nest]
+        by_turns = range(len(world.queens)) if nest is None else [nest]
         orders = {
-            one: start_order(self._first, world.queens[one], colony.seed, colony.start)
-            for one in wanted
+            number: start_order(self._first, world.queens[number], colony.seed, colony.start)
+            for number in by_turns
         }
         cells: list[Cell] = []
-        nests = [wanted[k % len(wanted)] for k in range(n)]
-        for one in nests:
-            free = (cell for cell in orders[one] if world.content(cell) == EMPTY)
+        nests = [by_turns[k % len(by_turns)] for k in range(n)]
+        for number in nests:
+            free = (cell for cell in orders[number] if world.content(cell) == EMPTY)
             cells.append(next(cell for cell in free if cell not in cells))
         self._add(cells, nests, heading)
 
@@ -216,15 +216,15 @@ class Interventions:
 
     def set_policy(self, q_values: np.ndarray) -> None:
         """Let all ants follow a table."""
-        for learner in self.colony.minds.tables:
+        for learner in self.colony.learners.tables:
             learner.rows = [list(row) for row in np.asarray(q_values, np.float32)]
 
     def remove_ants(self, cells: Sequence[Cell], nest: int | None = None) -> None:
         """Remove the ants on these cells, or those of a nest, with their food."""
-        there = self.colony.world.ants
+        by_cell = self.colony.world.ants
         for cell in cells:
-            if cell in there and nest in (None, there[cell].nest):
-                del self.colony.ants[there.pop(cell).slot]
+            if cell in by_cell and nest in (None, by_cell[cell].nest):
+                del self.colony.ants[by_cell.pop(cell).slot]
         self._observe()
 
     def set_ants(self, n: int) -> None:
@@ -254,8 +254,8 @@ class Interventions:
         now = replace(self._pheromone, **still)
         self.colony.pheromone = self.colony.world.pheromone = now
         self.colony.fields = {
-            name: one if self._falls else one.lasting
-            for name, one in self.colony.task.fields.items()
+            name: field if self._falls else field.lasting
+            for name, field in self.colony.task.fields.items()
         }
         self._new_trail()
 
@@ -266,7 +266,7 @@ class Interventions:
     def set_learning_rate(self, learning_rate: float) -> None:
         """Set the learning rate for this and all later episodes."""
         self._learning_rate = self.colony.learning_rate = learning_rate
-        self.colony.minds.set_learning_rate(learning_rate)
+        self.colony.learners.set_learning_rate(learning_rate)
 
     def begin_episode(self) -> None:
         """End the episode, and start the next one in the world as interventions have changed it."""

@@ -43,10 +43,10 @@ class ReferenceLearner:
     ) -> None:
         """Start with a copy of a table (n_states, 5), or with `initial_q`, and without memories."""
         self.name = config.learner
-        given = dict(config.hyperparameters)
-        for name in given.keys() - self.hyperparameters.keys():
+        hyperparameters = dict(config.hyperparameters)
+        for name in hyperparameters.keys() - self.hyperparameters.keys():
             raise AntsError(f"{name!r} is not a hyperparameter of {self.name!r}; leave it out.")
-        self.settings = {**self.hyperparameters, **given}
+        self.settings = {**self.hyperparameters, **hyperparameters}
         self.learning_rate = np.float32(config.learning_rate)
         self.discount = np.float32(config.discount)
         if q_values is None:

@@ -38,20 +38,20 @@ def path_ratio(colony: ReferenceColony) -> float:
     """Return the path length divided by the fewest ticks for the nearest food of the start."""
     world = colony.start_world
     walls, foods = set(listed_cells(world.obstacles)), set(listed_cells(world.foods))
-    inside, found = set(colony.world.ground), NONE
+    inside, fewest = set(colony.world.ground), NONE
     steps: dict[Cell, int] = {world.queen: 0}
     waiting = deque([world.queen])
     while waiting:
         cell = waiting.popleft()
         if cell in foods:
-            found = max(1, steps[cell] - 1)
+            fewest = max(1, steps[cell] - 1)
             break
         for heading in range(N_HEADINGS):
             there = neighbour(cell, heading)
             if there in inside and there not in walls and there not in steps:
                 steps[there] = steps[cell] + 1
                 waiting.append(there)
-    return path_length(colony) / found
+    return path_length(colony) / fewest
 
 
 def entropy(colony: ReferenceColony) -> float:
@@ -96,7 +96,7 @@ def foraging(colony: ReferenceColony) -> float:
 def mean_distance(colony: ReferenceColony) -> float:
     """Return the mean distance of the ants to the nearest queen."""
     queens = colony.world.queens
-    far = [min(distance(ant.cell, one) for one in queens) for ant in colony.ants.values()]
+    far = [min(distance(ant.cell, queen) for queen in queens) for ant in colony.ants.values()]
     return sum(far) / len(far) if far else NONE
 
 
@@ -112,8 +112,8 @@ def deliveries_by(colony: ReferenceColony, part: str) -> int:
     owner, _, number = part.partition("_")
     if owner == "caste":
         return colony.record.by_caste[int(number)]
-    place = ("nest", "food").index(owner)
-    return sum(n for key, n in colony.record.apart.items() if key[place] == int(number))
+    column = ("nest", "food").index(owner)
+    return sum(n for key, n in colony.record.delivered.items() if key[column] == int(number))
 
 
 def measured(colony: ReferenceColony, name: str) -> float:

@@ -68,8 +68,8 @@ def q_iteration(
             values = []
             for row, chances in zip(q, policy.tolist(), strict=True):
                 values.append(0.0)
-                for one, chance in zip(row, chances, strict=True):
-                    values[-1] += chance * one
+                for value, chance in zip(row, chances, strict=True):
+                    values[-1] += chance * value
         change = 0.0
         for (state, action), n in counts.items():
             later = 0.0

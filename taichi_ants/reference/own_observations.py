@@ -41,8 +41,8 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
     A misread cell has no ant, no level, and is not nearer.
     """
     turns, cells = observation.cells, cells_in_view(ant, observation.cells)
-    shown = [turn not in ant.misread for turn in turns]
-    own, queen = world.cue(ant), world.queens[ant.nest]
+    is_seen = [turn not in ant.misread for turn in turns]
+    cue, queen = world.cue(ant), world.queens[ant.nest]
     # All levels of cues are float32 if those of one cue are.
     cues = {name for pair in world.cues for name in pair if name != "compass"}
     dense = any(world.pheromone_named(name).rule.dense for name in cues)
@@ -51,10 +51,10 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
     def levels(trail: Trail, kind: type) -> Vector:
         return Vector(
             kind(trail.level(cell) if shows and world.ground.get(cell) == EMPTY else 0)
-            for cell, shows in zip(cells, shown, strict=True)
+            for cell, shows in zip(cells, is_seen, strict=True)
         )
 
-    ahead, own_level = levels(own, kind), kind(own.level(ant.cell))
+    ahead, own_level = levels(cue, kind), kind(cue.level(ant.cell))
     if world.cues[ant.caste][1] == "compass":
         far = distance(ant.cell, queen)
         nearer = [distance(cell, queen) < far for cell in cells]
@@ -70,14 +70,14 @@ def view_of(world: WorldState, ant: Ant, observation: Observation) -> SimpleName
         "levels": ahead,
         "ants": Vector(
             1 + other.carries if shows and other is not None and other.nest == ant.nest else 0
-            for other, shows in zip(others, shown, strict=True)
+            for other, shows in zip(others, is_seen, strict=True)
         ),
         "other_nest_ants": Vector(
             int(shows and other is not None and other.nest != ant.nest)
-            for other, shows in zip(others, shown, strict=True)
+            for other, shows in zip(others, is_seen, strict=True)
         ),
         "nearer": Vector(
-            int(is_nearer and shows) for is_nearer, shows in zip(nearer, shown, strict=True)
+            int(is_nearer and shows) for is_nearer, shows in zip(nearer, is_seen, strict=True)
         ),
         "strongest": kind(strongest_in_view(world, ant)),
         "own_level": own_level,

@@ -23,10 +23,10 @@ Inputs = Mapping[str, Callable[[], Any]]
 
 def computed(rule: Rule, task: Task, inputs: Inputs) -> float:
     """Return the result of a rule; only the inputs that it reads are computed."""
-    given = {name: inputs[name]() for name in rule.inputs}
+    values = {name: inputs[name]() for name in rule.inputs}
     numbers = {
         name: Vector(map(float, value)) if isinstance(value, list) else float(value)
-        for name, value in given.items()
+        for name, value in values.items()
     }
     return rule.result(numbers, vars(task.rules[rule.name]))
 

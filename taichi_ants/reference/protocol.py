@@ -44,7 +44,7 @@ class Protocol:
         colony.begin_episode()
         self._happened: set[int] = set()
         self._interventions = Interventions(colony)
-        tables = copy.deepcopy([learner.rows for learner in colony.minds.tables])
+        tables = copy.deepcopy([learner.rows for learner in colony.learners.tables])
         self._before = colony.task, colony.epsilon, colony.learning_rate, tables
         self._pheromones = colony.pheromone, colony.fields
 
@@ -54,10 +54,10 @@ class Protocol:
         colony.task, colony.epsilon, learning_rate, tables = self._before
         colony.pheromone, colony.fields = self._pheromones
         colony.take_castes()
-        colony.minds.set_learning_rate(learning_rate)
+        colony.learners.set_learning_rate(learning_rate)
         colony.learning_rate = learning_rate
         if colony.sharing == "frozen":
-            for learner, rows in zip(colony.minds.tables, tables, strict=True):
+            for learner, rows in zip(colony.learners.tables, tables, strict=True):
                 learner.rows = rows
         colony.end_episode()
 
@@ -84,57 +84,59 @@ class Protocol:
         value = measured(self._colony, event.measure)
         return value > event.above if event.above is not None else value < event.below  # type: ignore[operator]
 
-    def apply(self, one: Any) -> None:
+    def apply(self, intervention: Any) -> None:
         """Apply an intervention."""
         to = self._interventions
-        match one:
+        match intervention:
             case language.RemoveAnts(cells=None):
-                to.remove_some(self._amount(one), one.nest)
+                to.remove_some(self._amount(intervention), intervention.nest)
             case language.RemoveAnts():
-                to.remove_ants(self._cells(one), one.nest)
+                to.remove_ants(self._cells(intervention), intervention.nest)
             case language.AddAnts(cells=None):
-                to.add_some(self._amount(one), one.heading, one.nest)
+                to.add_some(self._amount(intervention), intervention.heading, intervention.nest)
             case language.AddAnts():
-                to.add_ants(self._cells(one), one.heading, one.nest)
+                to.add_ants(self._cells(intervention), intervention.heading, intervention.nest)
             case language.SetAnts():
-                to.set_ants(one.number)
+                to.set_ants(intervention.number)
             case language.Place(what="queen"):
-                to.move_queen(self._cells(one)[0], one.nest or 0)
+                to.move_queen(self._cells(intervention)[0], intervention.nest or 0)
             case language.Place():
                 names = list(self._colony.task.foods)
-                kind = names.index(one.kind) if one.kind else 0
-                to.put(self._cells(one), _CONTENTS[one.what], kind)
+                kind = names.index(intervention.kind) if intervention.kind else 0
+                to.put(self._cells(intervention), _CONTENTS[intervention.what], kind)
             case language.Move():
-                to.move(*self._cells(one))
+                to.move(*self._cells(intervention))
             case language.Clear():
-                to.put(self._cells(one), EMPTY)
+                to.put(self._cells(intervention), EMPTY)
             case language.SetTrail(cells=None):
-                to.lay_trail(list(self._colony.world.ground), one.level, one.field)
+                to.lay_trail(
+                    list(self._colony.world.ground), intervention.level, intervention.field
+                )
             case language.SetTrail():
-                to.lay_trail(self._cells(one), one.level, one.field)
+                to.lay_trail(self._cells(intervention), intervention.level, intervention.field)
             case language.SetEpsilon():
-                self._colony.epsilon = one.value
+                self._colony.epsilon = intervention.value
             case language.SetLearningRate():
-                to.set_learning_rate(one.value)
+                to.set_learning_rate(intervention.value)
             case language.SetPolicy():
                 make = {"random": random_policy, "trail_follower": trail_follower}
                 to.set_policy(
-                    make[one.source](self._colony.task.observation)
-                    if one.table is None
-                    else one.table
+                    make[intervention.source](self._colony.task.observation)
+                    if intervention.table is None
+                    else intervention.table
                 )
             case language.SetTask():
-                to.set_task(one.changed(self._colony.task))
+                to.set_task(intervention.changed(self._colony.task))
 
-    def _amount(self, one: Any) -> int:
+    def _amount(self, intervention: Any) -> int:
         """Return a number of ants; a share is rounded, halves up."""
-        if one.number is not None:
-            return one.number
-        ants = [ant for ant in self._colony.ants.values() if one.nest in (None, ant.nest)]
-        return int(one.share * len(ants) + 0.5)
+        if intervention.number is not None:
+            return intervention.number
+        ants = [ant for ant in self._colony.ants.values() if intervention.nest in (None, ant.nest)]
+        return int(intervention.share * len(ants) + 0.5)
 
-    def _cells(self, one: Any) -> list[Cell]:
+    def _cells(self, intervention: Any) -> list[Cell]:
         """Return the cells of an intervention, without duplicates."""
-        if isinstance(one.cells, str):
-            return listed_cells(self._colony.start_world.regions[one.cells])
-        return list(dict.fromkeys(normal_form(*cell) for cell in one.cells))
+        if isinstance(intervention.cells, str):
+            return listed_cells(self._colony.start_world.regions[intervention.cells])
+        return list(dict.fromkeys(normal_form(*cell) for cell in intervention.cells))

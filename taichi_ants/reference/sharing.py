@@ -105,9 +105,9 @@ class SharedTable(FrozenTable):
         errors_of: dict[Pair, list[np.float32]] = defaultdict(list)
         for step, error in zip(steps, errors, strict=True):
             errors_of[step.pair].append(error)
-        for pair, several in errors_of.items():
-            mean = several[0] if len(several) == 1 else mean_error(several)
-            weight = self._weights[min(len(several), len(self._weights) - 1)]
+        for pair, of_pair in errors_of.items():
+            mean = of_pair[0] if len(of_pair) == 1 else mean_error(of_pair)
+            weight = self._weights[min(len(of_pair), len(self._weights) - 1)]
             self._common.update(pair, weight, mean)
         return errors
 
@@ -167,9 +167,9 @@ class ByGroup(FrozenTable):
         self._epsilons = [caste.epsilon for caste in castes] or [None]
         self._learning_rates = [caste.learning_rate for caste in castes] or [None]
         for number, table in enumerate(self.tables):
-            own = castes[number % self._n_castes].discount if castes else None
-            if own is not None or discount is not None:
-                table.discount = np.float32(discount if own is None else own)
+            own_discount = castes[number % self._n_castes].discount if castes else None
+            if own_discount is not None or discount is not None:
+                table.discount = np.float32(discount if own_discount is None else own_discount)
         for group, rate in zip(self._groups, self._by_group(self._learning_rates), strict=True):
             if rate is not None:
                 group.set_learning_rate(rate)
@@ -188,17 +188,17 @@ class ByGroup(FrozenTable):
         return self._groups[self.group(ant)].draws_next_action
 
     def set_learning_rate(self, learning_rate: float) -> None:
-        own = self._by_group(self._learning_rates)
-        for group, rate in zip(self._groups, own, strict=True):
+        rates = self._by_group(self._learning_rates)
+        for group, rate in zip(self._groups, rates, strict=True):
             group.set_learning_rate(learning_rate if rate is None else rate)
 
     def learn(
         self, steps: Sequence[Transition], streams: Sequence[RandomStream], epsilon: float
     ) -> None:
         epsilons = self._by_group(self._epsilons)
-        for number, (group, own) in enumerate(zip(self._groups, epsilons, strict=True)):
+        for number, (group, own_epsilon) in enumerate(zip(self._groups, epsilons, strict=True)):
             ours = [i for i, step in enumerate(steps) if self.group(step) == number]
-            rate = epsilon if own is None else own
+            rate = epsilon if own_epsilon is None else own_epsilon
             group.learn([steps[i] for i in ours], [streams[i] for i in ours], rate)
 
 

@@ -46,7 +46,7 @@ class Trail:
         self.rule, self._rules = pheromone, rules or {}
         rocks = set(listed_cells(world.obstacles))
         self._cells = [cell for cell in existing_cells(world.ranges) if cell not in rocks]
-        self._place = {cell: place for place, cell in enumerate(self._cells)}
+        self._place = {cell: index for index, cell in enumerate(self._cells)}
         kind = np.float32 if pheromone.dense else np.int64
         self._levels: np.ndarray = np.zeros(len(self._cells), kind)
         for x, y, z, level in [] if is_empty else world.trails.tolist():
@@ -63,8 +63,8 @@ class Trail:
 
     def level(self, cell: Cell) -> Level:
         """Return the level of a cell, 0 for a rock."""
-        place = self._place.get(cell)
-        return 0 if place is None else self._levels[place]
+        index = self._place.get(cell)
+        return 0 if index is None else self._levels[index]
 
     def lay(self, cell: Cell, level: Level) -> None:
         """Set the level of a cell other than a rock."""
@@ -78,7 +78,7 @@ class Trail:
         The ant has the load and the event after its action, and the paper's state before it.
         `others` are all pheromones by name, `stimulus` is that of the ant's nest.
         """
-        place, rule, carried = self._place[cell], self.rule, ant.carried
+        index, rule, carried = self._place[cell], self.rule, ant.carried
         if rule.own_deposit is not None:
             facts: dict[str, Any] = {
                 "carried": carried,
@@ -92,31 +92,31 @@ class Trail:
                 "threshold": ant.threshold,
             }
             facts["stimulus"] = stimulus
-            facts |= {f"level_{name}": one.level(cell) for name, one in others.items()}
-            level = self._computed(rule.own_deposit, place, facts)
-            self._levels[place] = level if rule.dense else math.floor(level)
+            facts |= {f"level_{name}": trail.level(cell) for name, trail in others.items()}
+            level = self._computed(rule.own_deposit, index, facts)
+            self._levels[index] = level if rule.dense else math.floor(level)
         elif rule.deposit == "set":
-            self._levels[place] = rule.level
+            self._levels[index] = rule.level
         elif rule.deposit == "add":
-            self._levels[place] = min(self._levels[place] + rule.level, rule.cap)
+            self._levels[index] = min(self._levels[index] + rule.level, rule.cap)
         elif rule.deposit == "fading":
-            self._levels[place] = max(
-                self._levels[place], rule.level - int(rule.slope or 0) * carried
+            self._levels[index] = max(
+                self._levels[index], rule.level - int(rule.slope or 0) * carried
             )
 
-    def _computed(self, rule: Rule, place: int, facts: Mapping[str, float]) -> float:
+    def _computed(self, rule: Rule, index: int, facts: Mapping[str, float]) -> float:
         """Return the result of your own rule for a cell."""
-        every = {**facts, "level": self._levels[place]}
-        inputs = {name: float(every[name]) for name in rule.inputs}
+        inputs = {**facts, "level": self._levels[index]}
+        inputs = {name: float(inputs[name]) for name in rule.inputs}
         return rule.result(inputs, vars(self._rules[rule.name]))
 
     def tick(self, tick: int = 0) -> None:
         """Let trails evaporate, then spread, for one tick."""
-        own = self.rule.own_evaporation
-        if own is not None:
-            every = range(len(self._levels))
-            left = [self._computed(own, place, {"tick": tick}) for place in every]
-            self._levels = np.array(left).astype(np.float32)
+        evaporation = self.rule.own_evaporation
+        if evaporation is not None:
+            indices = range(len(self._levels))
+            levels = [self._computed(evaporation, index, {"tick": tick}) for index in indices]
+            self._levels = np.array(levels).astype(np.float32)
         elif self.rule.evaporation == "linear":
             self._levels = np.maximum(self._levels - 1, 0)
         elif self.rule.evaporation == "exponential":
@@ -127,13 +127,13 @@ class Trail:
 
     def _diffuse(self) -> None:
         shares = self._levels * self.rule.share
-        given = shares * self._n_open  # nothing diffuses into walls
+        outflow = shares * self._n_open  # nothing diffuses into walls
         shares_and_wall = np.append(shares, np.float32(0))
-        got = np.zeros_like(shares)
+        inflow = np.zeros_like(shares)
         for heading in range(N_HEADINGS):
-            got = got + shares_and_wall[self._around[:, heading]]
+            inflow = inflow + shares_and_wall[self._around[:, heading]]
         # With diffusion 1 a cell loses its whole level, and rounding could leave less than 0.
-        self._levels = np.maximum((self._levels - given) + got, 0)
+        self._levels = np.maximum((self._levels - outflow) + inflow, 0)
 
 
 class WorldState:
@@ -167,7 +167,9 @@ class WorldState:
         self.ants: dict[Cell, Ant] = {}
         self.pheromone = pheromone
         self.trail = Trail(world, pheromone, rules=rules)
-        self.fields = {name: Trail(world, one, True, rules) for name, one in (fields or {}).items()}
+        self.fields = {
+            name: Trail(world, field, True, rules) for name, field in (fields or {}).items()
+        }
         self.cues = cues
 
     def has_compass(self, ant: Ant) -> bool:

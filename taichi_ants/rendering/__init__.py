@@ -6,7 +6,7 @@
 - `save_picture` and `save_animation` write arrays to files, which appear only once complete.
 """
 
-from taichi_ants.engines.records import Snapshot
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering.scene import Scene, Status
 from taichi_ants.rendering.snapshots import Episode, at_start, colony_snapshots, frames, picture
 from taichi_ants.rendering.writers import (

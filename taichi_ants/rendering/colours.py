@@ -39,7 +39,7 @@ def channels(colours: int | np.ndarray) -> np.ndarray:
 
 _samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()]))
 _places = np.linspace(0, len(_samples) - 1, 256)
-_red, _green, _blue = (np.interp(_places, range(len(_samples)), one) for one in _samples.T)
+_red, _green, _blue = (np.interp(_places, range(len(_samples)), channel) for channel in _samples.T)
 # uint32 (256,): colours of trails from just above level 0 to `strongest`.
 TRAIL_RAMP = np.rint([_red, _green, _blue]).astype(np.uint32).T @ np.array(
     [1 << 16, 1 << 8, 1], np.uint32

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from taichi_ants import runtime
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.grid import hexgrid
 from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.task.constants import DEPOSIT_LEVEL, EMPTY, FOOD, OBSTACLE, QUEEN
@@ -70,7 +70,7 @@ def marks(
     return table
 
 
-def thing(
+def marker(
     places: npt.ArrayLike, hexagon: float, mark: Mark, colour: np.ndarray | None = None
 ) -> np.ndarray:
     """Return marks of food or queens; cells have the radius `hexagon`, in pixels."""
@@ -86,17 +86,17 @@ def cell(letter: str, centre: npt.ArrayLike, hexagon: float) -> np.ndarray:
     """Return marks of a cell and its content, by its letter in a state."""
     table = marks(centre, hexagon, Mark.HEXAGON, cell_colour(letter))
     stands = _CELLS.get(letter, _CELLS["E"])[1]
-    return table if stands is None else np.concatenate([table, thing(centre, hexagon, stands)])
+    return table if stands is None else np.concatenate([table, marker(centre, hexagon, stands)])
 
 
 def numbered(centre: npt.ArrayLike, hexagon: float, mark: Mark, number: int) -> list[np.ndarray]:
     """Return marks of a cell with a queen or food of this number of nest or kind."""
-    floor, several = (colours.FLOOR_QUEEN, colours.QUEENS)
+    floor, of_nests = (colours.FLOOR_QUEEN, colours.QUEENS)
     if mark == Mark.FOOD:
-        floor, several = (colours.FLOOR_FOOD, colours.FOODS)
-    n = number % len(several)
-    cell = marks(centre, hexagon, Mark.HEXAGON, int(colours.floors(several, floor)[n]))
-    return [cell, thing(centre, hexagon, mark, several[[n]])]
+        floor, of_nests = (colours.FLOOR_FOOD, colours.FOODS)
+    n = number % len(of_nests)
+    cell = marks(centre, hexagon, Mark.HEXAGON, int(colours.floors(of_nests, floor)[n]))
+    return [cell, marker(centre, hexagon, mark, of_nests[[n]])]
 
 
 def ants(
@@ -212,8 +212,8 @@ class Rasteriser:
             tables.append(marks(foods, radius, Mark.DOT, of_foods))
             tables.append(marks(queens, max(hexagon, _QUEEN), Mark.DOT, of_queens))
         else:
-            tables.append(thing(foods, hexagon, Mark.FOOD, of_foods))
-            tables.append(thing(queens, hexagon, Mark.QUEEN, of_queens))
+            tables.append(marker(foods, hexagon, Mark.FOOD, of_foods))
+            tables.append(marker(queens, hexagon, Mark.QUEEN, of_queens))
         if in_view is not None:
             places, radius = self._places(in_view), 0.98 * hexagon
             if hexagon < _SMALLEST_OUTLINE:
@@ -290,7 +290,7 @@ class Rasteriser:
         seen = levels[levels >= 1]
         most = float(np.quantile(seen, 0.95)) if len(seen) else 1.0
         power = 10 ** math.floor(math.log10(most))
-        return next(one * power for one in (1, 2, 5, 10) if one * power >= most)
+        return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= most)
 
     def _places(self, cells: np.ndarray) -> np.ndarray:
         """Pixel coordinates (n, 2) of flat indices (n,)."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.colours import Mark
 from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks, numbered
@@ -116,7 +116,7 @@ class Scene:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
         strongest = checked_whole("strongest", strongest)
-        of_fields = {name: _scale(one) for name, one in task.fields.items()} if task else {}
+        of_fields = {name: _scale(field) for name, field in task.fields.items()} if task else {}
         self._foods = list(task.foods) if task else []
         width, height = check_size(size)
         expect("title", title, str)

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.traces import RolloutArguments, Trace, rollout
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.records import Snapshot
 from taichi_ants.rendering.scene import DEFAULT_SIZE, Scene, Status, name_parts
 from taichi_ants.task import Observation, Task
 from taichi_ants.task.constants import ACTION_NAMES, EPISODE_STEPS, N_ACTIONS
@@ -95,10 +95,10 @@ class Episode:
         return cls(trace, "greedy" if epsilon == 0 else f"epsilon {epsilon:g}")
 
     @property
-    def made(self) -> RolloutArguments:
+    def arguments(self) -> RolloutArguments:
         """The world, task, policy and seed of the episode."""
-        assert self.trace.made is not None  # `rollout` sets it
-        return self.trace.made
+        assert self.trace.arguments is not None  # `rollout` sets it
+        return self.trace.arguments
 
     @property
     def delivered(self) -> bool:
@@ -111,7 +111,7 @@ class Episode:
 
     def snapshots(self) -> Iterator[CaptionedSnapshot]:
         """Yield the world before each step, with the action that follows, and at the end."""
-        colony = colony_of_rollout(self.made)
+        colony = colony_of_rollout(self.arguments)
         returns = np.concatenate([[0], np.cumsum(self.trace.rewards)]).tolist()
         for step, gained in enumerate(returns):
             if step:
@@ -128,18 +128,18 @@ class Episode:
             last = [("action", ACTION_NAMES[action])]
         elif self.delivered:
             last = [("outcome", "delivered")]
-        table, sees = self.made.q_values, self.made.task.sees
+        table, sees = self.arguments.q_values, self.arguments.task.sees
         assert table is not None
         return _status_of(sees, state, table[state], action, trace.q_values, lines, last)
 
 
-def colony_of_rollout(made: RolloutArguments) -> Colony:
+def colony_of_rollout(arguments: RolloutArguments) -> Colony:
     """Return a colony of one ant that repeats a `rollout`: it has the same random numbers."""
-    frozen: dict[str, Any] = {"sharing": "frozen", "q_values": made.q_values}
-    steady = TrainingConfig.frozen(made.epsilon)
-    colony = Colony(made.world, made.task, steady, made.seed, **frozen)
+    frozen: dict[str, Any] = {"sharing": "frozen", "q_values": arguments.q_values}
+    steady = TrainingConfig.frozen(arguments.epsilon)
+    colony = Colony(arguments.world, arguments.task, steady, arguments.seed, **frozen)
     colony.begin_episode()
-    colony.streams[0, 0] = stream_state(made.seed, STREAM_ROLLOUT, made.number)
+    colony.streams[0, 0] = stream_state(arguments.seed, STREAM_ROLLOUT, arguments.number)
     return colony
 
 
@@ -190,7 +190,7 @@ def _snapshot(colony: Colony, follow: int | None) -> CaptionedSnapshot:
         return snapshot, Status(tuple(lines))
     # Pictures mark the view of the first ant, so the followed ant must be first.
     order = np.argsort(~followed, kind="stable")
-    of_ants = [one.name for one in dataclass_fields(snapshot) if one.name.startswith("ant_")]
+    of_ants = [array.name for array in dataclass_fields(snapshot) if array.name.startswith("ant_")]
     snapshot = replace(snapshot, **{name: getattr(snapshot, name)[order] for name in of_ants})
     # All lines together do not fit into the panel.
     lines = [lines[0], lines[3], ("ant", str(follow))]

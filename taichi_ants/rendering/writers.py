@@ -238,7 +238,7 @@ def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: f
 
     before, shown = np.full((height, width), _SAME, np.uint8), 0
     most = _LONGEST * fps
-    for _, same in groupby(drawn(), key=lambda one: (one[1], (one[0] - 1) // most)):
+    for _, same in groupby(drawn(), key=lambda frame: (frame[1], (frame[0] - 1) // most)):
         ((number, content),) = deque(same, maxlen=1)
         picture = np.frombuffer(content, np.uint8).reshape(height, width)
         differs = picture != before

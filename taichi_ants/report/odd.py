@@ -16,6 +16,7 @@ from taichi_ants.analysis.tables import Block, Table, markdown
 from taichi_ants.errors import AntsError
 from taichi_ants.measures import finished
 from taichi_ants.settings import DeclaredSetting, declared, flat
+from taichi_ants.studies.folder import INPUTS, asked_in, checksum_of
 from taichi_ants.studies.sweep_file import declaration_of
 from taichi_ants.task import observations
 
@@ -66,21 +67,21 @@ class Model:
     def __init__(self, settings: Mapping[str, Any], sweep: Mapping[str, Any]) -> None:
         self.settings, self.sweep, self.of_colony = settings, sweep, "ants" in settings
         self.rows = list(self._points())
-        self.places = [one for place in settings["worlds"] for one in _list_of(place)]
+        self.places = [world for entry in settings["worlds"] for world in _list_of(entry)]
         self.world = flat({"world": sweep.get("world", {})})
 
     def _points(self) -> Iterator[dict[str, Any]]:
         """Yield the settings of each point, with those of its events and of its evaluation."""
-        own = {
+        values = {
             name: value
             for name, value in self.settings.items()
             if name.startswith(("task.", "training.")) or name in (*_OF_POINTS, "protocol")
         }
-        varies = {name for name, value in own.items() if isinstance(value, list)}
-        if not any(one is None or isinstance(one, list) for one in own.get("protocol") or ()):
+        varies = {name for name, value in values.items() if isinstance(value, list)}
+        if all(isinstance(event, dict) for event in values.get("protocol") or ()):
             varies -= {"protocol"}
-        for n in range(max([1, *(len(own[name]) for name in varies)])):
-            row = {name: one[n] if name in varies else one for name, one in own.items()}
+        for n in range(max([1, *(len(values[name]) for name in varies)])):
+            row = {name: value[n] if name in varies else value for name, value in values.items()}
             kinds = [kind for event in row.get("protocol") or () for kind in event]
             for number, event in enumerate(row.pop("protocol", None) or ()):
                 ((kind, facts),) = event.items()
@@ -96,10 +97,10 @@ class Model:
         if group != ["training", "hyperparameters"]:
             return declaration_of(name, self.world)
         learner = row["training.learner"]
-        several = learner in learners.names() and declared(learners.get(learner).hyperparameters)
-        return next((one for one in several or () if one.name == own), None)
+        known = learner in learners.names() and declared(learners.get(learner).hyperparameters)
+        return next((setting for setting in known or () if setting.name == own), None)
 
-    def uses(self, row: Mapping[str, Any], name: str, one: DeclaredSetting | None) -> bool:
+    def uses(self, row: Mapping[str, Any], name: str, setting: DeclaredSetting | None) -> bool:
         """Return whether a setting has an effect at a point, as far as declarations tell."""
         group, _, own = name.rpartition(".")
         if _EVENT.match(name):
@@ -119,27 +120,27 @@ class Model:
             return False
         if name == "evaluation_epsilon":
             return row["task.choice.rule"] != "deneubourg"
-        if one is None or one.rule.only is None:
+        if setting is None or setting.rule.only is None:
             return True
-        other, *needed = one.rule.only
+        other, *needed = setting.rule.only
         return row.get(f"{group}.{other}") in needed
 
     def parameters(self) -> list[Row]:
         """Return the names, values, units and meanings of all settings that have an effect."""
         varied = [{k: v for k, v in row.items() if k.startswith("world")} for row in self._vary()]
         rows = [self.world, *varied, *self.rows]
-        found: list[Row] = []
+        table: list[Row] = []
         for name in dict.fromkeys(name for row in rows for name in row):
             event = _EVENT.match(name)
-            some = [one for one in rows if name in one or (event and _has(one, event[1]))]
-            one = self.declaration(name, some[0])
-            usual = one.default if one else None  # facts of events leave out defaults
-            values = [row.get(name, usual) for row in some if self.uses(row, name, one)]
+            some = [entry for entry in rows if name in entry or (event and _has(entry, event[1]))]
+            setting = self.declaration(name, some[0])
+            default = setting.default if setting else None  # facts of events leave out defaults
+            values = [row.get(name, default) for row in some if self.uses(row, name, setting)]
             if any(value is not None for value in values):
                 unit, words = _OF_POINTS.get(name, ("", "of a plugin"))
-                unit, words = (one.rule.unit, one.rule.help) if one else (unit, words)
-                found.append((f"`{name}`", _several(values), unit, words))
-        return found
+                unit, words = (setting.rule.unit, setting.rule.help) if setting else (unit, words)
+                table.append((f"`{name}`", _several(values), unit, words))
+        return table
 
     def _vary(self) -> Sequence[Mapping[str, Any]]:
         return self.settings.get("vary") or [{"world_kinds": self.settings.get("world_kinds")}]
@@ -147,11 +148,11 @@ class Model:
     def entries(self, group: str) -> list[str]:
         """Return the names of the entries of a named group of the task, such as its fields."""
         parts = [name.split(".") for name in self.rows[0]]
-        return list(dict.fromkeys(one[2] for one in parts if one[:2] == ["task", group]))
+        return list(dict.fromkeys(part[2] for part in parts if part[:2] == ["task", group]))
 
     def entities(self) -> list[Row]:
         """Return the kinds of entities with their numbers in a world."""
-        ranges = (one["ranges"] for one in self.places)
+        ranges = (world["ranges"] for world in self.places)
         cells = {x * y + y * z + z * x - x - y - z + 1 for x, y, z in ranges}
         several = {
             "castes of ants": self.entries("castes"),
@@ -172,10 +173,10 @@ class Model:
         states = sorted(observations.get(name).n_states for name in names)
         number, foods, castes = "at least 0", self.entries("foods"), self.entries("castes")
         divides, levels = "task.labour.demand" in text, ["trail", *self.entries("fields")]
-        ages = "yes" in text.get("task.life.births", "") or any("lifespan" in one for one in text)
+        ages = "yes" in text.get("task.life.births", "") or any("lifespan" in name for name in text)
         rows = {
             ("cell", "content", "empty, rock, food, queen", ""): True,
-            **{("cell", f"level of `{one}`", number, "level"): True for one in levels},
+            **{("cell", f"level of `{level}`", number, "level"): True for level in levels},
             ("cell", "food", number, "loads"): foods,
             ("nest", "food received", number, "items"): True,
             ("nest", "stimulus", number, "units of stimulus"): divides,
@@ -206,11 +207,17 @@ class Model:
 
 def odd_of(folder: Path, manifest: Mapping[str, Any]) -> str:
     """Return the ODD description of finished results, as Markdown."""
-    inputs, sums = manifest["inputs"], manifest["files"]
-    name = inputs.get(str(manifest["asked"]["options"].get("file")))
+    asked = asked_in(folder)
+    assert asked is not None  # because the results are finished
+    inputs = asked["inputs"]
+    name = inputs.get(str(asked["options"].get("file")))
     sweep = files.tomllib.loads(files.read_text(folder / name)) if name else {}
-    sources = [(f"`{one}`", f"`{sums[one][:16]}`") for one in inputs.values()]
-    return described(Model(manifest["settings"], sweep), manifest["command"], sources)
+    every = sorted(path for path in (folder / INPUTS).rglob("*") if path.is_file())
+    sources = [
+        (f"`{path.relative_to(folder).as_posix()}`", f"`{checksum_of(path)[:16]}`")
+        for path in every
+    ]
+    return described(Model(asked["settings"], sweep), manifest["command"], sources)
 
 
 def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
@@ -218,8 +225,8 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
     rows, heads = model.parameters(), ("Parameter", "Value", "Unit", "Meaning")
     sizes = ("ranges", "foods", "obstacles", "trails", "ants")
     worlds = [
-        (*(str(one[size]) for size in sizes), str(_nests(one)), f"`{one['sha256'][:16]}`")
-        for one in model.places[:_MOST]
+        (*(str(world[size]) for size in sizes), str(_nests(world)), f"`{world['sha256'][:16]}`")
+        for world in model.places[:_MOST]
     ]
     of_worlds = ("Ranges", "Food items", "Rock", "Trail cells", "Listed ants", "Nests", "SHA-256")
     more: dict[str, Block] = {
@@ -251,7 +258,7 @@ def described(model: Model, command: str, sources: Sequence[Row] = ()) -> str:
         _table(heads, [row for row in rows if not _EVENT.match(row[0])]),
         _table(("File", "SHA-256 begins"), sources),
     ]
-    return markdown([one for one in blocks if (one if isinstance(one, str) else one.rows)])
+    return markdown([item for item in blocks if (item if isinstance(item, str) else item.rows)])
 
 
 def _table(heads: Row, rows: Iterable[Row]) -> Table:
@@ -273,8 +280,8 @@ def _list_of(value: Any) -> list[Any]:
 
 def _several(values: Iterable[Any]) -> str:
     """Return values, each once, or their range if they are many numbers."""
-    values = list({_value(one): one for one in values}.values())
-    if len(values) > _MOST and all(type(one) in (int, float) for one in values):
+    values = list({_value(value): value for value in values}.values())
+    if len(values) > _MOST and all(type(value) in (int, float) for value in values):
         return f"{len(values)} values from {_value(min(values))} to {_value(max(values))}"
     return ", ".join(map(_value, values))
 

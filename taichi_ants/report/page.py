@@ -164,20 +164,20 @@ def interval_drawing(finding: Finding, label: str, unit: str = "") -> str:
         return f'<text x="{x:g}" y="{y:g}">{escape(words)}</text>'
 
     low, high = at(finding.low), at(finding.high)
-    ends = sorted({one for one in edges if math.isfinite(one)})
+    ends = sorted({edge for edge in edges if math.isfinite(edge)})
     parts = [
         band(*wanted, "wanted"),
         band(-margin, margin, "small") if margin else "",
-        *(f'<path class="edge" d="M{at(one)} {_MIDDLE - 9}v18"/>' for one in ends),
+        *(f'<path class="edge" d="M{at(edge)} {_MIDDLE - 9}v18"/>' for edge in ends),
         f'<path class="span" d="M{low} {_MIDDLE}H{high}"/>',
         f'<circle cx="{at(finding.effect)}" cy="{_MIDDLE}" r="4.5"/>',
     ]
     labelled: list[float] = []
-    for one in sorted(ends, key=lambda one: (one != 0, one)):
-        if all(abs(at(one) - at(other)) > _SIDE for other in labelled):
-            labelled.append(one)
-            signed = figure(one).replace("-", "\N{MINUS SIGN}")
-            parts.append(text(signed, at(one), _NUMBERS))
+    for tick in sorted(ends, key=lambda edge: (edge != 0, edge)):
+        if all(abs(at(tick) - at(other)) > _SIDE for other in labelled):
+            labelled.append(tick)
+            signed = figure(tick).replace("-", "\N{MINUS SIGN}")
+            parts.append(text(signed, at(tick), _NUMBERS))
     lines = wrap(axis, _LETTERS)
     below = enumerate(lines, start=1)
     parts += [text(line, WIDTH / 2, _NUMBERS + _LINE * number) for number, line in below]
@@ -224,7 +224,7 @@ class Statements(NamedTuple):
         """The number of statements by verdict, for each column of verdicts."""
         columns = zip(*(line.verdicts for line in self.lines), strict=True)
         return [
-            (header, [(one, column.count(one)) for one in self.kinds if one in column])
+            (header, [(kind, column.count(kind)) for kind in self.kinds if kind in column])
             for header, column in zip(self.headers[2:], columns, strict=True)
         ]
 
@@ -233,13 +233,13 @@ def setting_facts(settings: Mapping[str, Any]) -> dict[str, str]:
     """Return the settings of a study as text by name, each value of a list once."""
     facts = {}
     for name, value in settings.items():
-        several = value if isinstance(value, list) else [value]
-        several = [one for one in several if one is not None]
-        numbers = all(isinstance(one, int) and not isinstance(one, bool) for one in several)
-        if name == "seeds" and several[1:]:
-            facts["Seeds"] = f"{several[0]} to {several[-1]}"
+        entries = value if isinstance(value, list) else [value]
+        entries = [entry for entry in entries if entry is not None]
+        numbers = all(isinstance(entry, int) and not isinstance(entry, bool) for entry in entries)
+        if name == "seeds" and entries[1:]:
+            facts["Seeds"] = f"{entries[0]} to {entries[-1]}"
         elif name not in ("version", "worlds", "world", "pool", "after"):
-            values = sorted(set(several)) if numbers else dict.fromkeys(map(_plain, several))
+            values = sorted(set(entries)) if numbers else dict.fromkeys(map(_plain, entries))
             words = name.split(".", 1)[-1].replace("_", " ").replace(".", ", ")
             facts[words.capitalize()] = ", ".join(map(str, values))
     return {name: words for name, words in facts.items() if words}
@@ -253,8 +253,8 @@ def _plain(value: Any) -> str:
 
 def made_facts(made: Mapping[str, Any]) -> dict[str, str]:
     """Return the command, versions, machine and time of results as text, from their manifest."""
-    several = [one for one in made["packages"].items() if one[0] in _SHOWN_PACKAGES]
-    packages = ", ".join(f"{name} {version}" for name, version in several)
+    shown = [item for item in made["packages"].items() if item[0] in _SHOWN_PACKAGES]
+    packages = ", ".join(f"{name} {version}" for name, version in shown)
     changed = ", with changes that are not committed" if made.get("clean") is False else ""
     cpus = f"{made['cpus']} processors" if made["cpus"] != 1 else "one processor"
     facts = {

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import ast
-import importlib.util
 import os
 import re
 import sys
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager, suppress
-from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from taichi_ants.errors import AntsError, without_middle
@@ -20,7 +16,7 @@ from taichi_ants.settings import DeclaredSetting, Named, Settings, declared, nes
 from taichi_ants.studies.interruption import stop_if_noted, stoppable
 
 if TYPE_CHECKING:
-    from taichi_ants import World
+    from taichi_ants.worlds.world import World
 
 EXIT_BAD_INPUT = 2
 MOST_SHARDS = 100_000
@@ -33,8 +29,6 @@ WORLDS = (
     "setting of the world"
 )
 AGAIN = "Stopped; finished parts are saved. Run the same command again to resume."
-_imports: dict[str, ModuleSpec | None] = {}  # files that plugins import from their folders
-_finder: Any = SimpleNamespace(find_spec=lambda name, *_: _imports.get(name))  # see `sys.meta_path`
 
 
 class _HelpFormatter(argparse.ArgumentDefaultsHelpFormatter):
@@ -142,8 +136,8 @@ def add_machines(parser: argparse.ArgumentParser) -> None:
     )
     add("--ray", nargs="?", const=True, type=_address, metavar="HOST:PORT", help=ray)
     shard = (
-        "compute only the I-th of N equal parts, for example of a job array; "
-        "`taichi-ants merge` joins the parts"
+        "compute only the I-th of N equal parts, for example of a job array; the last part to "
+        "finish in a folder writes the tables"
     )
     add("--shard", type=_shard, metavar="I/N", help=shard)
 
@@ -172,7 +166,7 @@ def _shard(text: str) -> tuple[int, int]:
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """Return the settings with a folder for the results, which --quick and --shard change.
+    """Return the settings with a folder for the results, which --quick changes.
 
     Raises:
         AntsError: Options of `add_machines` exclude each other.
@@ -184,8 +178,6 @@ def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
                 "work; leave one of them out."
             )
     name = f"{name}-quick" if getattr(settings, "quick", False) else name
-    if shard := getattr(settings, "shard", None):
-        name = f"{name}-shard-{shard[0]}-of-{shard[1]}"
     settings.out = settings.out or Path("results", name)
     return settings
 
@@ -275,61 +267,6 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
         notice(f"error: {text.rstrip('.')}.")
         status = getattr(error, "exit_status", EXIT_BAD_INPUT)
     sys.exit(status)
-
-
-def read_plugin(path: str | None) -> dict[str, bytes]:
-    """Return the contents of a plugin, if any, and then of the files in its folder that it imports.
-
-    Raises:
-        AntsError: A file cannot be read, or has the name of an installed module.
-        SyntaxError: A file is not Python.
-    """
-    found, paths = dict[str, bytes](), [] if path is None else [path]
-    installed = [one for one in sys.path if one.endswith(("site-packages", "dist-packages"))]
-    for one in paths:
-        try:
-            found[one] = Path(one).read_bytes()
-        except (OSError, ValueError) as error:
-            raise AntsError(f"cannot read the plugin {one!r}; name a Python file (.py).") from error
-        nodes = [*ast.walk(ast.parse(found[one], one))]
-        imported = [name.name for n in nodes if isinstance(n, ast.Import) for name in n.names]
-        imported += [n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)]
-        for name in imported:
-            place = Path(one).with_name(f"{name}.py")
-            if str(place) not in paths and place.is_file():
-                if name in sys.stdlib_module_names or PathFinder.find_spec(name, installed):
-                    raise AntsError(f"{str(place)!r} has an installed module's name; rename it.")
-                paths.append(str(place))
-    return found
-
-
-def load_plugin(path: str | None) -> None:
-    """Run a Python file that registers learners, observations or worlds; do nothing for None.
-
-    Raises:
-        AntsError: The file cannot be read, raises or exits.
-    """
-    if path is None:
-        return
-    spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
-    if spec is None or spec.loader is None:
-        raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")
-    if _finder not in sys.meta_path:
-        sys.meta_path.insert(0, _finder)
-    module = importlib.util.module_from_spec(spec)
-    try:
-        for name, place in [(Path(one).stem, one) for one in read_plugin(path)][1:]:
-            _imports[name] = importlib.util.spec_from_file_location(name, place)
-            sys.modules.pop(name, None)  # that of another plugin
-        sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
-        spec.loader.exec_module(module)
-    except AntsError:
-        raise
-    except (Exception, SystemExit) as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".splitlines())
-        lacks = isinstance(error, ModuleNotFoundError)
-        remedy = "install it, or save it in the plugin's folder" if lacks else "correct the file"
-        raise AntsError(f"the plugin {path!r} failed with {reason}; {remedy}.") from error
 
 
 @contextmanager

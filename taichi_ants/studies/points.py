@@ -1,4 +1,4 @@
-"""Points: what a study computes for each seed, and the settings that identify it.
+"""Points: what a study computes for each seed, and the key that identifies it.
 
 A point is a world, a task, a learner, and the lengths of training and evaluation. The outcome of a
 run depends only on its point and seed.
@@ -7,24 +7,25 @@ run depends only on its point and seed.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING, Field, dataclass, field, fields
+from functools import lru_cache
 from itertools import product
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
-from taichi_ants import __version__, arguments, files, learners, measures
+from taichi_ants import PHYSICS, __version__, arguments, files, learners, measures, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
 from taichi_ants.features import COLONY
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.measures.series import Recorder, stops
+from taichi_ants.measures.series import Recorder
 from taichi_ants.protocol import ProtocolEvent, When, check_queen, check_room, checked_protocol
 from taichi_ants.settings import flat
-from taichi_ants.studies.blocks import Outcome
 from taichi_ants.task import Task
-from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, N_ACTIONS, ROW
+from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, ROW
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
@@ -33,10 +34,10 @@ if TYPE_CHECKING:
 # Added to the seeds of a colony for its evaluation, so that it shares no random numbers with the
 # training.
 EVALUATION_SEEDS = 1 << 32
-_STEPS_OF_A_BLOCK = 250_000_000  # at most, if every episode of every run uses all its steps
+_SECONDS_OF_A_BLOCK = 5.0  # of one processor, about
+_STEPS_OF_A_SECOND, _TICKS_OF_A_SECOND = 5e7, 1e7  # of a lone ant, of an ant in a colony, about
 _RUNS_OF_A_BLOCK = 5000  # at most; each needs about 20 KB during training
 _NUMBERS_OF_A_BLOCK = 1 << 26  # of four bytes, for colonies, at most, unless one needs more
-_WORK_OF_A_BLOCK = 1e8  # ticks of ants, about ten seconds on one thread
 _WORK_OF_A_CELL, _WORK_OF_DIFFUSION = 0.02, 0.08  # of a dense field in a tick
 _NUMBERS_OF_AN_ANT, _NUMBERS_OF_A_CELL = 13, 4  # upper bounds
 _RUN_ARRAYS = ("returns", "steps", "deliveries")
@@ -48,6 +49,34 @@ SERIES = "series_"  # begins the names of the series of measures in outcomes
 _LATER = ("policy", "measures", "measure_every", "evaluation_epsilon")
 
 Progress = Callable[[float], None]
+Outcome = dict[str, np.ndarray]  # arrays by name
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A world for each seed, as a recipe: JSON of a preset, a seed to add, settings and regions."""
+
+    recipe: str
+
+    @classmethod
+    def by(
+        cls, preset: str, first: int = 0, regions: Mapping[str, Any] | None = None, **settings: Any
+    ) -> Drawn:
+        """Return the worlds that `worlds.build(preset, first + seed, **settings)` draws."""
+        for one in worlds.settings_of(preset) if preset in worlds.names() else ():
+            if one.name in settings:  # so that equal numbers of other types are equal
+                settings[one.name] = one.checked(settings[one.name])
+        return cls(json.dumps([preset, first, settings, regions or {}], sort_keys=True))
+
+    def of(self, seed: int) -> World:
+        """Return the world of a seed; AntsError if a setting is not allowed."""
+        return _drawn(self.recipe, seed)
+
+
+@lru_cache(1024)  # because all points of a study can share worlds
+def _drawn(recipe: str, seed: int) -> World:
+    preset, first, settings, regions = json.loads(recipe)
+    return worlds.build(preset, first + seed, **settings).with_regions(regions)
 
 
 @dataclass(frozen=True)
@@ -56,8 +85,7 @@ class RunPoint:
 
     Outcome: `returns`, `steps` and `deliveries` of training, integer (seeds, episodes);
     `greedy_returns`, `greedy_steps` and `greedy_deliveries` of the rollouts, integer (seeds,
-    rollouts). With training also `q_values`, float32 (seeds, n_states, 5), and `seconds` of CPU
-    time for it, float64 (seeds,).
+    rollouts). With training also `q_values`, float32 (seeds, n_states, 5).
 
     Attributes:
         episodes: The number of training episodes; 0 with a policy.
@@ -75,6 +103,7 @@ class RunPoint:
     max_steps: int = EPISODE_STEPS
     rollouts: int = 50
     policy: FixedPolicy | None = None
+    kind: ClassVar[str] = "runs"
     ants: ClassVar[int] = 1
     pool: ClassVar[None] = None
     after: ClassVar[None] = None
@@ -99,21 +128,12 @@ class RunPoint:
     @property
     def runs_of_a_block(self) -> int:
         """The number of runs of a block: many, for speed, but few enough to save often."""
-        return min(max(1, _STEPS_OF_A_BLOCK // self.weight), _RUNS_OF_A_BLOCK)
+        return min(max(1, round(_SECONDS_OF_A_BLOCK / self.seconds)), _RUNS_OF_A_BLOCK)
 
     @property
-    def weight(self) -> int:
-        """The approximate work of a seed, for progress."""
-        return (self.episodes or self.rollouts) * self.max_steps
-
-    @property
-    def bytes_of_a_run(self) -> int:
-        """The approximate upper bound on the bytes of one seed's outcome on disk."""
-        most = self.max_steps * self.task.rewards.largest
-        ends = (-most, most), (0, self.max_steps), (0, 1)
-        of_an_episode = sum(files.smallest(np.array(one)).itemsize for one in ends)
-        numbers = (self.episodes + self.rollouts) * of_an_episode
-        return numbers + 4 * self.task.n_states * N_ACTIONS + 8
+    def seconds(self) -> float:
+        """The approximate time of a seed on one processor."""
+        return (self.episodes or self.rollouts) * self.max_steps / _STEPS_OF_A_SECOND
 
     @staticmethod
     def do(
@@ -136,20 +156,19 @@ class RunPoint:
             outcome = {name: np.zeros((*shape, 0), np.int32) for name in _RUN_ARRAYS}
         else:
             trained = train(world, configs, seeds, *lengths, task, **where, progress=progress)
-            q_values, steps = trained.q_values, trained.steps.sum(axis=2, dtype=float)
-            outcome = {name: files.smallest(getattr(trained, name)) for name in _RUN_ARRAYS}
-            seconds = trained.seconds * steps / steps.sum()
-            outcome |= {"q_values": q_values, "seconds": seconds}
+            q_values = trained.q_values
+            outcome = {name: small(getattr(trained, name)) for name in _RUN_ARRAYS}
+            outcome["q_values"] = q_values
         greedy = evaluate(world, q_values, first.rollouts, seeds, first.max_steps, task, **where)
         of_rollouts = {f"greedy_{name}": getattr(greedy, name) for name in _RUN_ARRAYS}
-        return outcome | {name: files.smallest(array) for name, array in of_rollouts.items()}
+        return outcome | {name: small(array) for name, array in of_rollouts.items()}
 
 
 @dataclass(frozen=True)
 class FixedPolicy:
     """A policy that ants follow without learning: its name or file, and its action values."""
 
-    name: str
+    name: str = field(compare=False)
     sha256: str
     q_values: np.ndarray = field(compare=False, repr=False)
 
@@ -179,7 +198,7 @@ class ColonyPoint:
     measure NAME.
 
     Attributes:
-        world: The world, or one for each seed, all of the same ranges.
+        world: The world, or the recipe of one for each seed, all of the same ranges.
         pool: Worlds of the same ranges for training; each seed draws one for each episode. None
             means training in `world`.
         sharing: "shared" or "independent" tables during training.
@@ -201,7 +220,7 @@ class ColonyPoint:
         AntsError: A value is not allowed.
     """
 
-    world: World | tuple[World, ...]
+    world: World | Drawn
     task: Task
     training: TrainingConfig
     pool: tuple[World, ...] | None = None
@@ -219,6 +238,7 @@ class ColonyPoint:
     measure_every: int | None = None
     protocol: tuple[ProtocolEvent, ...] = ()
     during: str = "evaluation"
+    kind: ClassVar[str] = "colony"
 
     def __post_init__(self) -> None:
         (config,) = arguments.checked_configs(self.training)
@@ -285,10 +305,16 @@ class ColonyPoint:
         for world in () if places is self.pool else places:  # a pool's worlds are drawn
             check_queen(event, of, world, self.ticks)
 
+    def check_worlds(self, several: Iterable[World]) -> None:
+        """Raise AntsError if an event of the evaluation is impossible in one of its worlds."""
+        events = self.events(learns=False)
+        for event, world in product(events, several if events else ()):
+            check_queen(event, events, world, self.ticks)
+
     @property
     def places_of_evaluation(self) -> tuple[World, ...]:
-        """The worlds of the evaluation: one, or one for each seed."""
-        return self.world if isinstance(self.world, tuple) else (self.world,)
+        """The worlds of the evaluation that checks look at: one, if each seed draws its own."""
+        return (self.world.of(0) if isinstance(self.world, Drawn) else self.world,)
 
     alike = property(lambda self: self)  # each point has its own blocks
 
@@ -304,25 +330,19 @@ class ColonyPoint:
         owners = slots if self.sharing == "independent" else 1
         ants, cells = slots * _NUMBERS_OF_AN_ANT, world.grid.size * _NUMBERS_OF_A_CELL
         fits = _NUMBERS_OF_A_BLOCK // (ants + cells + owners * table)
-        return max(1, min(fits, int(_WORK_OF_A_BLOCK / self.weight)))
+        return max(1, min(fits, round(_SECONDS_OF_A_BLOCK / self.seconds)))
 
     @property
-    def weight(self) -> float:
-        """The approximate work of a seed: that of a tick of an ant is 1."""
+    def seconds(self) -> float:
+        """The approximate time of a seed on one processor."""
         world = self.places_of_evaluation[0]
         cells = sum(
             world.grid.size * (_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL)
             for one in (self.task.pheromone, *self.task.fields.values())
             if one.dense
         )
-        return (self.ants + cells) * self.ticks * (self.episodes + self.rollouts)
-
-    @property
-    def bytes_of_a_run(self) -> int:
-        """The approximate upper bound on the bytes of one seed's outcome on disk."""
-        rows = len(self.measures) * len(list(stops(self.ticks, self.measure_every)))
-        numbers = 8 * (len(_COLONY_ARRAYS) + rows) * self.rollouts
-        return numbers + 4 * self.task.n_states * N_ACTIONS
+        ticks = self.ticks * (self.episodes + self.rollouts)
+        return (self.ants + cells) * ticks / _TICKS_OF_A_SECOND
 
     @property
     def exploration(self) -> float:
@@ -377,28 +397,42 @@ class ColonyPoint:
         """
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
-        tables: Any = point.policy.q_values if point.policy else learned
-        if point.episodes:
-            places = point.places(seeds)
-            learning = point.colony(
-                places[0] if places else point.world, seeds, learned, True, **where
-            )
-            part, protocol = part_of(progress, 0.0, share), point.events(learns=True)
-            learning.run(point.episodes, point.ticks, part, places, protocol=protocol)
-            tables = learning.q_values
-        colony = point.colony(point.world, seeds, tables, False, **where)
-        part, protocol = part_of(progress, share, 1 - share), point.events(learns=False)
+        tables = point.tables(seeds, learned, part_of(progress, 0.0, share), where)
+        colony = point.colony(point.worlds(seeds), seeds, tables, False, **where)
         episodes = colony.run(
-            *(point.rollouts, point.ticks, part),
+            *(point.rollouts, point.ticks, part_of(progress, share, 1 - share)),
             measures=point.measures,
             every=point.measure_every,
-            protocol=protocol,
+            protocol=point.events(learns=False),
         )
-        outcome = {name: files.smallest(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
+        outcome = {name: small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
         outcome |= _series_of(episodes, point)
         if point.episodes and point.sharing == "shared":
             outcome["q_values"] = tables
         return {name: array[None] for name, array in outcome.items()}
+
+    def tables(
+        self, seeds: Sequence[int], learned: Any, progress: Progress, where: Mapping[str, Any]
+    ) -> Any:
+        """Return the action values that ants follow in the evaluation; train them if necessary.
+
+        `learned` has the tables of the point `after`, from which learning starts.
+        """
+        if not self.episodes:
+            return self.policy.q_values if self.policy else learned
+        places = self.places(seeds)
+        learning = self.colony(
+            places[0] if places else self.worlds(seeds), seeds, learned, True, **where
+        )
+        protocol = self.events(learns=True)
+        learning.run(self.episodes, self.ticks, progress, places, protocol=protocol)
+        return learning.q_values
+
+    def worlds(self, seeds: Sequence[int]) -> Any:
+        """Return the world, or those of some seeds."""
+        return (
+            [self.world.of(one) for one in seeds] if isinstance(self.world, Drawn) else self.world
+        )
 
 
 def _series_of(episodes: ColonyEpisodes, point: ColonyPoint) -> Outcome:
@@ -419,6 +453,68 @@ Point = RunPoint | ColonyPoint
 PointKind = TypeVar("PointKind", bound=Point)
 
 
+def key_of(point: Point, *more: str) -> str:
+    """Return the checksum of all that determines the outcome of a point, given its seed.
+
+    Settings at their defaults do not count, so a new setting with a neutral default leaves all keys
+    as they are. `more` are checksums of code of the user, and other facts.
+    """
+    facts = {"physics": PHYSICS, "kind": point.kind, "more": more, **_changed(point)}
+    castes = {name: caste.policy for name, caste in point.task.castes.items() if caste.policy}
+    if castes:  # whose policies are named by their files
+        named = ((name, FixedPolicy.named(one, point.task)) for name, one in castes.items())
+        facts["castes"] = {name: one.sha256 for name, one in named}
+    return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:32]
+
+
+def _changed(value: Any) -> Any:
+    """Return what identifies a value in JSON, without settings that have their defaults."""
+    if isinstance(value, World):
+        return _sum_of(value)
+    if isinstance(value, Drawn):
+        return json.loads(value.recipe)
+    if isinstance(value, FixedPolicy):
+        return value.sha256
+    if isinstance(value, ProtocolEvent):
+        return value.facts()
+    if isinstance(value, Mapping):  # in which the order of the names counts
+        return [[name, _changed(one)] for name, one in value.items()]
+    if hasattr(value, "__dataclass_fields__"):
+        found = {one.name: getattr(value, one.name) for one in fields(value)}
+        own = {one.name: found[one.name] for one in fields(value) if found[one.name] != _usual(one)}
+        if isinstance(value, TrainingConfig):
+            usual = learners.get(value.learner).hyperparameters()
+            more = {n: v for n, v in value.hyperparameters if v != getattr(usual, n, None)}
+            own["hyperparameters"] = sorted(more.items())
+        return {name: _changed(one) for name, one in own.items()}
+    if isinstance(value, (list, tuple)):
+        return [_changed(one) for one in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _usual(one: Field[Any]) -> Any:
+    return one.default if one.default_factory is MISSING else one.default_factory()
+
+
+@lru_cache(4096)
+def _sum_of(world: World) -> str:
+    """Return a checksum of all cells and regions of a world."""
+    regions = {name: cells.tolist() for name, cells in world.regions.items()}
+    return files.checksum_of_json([world_facts(world), regions])[:32]
+
+
+def small(array: np.ndarray) -> np.ndarray:
+    """Return integers as the smallest signed type that holds them.
+
+    Signed, so that the type of joined blocks does not depend on how runs were cut into blocks.
+    """
+    low, high = int(array.min(initial=0)), int(array.max(initial=0))
+    kinds = (np.int8, np.int16, np.int32, np.int64)
+    return array.astype(
+        next(k for k in kinds if np.iinfo(k).min <= low and high <= np.iinfo(k).max)
+    )
+
+
 def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]:
     """Return everything that determines the results of points and seeds, by name.
 
@@ -428,6 +524,7 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
     places: list[Any] = [place for one in points for place in (one.world, one.pool) if place]
     worlds = list(dict.fromkeys(places))
     numbers = {one: number for several in (points, worlds) for number, one in enumerate(several)}
+    drawn = {one: tuple(map(one.of, seeds)) for one in worlds if isinstance(one, Drawn)}
     rows = [facts_of(point, lambda name, value: numbers[value]) for point in points]
     names = dict.fromkeys(name for row in rows for name in row)
     columns = {name: [row.get(name) for row in rows] for name in names}
@@ -436,7 +533,7 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
         "seeds": list(seeds),
         "worlds": [
             [world_facts(one) for one in world] if isinstance(world, tuple) else world_facts(world)
-            for world in worlds
+            for world in (drawn.get(one, one) for one in worlds)
         ],
         **{
             name: values[0] if all(one == values[0] for one in values) else values

@@ -36,7 +36,7 @@ from taichi_ants.settings import (
 )
 from taichi_ants.studies import design
 from taichi_ants.studies.design import Axis, Choices, Range
-from taichi_ants.studies.points import ColonyPoint, FixedPolicy, Point, RunPoint
+from taichi_ants.studies.points import ColonyPoint, Drawn, FixedPolicy, Point, RunPoint
 from taichi_ants.task import Task
 
 KINDS: dict[str, type] = {"runs": RunPoint, "colony": ColonyPoint}
@@ -56,13 +56,13 @@ Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
 
 
 @contextmanager
-def contents(path: Path, text: str | None = None) -> Iterator[Settings]:
-    """Yield the contents of a file (.toml), or of its text; errors in the context name the file.
+def contents(path: Path) -> Iterator[Settings]:
+    """Yield the contents of a file (.toml); errors in the context name the file.
 
     Raises:
         AntsError: The file cannot be read.
     """
-    text = files.read_text(path) if text is None else text
+    text = files.read_text(path)
     try:
         file = files.tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -127,7 +127,7 @@ class Base(NamedTuple):
         Reuses worlds and policies in `built`, and adds new ones. Raises AntsError if a setting is
         not allowed, or there are too few episodes for a measure.
         """
-        point = _point(self.kind, {**self.fixed, **row}, self.seeds, built, self.reading)
+        point = _point(self.kind, {**self.fixed, **row}, built, self.reading)
         for name in self.measures:
             least = finished.of_runs(self.kind, name).episodes
             # With fewer than 50 episodes, `compare` uses all of them; a sweep refuses.
@@ -301,11 +301,7 @@ def check_training(names: Iterable[str], points: Sequence[Point]) -> None:
 
 
 def _point(
-    kind: str,
-    settings: Settings,
-    seeds: tuple[int, ...],
-    built: dict[str, Any],
-    reading: Mapping[str, Any],
+    kind: str, settings: Settings, built: dict[str, Any], reading: Mapping[str, Any]
 ) -> Point:
     """Return the point of some settings; reuse worlds and policies in `built`, and add new ones.
 
@@ -335,7 +331,7 @@ def _point(
             raise AntsError(f"training.{name} is missing; add it to [training] or [vary].")
     key = repr(sorted(world.items()))
     if key not in built:
-        built[key] = _world(kind, world, seeds)
+        built[key] = _world(kind, world)
     if events:
         tree["protocol"] = protocol.read(events)
     return KINDS[kind](built[key], chosen, TrainingConfig(**training), **tree, **reading)
@@ -390,7 +386,7 @@ def _rather(name: str, kind: str, known: list[str]) -> str:
     return f"of this sweep; choose one of {', '.join(near)}"
 
 
-def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
+def _world(kind: str, given: Settings) -> Any:
     preset, drawn = given.pop("preset", "paper"), "seed" in given
     first, per_seed = given.pop("seed", 0), given.pop("per_seed", False)
     regions = given.pop("regions", {})
@@ -403,5 +399,4 @@ def _world(kind: str, given: Settings, seeds: tuple[int, ...]) -> Any:
     if not per_seed:
         return worlds.build(preset, first, **given).with_regions(regions)
     checked_whole("world.seed", first, -(2**62), 2**62)
-    drawn_worlds = (worlds.build(preset, first + seed, **given) for seed in seeds)
-    return tuple(world.with_regions(regions) for world in drawn_worlds)
+    return Drawn.by(preset, first, regions, **given)

@@ -175,8 +175,9 @@ class Caste(Settings, path="task.castes.NAME"):
 
     def __repr__(self) -> str:
         """Return the settings that differ from their defaults."""
-        usual, own = vars(Caste()), vars(self)
-        return f"Caste({', '.join(f'{n}={own[n]!r}' for n in own if own[n] != usual[n])})"
+        defaults, values = vars(Caste()), vars(self)
+        changed = [f"{name}={values[name]!r}" for name in values if values[name] != defaults[name]]
+        return f"Caste({', '.join(changed)})"
 
     @property
     def fixed(self) -> tuple[Any, ...]:
@@ -205,12 +206,12 @@ def shares_in(castes: Mapping[str, Caste], nest: int) -> list[float]:
         raise AntsError(
             f"`task.castes` has no caste for nest {nest}; add one, or leave `nest` out of a caste."
         )
-    given = [caste.share for caste in ours if caste.share is not None]
+    shares = [caste.share for caste in ours if caste.share is not None]
     n_open = sum(caste.share is None and caste.ants is None for caste in ours)
-    left = 1.0 - sum(given)
-    if left < -1e-9 or (given and not n_open and left > 1e-9):
+    left = 1.0 - sum(shares)
+    if left < -1e-9 or (shares and not n_open and left > 1e-9):
         raise AntsError(
-            f"the shares of `task.castes` in nest {nest} add up to {sum(given):g}; they must add "
+            f"the shares of `task.castes` in nest {nest} add up to {sum(shares):g}; they must add "
             "up to 1, or to less if another caste has neither `share` nor `ants`."
         )
     equal = max(left, 0.0) / n_open if n_open else 0.0
@@ -234,19 +235,19 @@ def numbers_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[int]:
     AntsError if there are too few ants, or ants without a caste.
     """
     shares = shares_in(castes, nest)
-    found = [(caste.ants or 0) if caste.is_in(nest) else 0 for caste in castes.values()]
-    rest = n - sum(found)
+    counts = [(caste.ants or 0) if caste.is_in(nest) else 0 for caste in castes.values()]
+    rest = n - sum(counts)
     if rest < 0 or (rest > 0 and not any(shares)):
         raise AntsError(
-            f"the castes have {sum(found)} ants in nest {nest}, but {n} ants start there; change "
+            f"the castes have {sum(counts)} ants in nest {nest}, but {n} ants start there; change "
             "`ants` of a caste, or give a caste a share."
         )
     quotas = [round(share * rest, 9) for share in shares]
-    found = [one + int(quota) for one, quota in zip(found, quotas, strict=True)]
+    counts = [ants + int(quota) for ants, quota in zip(counts, quotas, strict=True)]
     order = sorted(range(len(quotas)), key=lambda i: int(quotas[i]) - quotas[i])
-    for i in order[: n - sum(found)]:
-        found[i] += 1
-    return found
+    for i in order[: n - sum(counts)]:
+        counts[i] += 1
+    return counts
 
 
 def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
@@ -257,4 +258,4 @@ def chances_in(castes: Mapping[str, Caste], nest: int, n: int) -> list[float]:
     shares, most = shares_in(castes, nest), max(n, 1)
     fixed = [(caste.ants or 0) if caste.is_in(nest) else 0 for caste in castes.values()]
     rest = (n - sum(fixed)) / most if n else 1.0
-    return [one / most + share * rest for one, share in zip(fixed, shares, strict=True)]
+    return [ants / most + share * rest for ants, share in zip(fixed, shares, strict=True)]

@@ -8,13 +8,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 from taichi_ants.rules.registry import registered, words
-from taichi_ants.rules.rule import BUILT_IN, Rule
+from taichi_ants.rules.rule import Rule
 from taichi_ants.settings import Setting, Settings, Share
 
 if TYPE_CHECKING:
     import numpy as np
-
-CHOICE_RULES = BUILT_IN["choice"]
 
 
 @dataclass(frozen=True)

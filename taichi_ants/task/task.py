@@ -214,9 +214,13 @@ class Task(Settings, path="task"):
     def own_rules(self) -> tuple[Rule, ...]:
         """Your rules that the task uses, each once."""
         pheromones = (self.pheromone, *self.fields.values())
-        of_fields = [rule for one in pheromones for rule in (one.own_deposit, one.own_evaporation)]
-        every = (self.choice.own_rule, self.own_reward, *of_fields)
-        return tuple(dict.fromkeys(rule for rule in every if rule is not None))
+        of_fields = [
+            rule
+            for pheromone in pheromones
+            for rule in (pheromone.own_deposit, pheromone.own_evaporation)
+        ]
+        of_task = (self.choice.own_rule, self.own_reward, *of_fields)
+        return tuple(dict.fromkeys(rule for rule in of_task if rule is not None))
 
     def _check_rules(self) -> None:
         rules = {rule.name: rule for rule in self.own_rules}
@@ -244,7 +248,7 @@ class Task(Settings, path="task"):
         object.__setattr__(bare, "rules", Named())
         others = {name: value for name, value in changes.items() if name != "rules"}
         task = super(Task, bare)._changed(others)
-        kept = {name: self.rules.get(name, usual) for name, usual in task.rules.items()}
+        kept = {name: self.rules.get(name, default) for name, default in task.rules.items()}
         return super(Task, replace(task, rules=Named(kept)))._changed(
             {"rules": changes["rules"]} if "rules" in changes else {}
         )
@@ -293,7 +297,7 @@ class Task(Settings, path="task"):
             "deneubourg": ("k", "exponent"),
         }
         usual = rules["greedy"] if self.choice.needs_table else ()  # for your own rules
-        for name in {one for several in rules.values() for one in several}:
+        for name in {name for of_rule in rules.values() for name in of_rule}:
             value = getattr(caste, name)
             if value is not None and name not in rules.get(self.choice.rule, usual):
                 raise AntsError(
@@ -368,9 +372,9 @@ class Task(Settings, path="task"):
 
     def __repr__(self) -> str:
         """Return the settings that differ from the paper's."""
-        usual, own = vars(Task()), vars(self)
-        given = [f"{name}={own[name]!r}" for name in own if own[name] != usual[name]]
-        return f"Task({', '.join(given)})"
+        defaults, values = vars(Task()), vars(self)
+        changed = [f"{name}={values[name]!r}" for name in values if values[name] != defaults[name]]
+        return f"Task({', '.join(changed)})"
 
     @property
     def sees(self) -> Observation:
@@ -410,20 +414,20 @@ class Task(Settings, path="task"):
     def fields_while(self, learning: bool) -> dict[str, Field]:
         """Return the fields while ants learn or do not, with or without evaporation."""
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
-        return {name: one if falls else one.lasting for name, one in self.fields.items()}
+        return {name: field if falls else field.lasting for name, field in self.fields.items()}
 
     def compiled(self, learning: bool) -> dict[str, Any]:
         """Return what kernels are compiled for, while ants learn or do not; see `Features`."""
         pheromones = self.pheromone_while(learning), *self.fields_while(learning).values()
         cues = self.all_cues
         outbound, homing = cues[0]
-        found = {
+        facts = {
             "observation": self.sees,
-            "dense": tuple(one.dense for one in pheromones),
+            "dense": tuple(pheromone.dense for pheromone in pheromones),
             # Only the views of cues are compiled.
             "views": tuple(
-                one.view if any(number in pair for pair in cues) else "half"
-                for number, one in enumerate(pheromones)
+                pheromone.view if any(number in pair for pair in cues) else "half"
+                for number, pheromone in enumerate(pheromones)
             ),
             "outbound": outbound,
             "homing": homing,
@@ -441,17 +445,17 @@ class Task(Settings, path="task"):
             "n_castes": len(self.castes),
             "cues": cues if len(cues) > 1 else (),
             "has_labour": self.labour.divides,
-            "epsilon_varies": any(one.epsilon_spread for one in self.castes.values()),
+            "epsilon_varies": any(caste.epsilon_spread for caste in self.castes.values()),
         }
         if self.rules:
-            found |= {
+            facts |= {
                 "rules": self.own_rules,
                 "reward": self.reward,
-                "deposits": tuple(one.deposit for one in pheromones),
-                "evaporations": tuple(one.evaporation for one in pheromones),
+                "deposits": tuple(pheromone.deposit for pheromone in pheromones),
+                "evaporations": tuple(pheromone.evaporation for pheromone in pheromones),
                 "fields": (TRAIL, *self.fields),
             }
-        return found
+        return facts
 
     def number_of(self, cue: str) -> int:
         """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""

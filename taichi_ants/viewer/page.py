@@ -51,7 +51,7 @@ def content_policy(script: str, style: str, connect: str = "") -> str:
     none). Style attributes are allowed, because they position and colour bars and drawings.
     """
     digests = [hashlib.sha256(text.encode()).digest() for text in (script, style)]
-    scripts, styles = (f"'sha256-{base64.b64encode(one).decode()}'" for one in digests)
+    scripts, styles = (f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
     rules = [
         *("default-src 'none'", f"script-src {scripts}", f"style-src-elem {styles}"),
         *("style-src-attr 'unsafe-inline'", "img-src data:", "base-uri 'none'"),
@@ -111,25 +111,25 @@ def frame(recording: Recording) -> str:
     return f'<iframe title="{title}" {size} srcdoc="{whole}"></iframe>'
 
 
-def notebook(shown: Any) -> str | None:
+def notebook(media: Any) -> str | None:
     """Return HTML that shows a world, recording, trace or colony; None if it is too large.
 
     IPython calls this function, see `taichi_ants.__init__`.
     """
-    if isinstance(shown, Recording):
-        return frame(shown)
-    if isinstance(shown, World):
-        return _image(shown, picture(shown)) if shown.grid.size <= _MOST_CELLS else None
-    if isinstance(shown, Trace):
-        small = shown.made is not None and len(shown) <= _MOST_STEPS
-        return frame(record_trace(shown)) if small else None
-    expect("the object", shown, Colony)
-    if shown.grid.size > _MOST_CELLS or shown.ants > _MOST_ANTS or shown.episode < 0:
+    if isinstance(media, Recording):
+        return frame(media)
+    if isinstance(media, World):
+        return _image(media, picture(media)) if media.grid.size <= _MOST_CELLS else None
+    if isinstance(media, Trace):
+        small = media.arguments is not None and len(media) <= _MOST_STEPS
+        return frame(record_trace(media)) if small else None
+    expect("the object", media, Colony)
+    if media.grid.size > _MOST_CELLS or media.ants > _MOST_ANTS or media.episode < 0:
         return None
-    return frame(record_colony(shown))
+    return frame(record_colony(media))
 
 
-def _image(shown: World, pixels: np.ndarray) -> str:
+def _image(world: World, pixels: np.ndarray) -> str:
     """Return an HTML image of a world, with its text for screen readers."""
     content = base64.b64encode(png(pixels, optimize=True)).decode()
-    return f'<img alt="{html.escape(repr(shown))}" src="data:image/png;base64,{content}">'
+    return f'<img alt="{html.escape(repr(world))}" src="data:image/png;base64,{content}">'

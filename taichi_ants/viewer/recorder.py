@@ -69,7 +69,7 @@ class Progress:
         if ended:
             self._before, self._ended = numbers[1], colony.episode
 
-    def news(self) -> list[Point]:
+    def take_new_points(self) -> list[Point]:
         """Return the points of the curves that were added since the last call."""
         new, self._new = self._new, []
         return new
@@ -208,8 +208,8 @@ class Recorder:
         if self._learns:
             lines["learner"] = learners.label(config.learner)
             groups = {"nest": colony.n_nests, "caste": len(colony.task.castes)}
-            several = " and ".join(name for name, n in groups.items() if n > 1)
-            shared = f"one per {several}" if several else "shared"
+            parts = " and ".join(name for name, n in groups.items() if n > 1)
+            shared = f"one per {parts}" if parts else "shared"
             lines["table"] = "one per ant" if colony.one_a_slot else shared
             lines["learning rate"] = f"{config.learning_rate:g}"
             lines["discount"] = f"{config.discount:g}"
@@ -290,11 +290,11 @@ class Recorder:
         slots, states = slots[acted], states[acted]
         pairs = self._rows(slots, states) * N_ACTIONS + actions[acted]
         moved = self._tables().astype(np.float64).ravel()[pairs] - before.ravel()[pairs]
-        _, place, ants = np.unique(pairs, return_inverse=True, return_counts=True)
+        _, pair, ants = np.unique(pairs, return_inverse=True, return_counts=True)
         castes = self.colony.castes[self.world, slots]
-        weights = self.colony.update_weights_of(castes, ants[place])
-        found = np.full(len(moved), np.nan)
-        errors[acted] = np.divide(moved, weights, out=found, where=weights > 0)
+        weights = self.colony.update_weights_of(castes, ants[pair])
+        values = np.full(len(moved), np.nan)
+        errors[acted] = np.divide(moved, weights, out=values, where=weights > 0)
         return errors
 
     def _frame(self, sections: dict[str, Any]) -> bytes:
@@ -322,7 +322,7 @@ class Recorder:
         counts = (len(numbers), delivered, self.progress.ticks)
         stored, clock = colony.stored_trail(self.world, self.pheromone)
         sections["clock"] = (colony.episode, tick, *totals, *rates, *counts, clock)
-        sections.setdefault("progress", self.progress.news())
+        sections.setdefault("progress", self.progress.take_new_points())
         sections |= _changes("ground", self._ground, snapshot.ground)
         sections |= _changes("kinds", self._kinds, snapshot.food_kinds)
         sections |= _changes("trail", self._trail, stored)
@@ -398,27 +398,27 @@ def record_episode(episode: Episode, title: str = "") -> Recording:
 def record_trace(trace: Trace, title: str = "") -> Recording:
     """Return a recording of a `rollout` or `trace_training`; AntsError for any other trace."""
     expect("trace", trace, Trace)
-    made = trace.made
-    if made is None:
+    arguments = trace.arguments
+    if arguments is None:
         raise AntsError(
             "the trace does not contain its world and settings, so it cannot be replayed; use a "
             "trace of rollout or trace_training."
         )
     expect("title", title, str)
-    if made.config is None:
+    if arguments.config is None:
         title = title or "One ant that follows a policy"
-        return record_colony(colony_of_rollout(made), len(trace), title=title, follow=0)
+        return record_colony(colony_of_rollout(arguments), len(trace), title=title, follow=0)
     # A colony of one ant with an independent table repeats the training.
     options: dict[str, Any] = {"sharing": "independent", "ends_at_delivery": True}
-    colony = Colony(made.world, made.task, made.config, made.seed, 1, **options)
-    colony.begin_episode(made.max_steps)
+    colony = Colony(arguments.world, arguments.task, arguments.config, arguments.seed, 1, **options)
+    colony.begin_episode(arguments.max_steps)
     recorder, frames = Recorder(colony, 0, title, 0), []
     errors = np.zeros(len(trace)) if trace.td_errors is None else trace.td_errors
     for number, (step, error) in enumerate(zip(trace.steps.tolist(), errors, strict=True)):
         if step == 0 and number:
             recorder.progress.note(ended=True)
             colony.end_episode()
-            colony.begin_episode(made.max_steps)
+            colony.begin_episode(arguments.max_steps)
         if step == 0:
             frames.append(recorder.snapshot())
         frames.append(recorder.tick(td_errors=np.array([error])))

@@ -60,15 +60,15 @@ def open_world(
             f"rock_share {rock_share} and food_share {food_share} add up to more than {MAX_SHARE}; "
             "choose smaller shares, so that ants have space to walk."
         )
-    wanted = None if ranges is None else parse_ranges(ranges)
+    fixed = None if ranges is None else parse_ranges(ranges)
     for attempt in range(MAX_DRAWS):
         words = Stream(seed, _STREAM_RANGES, attempt).bits(3) >> np.uint64(32)
-        grid = AxialGrid(wanted or parse_ranges(10 + choose(words, 91)))  # from 10 to 100
+        grid = AxialGrid(fixed or parse_ranges(10 + choose(words, 91)))  # from 10 to 100
         world = _draw(grid, rock_share, food_share, piles, seed, attempt)
         if world.reachable_foods().any():
             return world
     raise AntsError(
-        f"in {MAX_DRAWS} open worlds of ranges {wanted or 'drawn at random'}, rock_share "
+        f"in {MAX_DRAWS} open worlds of ranges {fixed or 'drawn at random'}, rock_share "
         f"{rock_share} and food_share {food_share}, no food could be reached from the queen; "
         "choose larger ranges or other shares."
     )
@@ -128,8 +128,8 @@ def scatter_rocks(grid: AxialGrid, share: float, stream: Stream) -> np.ndarray:
     covered = np.zeros(grid.size, dtype=bool)
     n_covered, target = 0, share * grid.count
     while n_covered < target:
-        wanted = int(2 * (target - n_covered) / largest) + 1
-        words = stream.bits(min(wanted, max(1, _BATCH_CELLS // largest)))
+        n_tries = int(2 * (target - n_covered) / largest) + 1
+        words = stream.bits(min(n_tries, max(1, _BATCH_CELLS // largest)))
         centres = existing[choose(words >> np.uint64(32), len(existing))]
         radii = choose(words & np.uint64(0xFFFF_FFFF), max_radius + 1)
         rock, cell = _hexagons(grid, grid.cells(centres), radii)

@@ -317,12 +317,12 @@ def _marks_of_regions(
             f"the regions have {len(groups)} kinds of cells, but a map can show {len(_MARKS)}; "
             "leave out some regions."
         )
-    more, lines = [], []
+    legend, lines = [], []
     for mark, ((cell_mark, *names), group) in zip(_MARKS, groups.items(), strict=False):
-        more.append((np.array(group), mark))
+        legend.append((np.array(group), mark))
         end = "" if cell_mark == EMPTY else f" {cell_mark}"
         lines.append(f"region {', '.join(names)} = {mark}{end}")
-    return more, lines
+    return legend, lines
 
 
 def drawing(ranges: tuple[int, int, int], marks: Iterable[tuple[np.ndarray, str]]) -> str:

@@ -126,8 +126,8 @@ class World:
 
     def with_regions(self, regions: Mapping[str, Any]) -> World:
         """Return the world with more regions, which replace those of the same names."""
-        more = validation.parse_regions(self.grid, regions)
-        return replace(self, regions={**self.regions, **more}) if more else self
+        by_name = validation.parse_regions(self.grid, regions)
+        return replace(self, regions={**self.regions, **by_name}) if by_name else self
 
     def region(self, name: str) -> np.ndarray:
         """Return the flat indices of the cells of a region; AntsError if there is none."""
@@ -169,11 +169,11 @@ class World:
 
     def closer(self, nest: int = 0) -> np.ndarray:
         """Return bit h by cell, 1 if the neighbour at heading h is nearer to a queen (uint8)."""
-        here = self._far(nest)
+        distances = self._far(nest)
         bits = np.zeros(self.grid.size, dtype=np.uint8)
         for heading, offset in enumerate(self.grid.offsets.tolist()):
-            there = np.roll(here, -offset)
-            bits |= (there < here).astype(np.uint8) << np.uint8(heading)
+            beyond = np.roll(distances, -offset)
+            bits |= (beyond < distances).astype(np.uint8) << np.uint8(heading)
         return bits * self.grid.exists
 
     def walkable(self, starts: np.ndarray) -> np.ndarray:
@@ -267,7 +267,7 @@ class World:
         free, (index,) = free.copy(), np.nonzero(free)
         words = stream_state(seed, STREAM_START_CELL, self.grid.number(self.grid.cells(index)))
         far = (self._far(nest)[index] for nest in range(self.n_nests))
-        queues = [iter(index[np.lexsort((words, distance))].tolist()) for distance in far]
+        queues = [iter(index[np.lexsort((words, steps))].tolist()) for steps in far]
         cells = np.empty(n, np.int64)
         for i, nest in enumerate(self.nests_of(n_taken + n)[n_taken:].tolist()):
             cells[i] = next(cell for cell in queues[nest] if free[cell])

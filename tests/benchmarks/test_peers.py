@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import measuring
 import numpy as np
 import peers
 import pytest
 from systems import numpy_runs
 
-from taichi_ants import AntsError, Task, TrainingConfig, train, worlds
-from taichi_ants.analysis.tables import Table, plain_text
+from taichi_ants import Task, TrainingConfig, train, worlds
+from taichi_ants.analysis.tables import plain_text
 from taichi_ants.engines.runs.traces import trace_training
 from taichi_ants.task.events import Event
 
@@ -62,28 +61,6 @@ def test_numpy_trains_as_we_do(ours):
 
 
 @pytest.mark.slow
-def test_jax_trains_as_we_do(ours):
-    pytest.importorskip("jax")
-    from systems import jax_runs
-
-    assert_distributed_alike(ours, jax_runs.train(CONFIGS, SEEDS, EPISODES, STEPS))
-
-
-@pytest.mark.slow
-def test_jax_steps_as_we_do(trace):
-    pytest.importorskip("jax")
-    from systems import jax_runs
-
-    runs, numbers = jax_runs.first(CONFIGS[:1], 1)
-    words = np.zeros((len(trace.actions), 1, 6), np.float32)  # explores always, by the largest
-    words[np.arange(len(words)), 0, trace.actions] = 0.5
-    runs, (ended, returned, _) = jax_runs.follow(runs, numbers, words, STEPS)
-    assert np.allclose(runs.q[0], trace.tables[-1], rtol=1e-4, atol=1e-4)
-    returns = np.bincount(trace.episodes, trace.rewards)
-    assert np.asarray(returned)[np.asarray(ended)].tolist() == returns.tolist()
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("parallel", [False, True])
 def test_numba_gives_the_same_runs(ours, parallel):
     pytest.importorskip("numba")
@@ -106,36 +83,3 @@ def test_the_tables():
     text = plain_text([table, below], 120)
     assert "16 ants, trails, right of way" in text
     assert "Absent is skipped, because it requires no_such_package." in text
-
-
-def test_a_page_takes_tables_in_their_place(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text("before\n<!-- one -->\nold\n<!-- /one -->\nafter\n")
-    table = Table("A title", ["a", "b"], [["c", "1"]])
-    for _ in range(2):
-        measuring.publish("one", [table], page)
-        text = page.read_text()
-        assert text.startswith("before\n<!-- one -->\n\n**A title**\n\n| a | b |\n")
-        assert text.endswith("| c | 1 |\n\n<!-- /one -->\nafter\n")
-    with pytest.raises(AntsError, match="lacks the lines <!-- two -->"):
-        measuring.publish("two", [table], page)
-    assert page.read_text() == text
-
-
-def test_the_pages_places():
-    text = measuring.PAGE.read_text()
-    for name in ("peers", "growth"):
-        assert text.index(f"<!-- {name} -->\n") < text.index(f"<!-- /{name} -->")
-
-
-@pytest.mark.long
-def test_the_command(capfd):
-    with pytest.raises(SystemExit) as end:
-        peers.main(["--small", "--rounds", "1"])
-    assert end.value.code == 0
-    out, err = capfd.readouterr()
-    assert err == ""
-    for group, systems in peers.GROUPS.items():
-        assert group in out
-        for one in systems:
-            assert one.name in out  # measured, or left out by name

@@ -57,13 +57,3 @@ def test_each_fault_is_found():
         assert soak.faults(colony) == []
         put(colony)
         assert words in soak.faults(colony)
-
-
-@pytest.mark.long
-def test_a_small_soak_holds(capsys):
-    with pytest.raises(SystemExit) as end:
-        soak.main(["--ants", "300", "--ticks", "9000"])
-    assert end.value.code == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[-1] == "All checks passed."
-    assert len(lines) == 2 + 2 * 10

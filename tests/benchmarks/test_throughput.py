@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 import throughput
 from random_worlds import random_world
 
 from taichi_ants import AntsError, Task, TrainingConfig, train
 from taichi_ants.worlds import paper
-
-needs_c = pytest.mark.skipif(throughput.compiler(1) is None, reason="there is no C compiler")
 
 
 @pytest.fixture(scope="module")
@@ -50,16 +47,6 @@ def test_c_gives_the_same_runs(learner, delivery, name, yardsticks):
     assert deliveries > 100
 
 
-@pytest.mark.parametrize("name", throughput.YARDSTICKS.values())
-def test_fewer_runs_than_lanes(name, yardsticks):
-    yardstick, configs = yardstick_of(yardsticks, name), throughput.grid("dyna_q", 3)[:1]
-    result = train(paper(), configs, 3, 4, 600)
-    trained = throughput.train_in_c(yardstick, paper(), configs, [3], False, 4)
-    throughput.check_same(trained, result)
-    with pytest.raises(AntsError, match="other steps than the package"):
-        throughput.check_same(trained._replace(steps=trained.steps + 1), result)
-
-
 def said_by(arguments, capsys):
     with pytest.raises(SystemExit) as end:
         throughput.main(arguments)
@@ -67,41 +54,6 @@ def said_by(arguments, capsys):
 
 
 SMALL = ["--seeds", "1", "--rounds", "1"]
-
-
-def rows_of(said):
-    """The cells behind the label of each row, spaces within numbers removed."""
-    labels = [*throughput.LEARNERS, "the grid"]
-    lines = {line[:12].strip(): line[12:].split() for line in said.splitlines()}
-    return [["".join(lines[label][:-5]), *lines[label][-5:]] for label in labels]
-
-
-@pytest.mark.long
-@needs_c
-def test_its_table_and_its_guard(capsys):
-    code, said = said_by(SMALL, capsys)
-    assert code == 0
-    rows = rows_of(said.out)
-    expected = train(paper(), throughput.grid("sarsa", 0), 0, task=Task(delivery="truncates"))
-    assert int(rows[1][0]) == expected.steps.sum()
-    assert int(rows[-1][0]) == sum(int(row[0]) for row in rows[:-1])
-    for row in rows:
-        ours, in_c, ratio = float(row[1]), float(row[2]), float(row[4])
-        assert ratio == pytest.approx(ours / in_c, rel=0.05)
-    code, said = said_by([*SMALL, "--least", "1000"], capsys)
-    assert code != 0
-    assert "at least 1000 is expected" in said.err
-
-
-@needs_c
-def test_without_vectors(tmp_path, monkeypatch):
-    monkeypatch.setattr(throughput, "FLAGS", (*throughput.FLAGS, "-U__AVX512F__"))
-    loaded = throughput.load_yardsticks(throughput.compiler(1), tmp_path, 1)
-    assert list(loaded) == ["C"]
-    seconds = {label: np.ones((1, 2)) for label in throughput.LEARNERS}
-    made = throughput.table(["C"], dict.fromkeys(seconds, 10**6), seconds, 1, 1)
-    assert [row[4] for row in made.rows] == ["-"] * 5
-    assert made.notes[-1].startswith("No vector C")
 
 
 @pytest.mark.parametrize(
@@ -116,28 +68,3 @@ def test_a_least_ratio_is_a_number_from_0_on(least, why, capsys):
     assert (code, said.out) == (2, "")
     assert said.err.startswith("error: --least: ")
     assert why in said.err
-
-
-def test_the_first_compiler_that_has_openmp(tmp_path, monkeypatch):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.delenv("CC", raising=False)
-    for name, code in (("clang", 1), ("gcc", 0), ("cc", 0)):
-        (tmp_path / name).write_text(f"#!/bin/sh\nexit {code}\n")
-        (tmp_path / name).chmod(0o755)
-    assert throughput.compiler(1) == str(tmp_path / "clang")
-    assert throughput.compiler(2) == str(tmp_path / "gcc")
-    monkeypatch.setenv("CC", "clang")
-    assert throughput.compiler(2) == str(tmp_path / "clang")
-    monkeypatch.delenv("CC")
-    for name in ("gcc", "cc"):
-        (tmp_path / name).unlink()
-    assert throughput.compiler(2) == str(tmp_path / "clang")  # its error says what to install
-
-
-def test_without_a_compiler(capsys, monkeypatch):
-    monkeypatch.setenv("PATH", "")
-    monkeypatch.delenv("CC", raising=False)
-    code, said = said_by(SMALL, capsys)
-    assert code == 0
-    assert [row[2] for row in rows_of(said.out)] == ["-"] * 5
-    assert said.out.splitlines()[-1].startswith("There is no C compiler")

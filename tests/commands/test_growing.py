@@ -1,4 +1,4 @@
-"""Studies that grow, and shards that are merged: the bytes of one plain run, by any way."""
+"""Studies that grow, shards, and damage: the bytes of one plain run, by any way."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from command_lines import (
     assert_one_sentence,
@@ -22,9 +21,8 @@ from command_lines import (
     start,
 )
 
-from taichi_ants.files import archives
+from taichi_ants.studies.folder import sessions_in, status
 from taichi_ants.studies.points import ColonyPoint, RunPoint
-from taichi_ants.studies.state import state
 
 RUNS = """
 kind = "runs"
@@ -123,8 +121,7 @@ def test_unfinished_work_grows_too(sweep, monkeypatch):
         return real(points, seeds, *more)
 
     monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
-    fewer = RUNS.replace("[7, 2, 5, 1]", "[7, 2]")
-    assert sweep(fewer, "grown")[0] == 130
+    assert sweep(RUNS.replace("[7, 2, 5, 1]", "[7, 2]"), "grown")[0] == 130
     monkeypatch.setattr(RunPoint, "do", staticmethod(real))
     assert sweep(RUNS, "grown")[0] == 0
     assert_same_results("plain", "grown")
@@ -137,126 +134,117 @@ def test_unfinished_work_grows_too(sweep, monkeypatch):
         (RUNS, ("discount = 0.9\n", "discount = 0.8\n"), "discount is 0.9 instead of 0.8"),
         (RUNS, ("[7, 2, 5, 1]", "[7, 2, 5]"), "that this study lacks (seed 1); add them"),
         (RUNS, ("[0.01, 0.1, 0.2]", "[0.01, 0.1, 0.3]"), "lacks (training.learning_rate 0.2)"),
-        (RUNS, ("return_all", "return_last50"), "not the same measures"),
         (RUNS, ("[training]", 'task.delivery = "truncates"\n[training]'), "task.delivery is "),
-        (DRAWN, ("samples = 8", "samples = 4"), "that this study lacks (4 samples); add them"),
-        (DRAWN, ("samples = 8", "samples = 8\ndesign_seed = 3"), "(design_seed is 0 instead of 3)"),
-        (DRAWN, ("to = 0.2", "to = 0.3"), "(not the same training.learning_rate, vary)"),
-        (DRAWN, ('"sobol"', '"random"'), "(design is 'sobol' instead of 'random')"),
+        (DRAWN, ("samples = 8", "samples = 4"), "that this study lacks (training.learning_rate 0."),
+        (DRAWN, ("samples = 8", "samples = 8\ndesign_seed = 3"), "design.design_seed is 0 instead"),
+        (DRAWN, ('"sobol"', '"random"'), "design.design is 'sobol' instead of 'random'"),
     ],
 )
 def test_what_contradicts_is_refused_by_name(text, change, words, sweep):
     assert sweep(text, "a")[0] == 0
     before = contents(Path("a"))
-    enough = ("episodes = 6", "episodes = 50") if "last50" in change[1] else ("", "")
-    status, _, err = sweep(text.replace(*change).replace(*enough), "a")
+    status, _, err = sweep(text.replace(*change), "a")
     assert status == 2
     assert_one_sentence(err)
     assert words in err
     assert contents(Path("a")) == before
+    assert sweep(text.replace(*change), "a", "--force")[0] == 0
+    assert sweep(text.replace(*change), "plain")[0] == 0
+    assert tables_of("a") == tables_of("plain")
 
 
-def test_altered_results_do_not_grow(sweep):
-    assert sweep(FEWER["runs"], "a")[0] == 0
-    with open("a/runs.csv", "a") as file:
-        file.write("0,0,0,0,0\n")
+def tables_of(folder):
+    return {path.name: path.read_bytes() for path in Path(folder).glob("*.csv")}
+
+
+def test_other_measures_and_values_that_are_equal_floats_extend_a_sweep(sweep):
+    """The finished runs stay, and only what is new is computed."""
+    assert sweep(RUNS, "a")[0] == 0
+    more = RUNS.replace('"return_all"', '"return_all", "steps_all"')
+    assert sweep(more, "a")[::2] == (0, "")
+    near = RUNS.replace("[0.01, 0.1, 0.2]", "[0.01, 0.1, 0.10000000000000002, 0.2]")
+    near = near.replace("0.1,", "0.1000000000000000055,", 1)
+    assert sweep(near, "a", "--force")[::2] == (0, "")
+    assert sweep(near, "plain")[0] == 0
+    assert tables_of("a") == tables_of("plain")
+
+
+def test_results_of_other_physics_are_refused(sweep, monkeypatch):
+    assert sweep(RUNS, "a")[0] == 0
+    monkeypatch.setattr("taichi_ants.studies.points.PHYSICS", 99)
+    monkeypatch.setattr("taichi_ants.studies.folder.PHYSICS", 99)
     status, _, err = sweep(RUNS, "a")
     assert status == 2
-    assert "has changed since they were finished" in err
+    assert "contains results of other settings (physics is 1 instead of 99); choose another" in err
+
+
+def test_a_table_that_was_changed_or_removed_is_written_again(sweep, monkeypatch):
+    assert sweep(RUNS, "a")[0] == 0
+    before = contents(Path("a"))
+    with open("a/runs.csv", "a") as file:
+        file.write("0,0,0,0,0\n")
+    Path("a/summary.csv").unlink()
+    monkeypatch.setattr(RunPoint, "do", None)
+    assert sweep(RUNS, "a")[::2] == (0, "")
+    after = contents(Path("a"))
+    assert {name for name in after if after[name] != before.get(name)} <= {"manifest.json"}
+
+
+def test_read_only_results_are_shown(sweep):
+    """In a forked process, in which nothing can be written to their folder."""
+    assert sweep(RUNS, "a")[0] == 0
+    process = os.fork()
+    if process == 0:
+
+        def hook(event, details):
+            writes = event == "open" and details[2] & (os.O_CREAT | os.O_WRONLY | os.O_RDWR)
+            if (writes or event in ("os.mkdir", "os.rename")) and str(details[0]).startswith("a"):
+                raise PermissionError(30, os.strerror(30))
+
+        sys.addaudithook(hook)
+        shown, more = sweep(RUNS, "a"), sweep(RUNS.replace("[7,", "[7, 8,"), "a")
+        is_right = "a/ already has these results" in shown[1] and shown[::2] == (0, "")
+        os._exit(0 if is_right and (more[0], more[2].count("\n")) == (2, 1) else 1)
+    assert os.waitpid(process, 0)[1] == 0
 
 
 @pytest.mark.parametrize("kind", SWEEPS)
-def test_three_shards_merge_to_the_bytes_of_one_run(kind, sweep, capsys):
+def test_three_shards_have_the_bytes_of_one_run(kind, sweep):
+    """In one folder, whose last shard writes the tables, and in several, by copying files."""
     assert sweep(SWEEPS[kind], "plain")[0] == 0
-    for n in (1, 2, 3):
-        status, out, err = sweep(SWEEPS[kind], f"s{n}", "--shard", f"{n}/3")
+    for n in (3, 1, 2):
+        status, out, err = sweep(SWEEPS[kind], "one", "--shard", f"{n}/3")
         assert (status, err) == (0, "")
-        assert f"Shard {n} of 3 is finished in s{n}/" in out
-    Path("my.toml").unlink()
-    shutil.copytree("s1", "once more")  # overlaps that are the same are allowed
-    status, _, err = call("merge", ["s3", "s1", "once more", "s2", "--out", "merged"], capsys)
-    assert (status, err) == (0, "")
+        assert ("Shard" in out) == (n != 2)
+        assert sweep(SWEEPS[kind], f"s{n}", "--shard", f"{n}/3")[0] == 0
+        shutil.copytree(f"s{n}/blocks", "merged/blocks", dirs_exist_ok=True)
+    assert sweep(SWEEPS[kind], "merged")[0] == 0
+    assert_same_results("plain", "one")
     assert_same_results("plain", "merged")
+    assert not sessions_in(Path("merged"))  # nothing was computed
 
 
-def test_shards_in_one_folder_need_no_merge(sweep):
+DAMAGES = {"cut": lambda content: content[:-40], "empty": lambda content: b""}
+
+
+@pytest.mark.parametrize("damage", [*DAMAGES, "bit"])
+def test_a_damaged_block_is_computed_again(damage, sweep):
     assert sweep(RUNS, "plain")[0] == 0
-    for n in (2, 1):
-        assert sweep(RUNS, "all", "--shard", f"{n}/2")[0] == 0
-    assert sweep(RUNS, "all")[0] == 0
-    assert_same_results("plain", "all")
-
-
-def test_shards_that_do_not_fit_are_refused(sweep, capsys):
-    for n in (1, 2):
-        assert sweep(RUNS, f"s{n}", "--shard", f"{n}/3")[0] == 0
-    assert sweep(RUNS.replace("seeds = [7,", "seeds = [8,"), "other", "--shard", "3/3")[0] == 0
-    assert sweep(FEWER["runs"], "finished")[0] == 0
-
-    def refused(*folders):
-        status, _, err = call("merge", [*folders, "--out", "merged"], capsys)
-        assert status == 2
-        assert_one_sentence(err)
-        assert not Path("merged").exists()
-        return err
-
-    assert "8 of 24 runs are missing in these folders; give shard 3 of 3 too" in refused("s1", "s2")
-    assert "not shards of the same work (seeds differ)" in refused("s1", "s2", "other")
-    assert "'finished' has finished results, not a shard" in refused("s1", "finished")
-    assert "'nothing' does not exist" in refused("s1", "nothing")
-    assert sweep(RUNS, "s3", "--shard", "3/3")[0] == 0
-    shutil.copytree("s1", "wrong")
-    for path in Path("wrong/unfinished/blocks").iterdir():
-        arrays = archives.read(path)
-        arrays["value_return_all"] = arrays["value_return_all"] + 1
-        archives.write(path, arrays, compress=False)
-    err = refused("s1", "s2", "wrong", "s3")
-    assert "'s1' and 'wrong' have different results for training.learning_rate 0.01, " in err
-
-
-@pytest.mark.parametrize("part", ["header", "array"])
-def test_a_damaged_block_of_a_shard_is_computed_again_by_its_command(part, sweep, capsys):
-    assert sweep(RUNS, "plain")[0] == 0
-    for n in (1, 2):
-        assert sweep(RUNS, f"s{n}", "--shard", f"{n}/2")[0] == 0
-    path = blocks_of("s2")[0]
+    assert sweep(RUNS, "a")[0] == 0
+    path, *_ = sorted(Path("a/blocks").iterdir())
     content = bytearray(path.read_bytes())
-    first, *_, header = (one.start() for one in re.finditer(rb"\x93NUMPY", content))
-    content[(header if part == "header" else first) + 130] ^= 1  # after NumPy's 128 bytes
-    path.write_bytes(content)
-    before = contents(Path("s2"))
-    status, _, err = call("merge", ["s1", "s2", "--out", "merged"], capsys)
+    content[content.rindex(b"\x93NUMPY") + 130] ^= 1  # after NumPy's 128 bytes
+    path.write_bytes(content if damage == "bit" else DAMAGES[damage](path.read_bytes()))
+    Path("a/runs.csv").unlink()
+    status, _, err = sweep(RUNS, "a")
+    assert status == 0
+    assert err.startswith(f"'{path}' is damaged, so its runs are ")
+    assert_same_results("plain", "a")
+    Path("a/study.json").write_text("{")
+    status, _, err = sweep(RUNS.replace("[7,", "[7, 8,"), "a")
     assert status == 2
     assert_one_sentence(err)
-    assert f"'{path}' is damaged; run the command of the shard in 's2' again" in err
-    assert contents(Path("s2")) == before
-    assert not Path("merged").exists()
-    status, _, err = sweep(RUNS, "s2", "--shard", "2/2")
-    assert status == 0
-    assert "is damaged or has other settings, so it is computed again" in err
-    assert call("merge", ["s1", "s2", "--out", "merged"], capsys)[::2] == (0, "")
-    assert_same_results("plain", "merged")
-
-
-def test_a_merge_that_was_killed_counts_the_runs_of_all_shards(sweep, capsys, monkeypatch):
-    for n in (1, 2):
-        assert sweep(RUNS, f"s{n}", "--shard", f"{n}/2")[0] == 0
-    with monkeypatch.context() as patch:
-        patch.setattr("taichi_ants.commands.merge.started", lambda *given: None)
-        assert call("merge", ["s1", "s2", "--out", "merged"], capsys)[0] == 0
-    assert "unfinished: 24 of 24 runs done" in call("status", ["merged"], capsys)[1]
-
-
-def test_a_merge_replaces_other_results_only_if_asked(sweep, capsys):
-    assert sweep(FEWER["runs"], "merged")[0] == 0
-    assert sweep(RUNS.replace("seeds = [7,", "seeds = [8,"), "other")[0] == 0
-    assert sweep(RUNS, "s1", "--shard", "1/1")[0] == 0
-    for out in ("merged", "other"):
-        status, _, err = call("merge", ["s1", "--out", out], capsys)
-        assert status == 2
-        assert "--force" in err
-        assert call("merge", ["s1", "--out", out, "--force"], capsys)[::2] == (0, "")
-        assert_same_results("merged", out)
+    assert "'a/study.json' is damaged; remove it and run the command" in err
 
 
 @pytest.mark.parametrize("shard", ["4/3", "0/3", "2", "a/b", "1/0", "-1/3"])
@@ -267,41 +255,73 @@ def test_shards_that_do_not_exist_are_refused(shard, sweep):
     assert "write I/N" in err
 
 
-def test_status_and_rows_of_work_in_progress(sweep, capsys, monkeypatch):
+def test_status_and_tables_of_work_in_progress(sweep, capsys, monkeypatch):
     real, seen = RunPoint.do, []
 
     def fails(points, seeds, *more):
         if 0.2 in (point.training.learning_rate for point in points) and 1 in seeds:
             raise KeyError("a plugin")
-        seen.append((call("status", ["a"], capsys), Path("a/unfinished/rows/runs.csv")))
-        seen[-1] = seen[-1][0], seen[-1][1].read_text() if seen[-1][1].exists() else ""
+        seen.append(call("status", ["a"], capsys))
         return real(points, seeds, *more)
 
     monkeypatch.setattr(RunPoint, "do", staticmethod(fails))
     status, _, err = sweep(RUNS, "a")
     assert status == 1
     assert_one_sentence(err)
-    assert (
-        "2 blocks failed: task.rewards.shaping 1, training.learning_rate 0.2, seed 1 (KeyEr" in err
+    assert re.search(
+        "failed: .*training.learning_rate 0.2, .*seeds? .*1 \\(KeyError: 'a plugin'", err
     )
-    (status, out, _), rows = seen[-1]
+    status, out, _ = seen[-1]
     assert status == 0
     assert out.splitlines()[0] == "a"
-    assert "unfinished: 19 of 24 runs done (79 % of the work), in 9 blocks" in out
+    assert re.search(r"unfinished: \d+ of 24 runs done \(\d+ % of the work\), in \d+ blocks", out)
     monkeypatch.setattr(RunPoint, "do", staticmethod(real))
     _, out, _ = call("status", ["a"], capsys)
-    assert out.count("failed: task.rewards.shaping ") == 2
-    assert "22 of 24 runs done" in out
-    partial = Path("a/unfinished/rows/runs.csv").read_text().splitlines()
+    (done,) = re.findall(r"(\d+) of 24", out)
+    assert "  failed: " in out
+    assert "  last block: " in out
+    status, out, _ = call("tables", ["a", "--no-figures"], capsys)
+    assert status == 0
+    assert f"{24 - int(done)} runs are missing" in out
+    partial = Path("a/runs.csv").read_text().splitlines()
+    assert not Path("a/manifest.json").exists()
     assert sweep(RUNS, "a")[0] == 0
     final = Path("a/runs.csv").read_text().splitlines()
     assert partial[0] == final[0]
     assert set(partial) < set(final)
-    assert len(partial) == 23
-    assert rows.splitlines()[0] == final[0]
+    assert len(partial) == int(done) + 1
+    assert call("tables", ["a", "--no-figures"], capsys)[0] == 0
+    assert Path("a/runs.csv").read_text().splitlines() == final
     _, out, _ = call("status", ["a"], capsys)
     assert "finished: results with 24 runs, since" in out
-    assert call("status", ["nothing"], capsys)[0] == 2
+    status, out, err = call("status", ["nothing", "a", "none"], capsys)
+    assert status == 2
+    assert err.count("has no results; name the folder of a study") == 2
+
+
+def test_the_time_left_is_that_of_the_last_process(sweep, monkeypatch):
+    real, calls = RunPoint.do, []
+
+    def stops(*arguments):
+        calls.append(arguments)
+        if len(calls) > 3:
+            raise KeyboardInterrupt
+        return real(*arguments)
+
+    monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
+    assert sweep(RUNS, "a")[0] == 130
+    (one,) = sessions_in(Path("a"))
+    blocks = sorted(Path("a/blocks").iterdir(), key=os.path.getmtime)
+    os.utime(blocks[0], (0, one["began"] - 99))  # of a process before
+    os.utime(blocks[1], (0, one["began"] + 100))
+    os.utime(blocks[2], (0, one["began"] + 5 * 86400))
+    (left,) = (line for line in status(Path("a")) if line.startswith("left"))
+    assert re.fullmatch(r"left: about \d+ days", left)
+    assert next(line for line in status(Path("a")) if "last" in line) == "last block: 0 seconds ago"
+    old = time.time() - 3 * 86400
+    for path in blocks:
+        os.utime(path, (old, old))
+    assert "last block: 3 days ago" in status(Path("a"))
 
 
 def test_tables_are_written_as_parquet_too(sweep, capsys, monkeypatch):
@@ -312,108 +332,18 @@ def test_tables_are_written_as_parquet_too(sweep, capsys, monkeypatch):
         status, _, err = sweep(COLONY, "whole", "--parquet")
         assert status == 2
         assert 'pip install -e ".[parquet]"' in err
-    assert sweep(COLONY, "plain")[0] == 0
-    before = contents(Path("plain"))
-    real, seen = ColonyPoint.do, []
-
-    def looks(*arguments):
-        rows = Path("whole/unfinished/rows")
-        if rows.exists():
-            seen.append([pandas.read_parquet(rows / f"{n}.parquet") for n in ("runs", "series")])
-        return real(*arguments)
-
-    monkeypatch.setattr(ColonyPoint, "do", staticmethod(looks))
     assert sweep(COLONY, "whole", "--parquet")[0] == 0
+    assert sweep(COLONY, "plain")[0] == 0
+    monkeypatch.setattr(ColonyPoint, "do", None)
     assert sweep(COLONY, "plain", "--parquet")[0] == 0  # added to finished results
-    assert sweep(COLONY, "plain", "--parquet")[0] == 0
-    tables = {"runs", "series", "summary"}
-    assert {one.stem for one in Path("plain").glob("*.parquet")} == tables
-    Path("plain/series.parquet").unlink()  # it is made again
-    with monkeypatch.context() as patch:
-        patch.setitem(sys.modules, "pyarrow", None)
-        assert "pip install" in sweep(COLONY, "plain", "--parquet")[2]
-    assert sweep(COLONY, "plain", "--parquet")[0] == 0
-    assert (
-        before.items() - {("manifest.json", before["manifest.json"])}
-        <= contents(Path("plain")).items()
-    )
-    for name in tables:
+    assert_same_results("plain", "whole")
+    for name in ("runs", "series", "summary"):
         table = pandas.read_parquet(f"whole/{name}.parquet")
-        pandas.testing.assert_frame_equal(table, pandas.read_parquet(f"plain/{name}.parquet"))
         text = pandas.read_csv(f"plain/{name}.csv")
         pandas.testing.assert_frame_equal(table, text, check_dtype=False)
-    runs, series = seen[-1]
-    assert len(runs) == 7  # of 8, in blocks of 3 seeds and of 1
+    runs, series = (pandas.read_parquet(f"plain/{name}.parquet") for name in ("runs", "series"))
     assert runs.dtypes["deliveries"] == "float64"
     assert series.dtypes["tick"] == series.dtypes["seed"] == "int64"
-    whole = pandas.read_parquet("whole/runs.parquet")
-    parts = runs.merge(whole, "inner")
-    assert len(parts) == len(runs)
-    assert call("archive", ["plain"], capsys)[0] == 0
-    status, out, _ = call("reproduce", ["plain.zip"], capsys)
-    assert status == 0
-    assert "equal      series.parquet" in out
-
-
-def blocks_of(folder):
-    return sorted(Path(folder, "unfinished/blocks").iterdir(), key=lambda one: one.stat().st_mtime)
-
-
-def test_the_time_left_does_not_count_kept_results_as_new(sweep, capsys, monkeypatch):
-    assert sweep(FEWER["runs"], "a")[0] == 0
-    real, done = RunPoint.do, []
-
-    def stops(*arguments):
-        if done:
-            raise KeyboardInterrupt
-        done.append(arguments[:2])
-        return real(*arguments)
-
-    monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
-    assert sweep(RUNS, "a")[0] == 130
-    ((points, seeds),) = done
-    new = len(points) * len(seeds)
-    began = Path("a/unfinished/manifest.json").stat().st_mtime
-    os.utime(blocks_of("a")[-1], (began, began + 360))
-    _, out, _ = call("status", ["a"], capsys)
-    assert f"unfinished: {8 + new} of 24 runs done" in out
-    assert f"left: about {360 * (16 - new) / new / 60:.0f} minutes" in out
-
-
-def test_the_time_left_before_the_first_block_of_a_new_process(sweep, capsys, monkeypatch):
-    real, stop_after = RunPoint.do, 3
-
-    def stops(*arguments):
-        nonlocal stop_after
-        stop_after -= 1
-        if stop_after < 0:
-            raise KeyboardInterrupt
-        return real(*arguments)
-
-    monkeypatch.setattr(RunPoint, "do", staticmethod(stops))
-    assert sweep(RUNS, "a")[0] == 130
-    done = sum(int(one) for one in re.findall(r"(\d+) of 24", call("status", ["a"], capsys)[1]))
-    began = Path("a/unfinished/manifest.json").stat().st_mtime - 1000
-    os.utime("a/unfinished/manifest.json", (began, began))
-    for path in blocks_of("a"):
-        os.utime(path, (began, began + 360))
-    assert sweep(RUNS, "a")[0] == 130
-    _, out, _ = call("status", ["a"], capsys)
-    assert f"left: about {360 * (24 - done) / done / 60:.0f} minutes" in out
-
-
-def test_a_finished_shard_is_not_unfinished(sweep, capsys):
-    assert sweep(RUNS, "a", "--shard", "2/3")[0] == 0
-    _, out, _ = call("status", ["a"], capsys)
-    assert "  finished: shard 2 of 3, 8 runs, in " in out
-    assert "unfinished" not in out
-    assert "of all shards" not in out
-    Path("a/unfinished/failed.json").write_text("{")  # damaged
-    assert sweep(RUNS, "a", "--shard", "1/3")[0] == 0
-    status, out, err = call("status", ["nothing", "a", "none"], capsys)
-    assert "  of all shards: 16 of 24 runs done in this folder" in out
-    assert status == 2
-    assert err.count("has neither results nor unfinished work") == 2
 
 
 def workers_of(pid):
@@ -441,7 +371,7 @@ def test_worker_processes_end_with_the_command_and_work_resumes(number, sweep, t
     arguments = ["long.toml", "--out", "a", "--no-figures", "--workers", 2]
     process = start("sweep", arguments, tmp_path / "kernels", tmp_path)
     until = time.monotonic() + 120
-    while not list(Path("a").rglob("block-*.npz")) and time.monotonic() < until:
+    while not list(Path("a").rglob("*.npz")) and time.monotonic() < until:
         time.sleep(0.05)
     workers = workers_of(process.pid)
     assert len(workers) >= 2
@@ -455,37 +385,5 @@ def test_worker_processes_end_with_the_command_and_work_resumes(number, sweep, t
     if number == signal.SIGINT:
         assert process.returncode == 130
         assert err == "Stopped; finished parts are saved. Run the same command again to resume.\n"
-    done = set(Path("a").rglob("block-*.npz"))
-    assert done
-    assert "of 2400 runs done" in "".join(state(Path("a")))
-
-
-COMPARE = [
-    *("--seed", 3, "--episodes", 20, "--max-steps", 40, "--learners", "sarsa", "q_learning"),
-    *("--learning-rates", 0.1, "--discounts", 0.9, "--epsilons", 0.3, "--epsilon-decays", 0.9),
-    *("--no-figures", "--delivery", "truncates"),
-]
-
-
-@pytest.mark.parametrize("way", ["grown", "merged"])
-def test_a_comparison_grows_and_merges(way, tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert call("compare", [*COMPARE, "--seeds", 4, "--out", "plain"], capsys)[0] == 0
-    if way == "grown":
-        assert call("compare", [*COMPARE, "--seeds", 2, "--out", way], capsys)[0] == 0
-        assert call("compare", [*COMPARE, "--seeds", 4, "--out", way], capsys)[::2] == (0, "")
-    else:
-        for n in (1, 2):
-            more = "--out", n, "--shard", f"{n}/2"
-            assert call("compare", [*COMPARE, "--seeds", 4, *more], capsys)[::2] == (0, "")
-        assert call("merge", ["1", "2", "--out", way], capsys)[::2] == (0, "")
-    Path("plain/report.html").unlink()
-    Path(way, "report.html").unlink()
-    arrays = [archives.read(Path(folder, "runs.npz")) for folder in ("plain", way)]
-    assert arrays[0].keys() == arrays[1].keys()
-    for name, array in arrays[0].items():
-        np.testing.assert_array_equal(array, arrays[1][name])
-    first, second = contents(Path("plain")), contents(Path(way))
-    for files in (first, second):
-        del files["manifest.json"]
-    assert first == second
+    assert set(Path("a").rglob("*.npz"))
+    assert "of 2400 runs done" in "".join(status(Path("a")))

@@ -7,7 +7,6 @@ import io
 import json
 import re
 
-import numpy as np
 import pytest
 from command_lines import ROOT, environment
 from PIL import Image
@@ -46,12 +45,6 @@ def executor():
     return execute
 
 
-def test_there_are_three():
-    assert [path.name[0] for path in LESSONS] == ["1", "2", "3"]
-    listed = (FOLDER / "README.md").read_text(encoding="utf-8")
-    assert all(f"({path.name})" in listed for path in LESSONS)
-
-
 @each_lesson
 def test_it_was_run_from_top_to_bottom_and_holds_text_alone(path):
     assert path.stat().st_size < MOST
@@ -88,16 +81,6 @@ def test_pictures_lie_beside_the_notebooks():
             assert 800 < image.width <= 1280
 
 
-def test_a_picture_is_packed_without_being_changed_much():
-    pixels = np.full((40, 60, 3), (0, 114, 178), np.uint8)
-    pixels[10:20, 10:50] = 255
-    file = io.BytesIO()
-    Image.fromarray(pixels).save(file, "png")
-    packed = Image.open(io.BytesIO(executor().packed(file.getvalue())))
-    assert packed.mode == "P"
-    np.testing.assert_array_equal(np.asarray(packed.convert("RGB")), pixels)
-
-
 @each_lesson
 def test_questions_come_before_results_and_solutions_after_exercises(path):
     cells = cells_of(path)
@@ -115,34 +98,6 @@ def test_questions_come_before_results_and_solutions_after_exercises(path):
     assert [match[1] for match in solved if match] == wanted
     (heading,) = [cell for cell in cells if cell["source"] == "## Solutions"]
     assert heading["metadata"]["jp-MarkdownHeadingCollapsed"]
-
-
-def test_a_class_edition_has_exercises_but_neither_results_nor_solutions(tmp_path, capsys):
-    execute = executor()
-    execute.main(["--class-edition", str(tmp_path / "class")])
-    for path in LESSONS:
-        whole, short = cells_of(path), cells_of(tmp_path / "class" / path.name)
-        sources = [cell["source"] for cell in whole]
-        kept = [cell["source"] for cell in short]
-        assert kept == sources[: sources.index("## Solutions")]
-        assert kept[-1].startswith("## Exercises")
-        codes = [cell for cell in short if cell["cell_type"] == "code"]
-        assert not any(cell["outputs"] or cell["execution_count"] for cell in codes)
-    with pytest.raises(SystemExit):
-        execute.main(["--class-edition", str(FOLDER)])
-    assert "would replace the lessons" in capsys.readouterr().err
-
-
-def test_lessons_tell_what_comes_after_a_delivery():
-    first, second = (
-        "\n".join(cell["source"] for cell in cells_of(path)).replace("\n", " ")
-        for path in LESSONS[:2]
-    )
-    assert "terminal" in first
-    assert "terminal" in second
-    counts = "\n".join(shown(cells_of(LESSONS[1])))
-    assert re.search("Dyna-Q +terminates +{'delivers': 0,", counts)
-    assert re.search("Dyna-Q +truncates +{'delivers': 40,", counts)
 
 
 @pytest.mark.parametrize(

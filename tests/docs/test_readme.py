@@ -11,13 +11,11 @@ import compare
 import numpy as np
 import pytest
 from command_lines import EXPERIMENTS, ROOT
-from PIL import Image
 
 from taichi_ants.analysis.behaviour import CIRCLES, DELIVERS, WALKS
 
 sys.path.insert(0, str(EXPERIMENTS))
 import findings
-import hero
 
 sys.path.remove(str(EXPERIMENTS))
 
@@ -74,7 +72,7 @@ def test_the_third_finding_is_the_table_of_the_guide():
 @pytest.mark.slow  # it makes the paper's comparison with 100 seeds
 def test_the_first_two_findings_and_the_printed_table(tmp_path, capsys):
     folder = tmp_path / "compare"
-    compare.compare(compare.parse_arguments(["--out", str(folder), "--no-figures"]))
+    compare.start(["--out", str(folder), "--no-figures"])
     printed = capsys.readouterr().out
     [table] = re.findall(r"^(Learner  .*?)```", PAPER, re.DOTALL | re.MULTILINE)
     assert table in printed
@@ -112,33 +110,3 @@ def test_the_first_two_findings_and_the_printed_table(tmp_path, capsys):
     claims = f"{cut[0]} are supported and {cut[1]} contradicted if deliveries truncate, "
     assert f"{claims}{end[0]} and {end[1]} if they terminate" in WORDS
     assert f"Of the paper's {total} claims" in WORDS
-
-
-def test_the_film_shows_the_run_closest_to_the_median():
-    times = [np.array(each) for each in ([1, 1, 1, 1, 1], [9, 5, 7, 6, 8], [99, 95, 97, 99, 92])]
-    course = hero.Course(*times)
-    assert hero.most_typical(course) == 2  # third of five in both
-
-
-@pytest.mark.slow
-def test_a_colony_is_filmed_as_it_was_measured():
-    together = hero.run([15, 16])
-    alone = hero.run([16], after=3, keep=True)
-    assert together.detour.min() > 0
-    for name in ("first", "lanes", "detour"):
-        assert getattr(alone, name)[0] == getattr(together, name)[1]
-    assert len(alone.snapshots) == alone.detour[0] + 4
-    assert alone.deliveries[int(alone.lanes[0])][0] >= hero.LANES
-    before, after = (alone.snapshots[n].ground for n in (0, -1))
-    walls = np.flatnonzero((after != before) & (after == hero.OBSTACLE))
-    drawn = {int(alone.snapshots[0].grid.index(cell)) for part in hero.stroke() for cell in part}
-    assert set(walls.tolist()) == drawn
-    frames = list(hero.film(alone, hero.LOOKS["dark"], step=80))
-    assert [frame.shape for frame in frames] == [(600, 960, 3)] * 2
-    assert np.abs(frames[0].astype(int) - frames[1]).max() > 100
-
-
-@pytest.mark.parametrize("theme", hero.LOOKS)
-def test_the_film_lasts_eight_seconds(theme):
-    with Image.open(ROOT / "renders" / f"hero_{theme}.webp") as film:
-        assert (film.size, film.n_frames, film.info["loop"]) == (hero.SIZE, 8 * hero.FPS, 0)

@@ -9,7 +9,7 @@ from command_lines import ROOT
 from taichi_ants import Colony, TrainingConfig, files, worlds
 from taichi_ants.learners.policies import frozen_policy
 from taichi_ants.studies.sweep import sweep_of
-from taichi_ants.task import Task, foraging
+from taichi_ants.task import foraging
 
 GUIDE = (ROOT / "docs" / "sweeps.md").read_text("utf-8")
 COLONY, RUNS = (part.split("```")[0] for part in GUIDE.split("```python\n")[1:])
@@ -60,13 +60,3 @@ def test_the_row_of_a_frozen_policy_is_played_as_the_guide_says(epsilon, tmp_pat
     rollouts = colony.run(2, 200, measures="entropy")
     assert rollouts.deliveries.mean() * 1000 / 200 == wanted["deliveries"] > 0
     assert np.mean(rollouts.series.values["entropy.trail"]) == wanted["entropy.trail"]
-
-
-def test_the_row_of_ants_without_action_values_is_played_as_the_guide_says(tmp_path):
-    task = {"choice": {"rule": "deneubourg", "k": 5.0}}
-    names = {"kind": "colony", "measures": ["deliveries"], "task": task}
-    of_colony = {"episodes": 0, "ticks": 200, "rollouts": 2, "seeds": [5]}
-    wanted = row_of({**names, **of_colony, "vary": {"ants": [9]}}, tmp_path)
-    rules = Task().replace(choice={"rule": "deneubourg", "k": 5.0})
-    colony = Colony(worlds.paper(), rules, None, 5 + 2**32, ants=9, sharing="frozen")
-    assert colony.run(2, 200).deliveries.mean() * 1000 / 200 == wanted["deliveries"]

@@ -7,11 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_worlds import random_world
 
 from taichi_ants import Task, TrainingConfig, continue_training, evaluate, train
-from taichi_ants.engines.runs import engine as run_engine
-from taichi_ants.worlds import World, paper
+from taichi_ants.worlds import paper
 
 # Uneven on purpose: some deliver within 34 steps, some walk in circles for all of an episode, a
 # step of Dyna-Q costs several of the others, and memories differ in size.
@@ -74,19 +72,6 @@ def test_whatever_else_is_in_the_sweep(expected):
             assert np.array_equal(getattr(alone, name)[0, 0], getattr(expected, name)[c, c])
 
 
-@pytest.mark.parametrize("size", [(1, EPISODES), (3, 7), (1000, 1)])
-def test_whatever_the_size_of_launches(size, expected, monkeypatch):
-    used = []
-    monkeypatch.setattr(run_engine, "size_of_launch", lambda *sizes: used.append(sizes) or size)
-    again = train(paper(), CONFIGS, SEEDS, EPISODES, MAX_STEPS, TRUNCATES)
-    assert used
-    assert_same(again, expected)
-    assert again.state == expected.state
-    greedy = evaluate(paper(), again.q_values, 5, SEEDS, 100, epsilon=0.2)
-    monkeypatch.undo()
-    assert_same(greedy, evaluate(paper(), again.q_values, 5, SEEDS, 100, epsilon=0.2), GREEDY)
-
-
 def test_training_that_is_continued_is_longer_training():
     """10 and 10 episodes are 20; so are other parts."""
     world = replace(paper(), ants=())  # the ant is placed by the seed
@@ -98,16 +83,6 @@ def test_training_that_is_continued_is_longer_training():
         assert result.episodes == 20
         assert_same(result, whole)
         assert result.state == whole.state
-
-
-def test_continued_training_with_evaporation():
-    world = random_world(6, 7)
-    falls = Task(evaporation_in_training=True)
-    whole = train(world, CONFIGS, SEEDS[:2], 30, 60, falls)
-    result = continue_training(train(world, CONFIGS, SEEDS[:2], 11, 60, falls), 19)
-    assert_same(result, whole)
-    without = train(world, CONFIGS, SEEDS[:2], 30, 60)
-    assert not np.array_equal(without.returns, whole.returns)
 
 
 def test_evaluation(expected):
@@ -128,29 +103,3 @@ def test_evaluation(expected):
     alone = evaluate(paper(), tables[3, 2], 20, SEEDS[2], **options)
     for name in GREEDY:
         assert np.array_equal(getattr(alone, name), getattr(whole, name)[3, 2])
-
-
-def test_evaluation_leaves_training_as_it_is(expected):
-    """Rollouts have streams of their own."""
-    first = train(paper(), CONFIGS, SEEDS, EPISODES // 2, MAX_STEPS, TRUNCATES)
-    evaluate(paper(), first.q_values, 5, SEEDS)
-    assert_same(continue_training(first, EPISODES - EPISODES // 2), expected)
-
-
-def test_seeds_and_rollouts_differ(expected):
-    """The same numbers everywhere would pass all of the above."""
-    for c in (0, 1, 2):
-        runs = {expected.returns[c, s].tobytes() for s in range(len(SEEDS))}
-        assert len(runs) == len(SEEDS)
-    outcome = evaluate(paper(), np.zeros((2, 128, 5)), 30, (0, 1), 60)
-    assert len({tuple(row) for row in outcome.returns.tolist()}) == 2
-    assert all(len(set(row)) > 5 for row in outcome.returns.tolist())
-
-
-def test_worlds_without_trails_or_listed_ants_differ_by_seed():
-    world = World((7, 7, 7), queen=(3, 3, 0), foods=[(6, 0, 0)])
-    starts = {tuple(np.concatenate(world.start(seed)).tolist()) for seed in range(30)}
-    assert len(starts) > 10
-    outcome = evaluate(world, np.zeros((30, 128, 5)), 3, range(30), 40)
-    alone = [evaluate(world, np.zeros((128, 5)), 3, seed, 40).returns for seed in range(30)]
-    assert np.array_equal(outcome.returns, alone)

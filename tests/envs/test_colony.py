@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from colonies import act, training
@@ -15,9 +13,9 @@ from same_colonies import assert_equal
 from taichi_ants.envs.colony import ColonyWorlds
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
+from taichi_ants.task.constants import N_ACTIONS, PICK_UP
 from taichi_ants.task.events import Event
-from taichi_ants.worlds import World, paper
+from taichi_ants.worlds import paper
 
 N_WORLDS = 3
 SUCCESSES = (Event.ENTERED_EMPTY, Event.ENTERED_CUE, Event.PICKED_UP, Event.DELIVERED)
@@ -136,36 +134,3 @@ def test_what_the_mask_allows_succeeds_where_an_ant_is_alone():
             seen[mask[action], action] += 1
     assert (seen[0] > 0).all()
     assert (seen[1, :3] > 0).all()
-
-
-def test_worlds_that_are_stopped_stand_still_until_they_begin_again():
-    worlds = ColonyWorlds(2, None, Arguments(paper(), 3, "index", None, None), 5, "nest")
-    worlds.begin(np.ones(2, bool), [1, 2])
-    actions = np.ones((2, 5), int)
-    worlds.step(actions)
-    worlds.colony.stop(np.array([True, False]))
-    before = worlds.colony.snapshot(0)
-    worlds.step(actions)
-    assert worlds.colony.snapshot(0) == before
-    assert worlds.acted.tolist() == [[False] * 5, [True] * 5]
-    assert worlds.over().tolist() == [False, False]
-    worlds.step(actions)
-    assert worlds.over().tolist() == [False, True]
-    worlds.begin(np.array([True, False]))
-    worlds.step(actions)
-    assert worlds.acted.tolist() == [[True] * 5, [False] * 5]  # the other one is at its end
-
-
-def test_evaporation_is_that_of_training_unless_it_is_given():
-    """A trail of level 2 on a cell that nobody enters."""
-    world = World((4, 4, 4), (0, 0, 0), [(3, 0, 0)], trails=[((0, 3, 0), 2)])
-    for given, left in ((None, 2), (False, 2), (True, 1)):
-        worlds = ColonyWorlds(1, None, Arguments(world, 9, "index", given, None), 1, "nest")
-        worlds.begin(np.ones(1, bool), [0])
-        worlds.step(np.full((1, 1), GIVE))
-        assert worlds.colony.snapshot().trail.max() == left
-    falls = replace(worlds.colony.task, evaporation_in_training=True)
-    worlds = ColonyWorlds(1, falls, Arguments(world, 9, "index", None, None), 1, "nest")
-    worlds.begin(np.ones(1, bool), [0])
-    worlds.step(np.full((1, 1), GIVE))
-    assert worlds.colony.snapshot().trail.max() == 1

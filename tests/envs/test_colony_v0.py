@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-import resource
-import subprocess
-import sys
 import warnings
 from dataclasses import replace
 
-import gymnasium
 import numpy as np
 import pytest
 from colonies import act, training
-from command_lines import environment
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 from same_colonies import assert_equal
 
 from taichi_ants import AntsError, Task, worlds
 from taichi_ants.envs import Event, colony_v0
-from taichi_ants.envs.colony_v0 import most_births
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Life
 from taichi_ants.task.constants import FOOD, GIVE, N_ACTIONS, PICK_UP, QUEEN
@@ -107,15 +99,6 @@ def test_agents_are_the_ants_of_the_reference_by_number():
         assert step == 90
 
 
-def test_most_births():
-    """One food grows back at its place: as often as it can be taken and given."""
-    assert most_births(Life(), 9, 100) == 0
-    assert most_births(Life(births=True), 9, 100) == 9
-    assert most_births(Life(births=True), 9, 1) == 6
-    assert most_births(Life(births=True, regrowth=0), 1, 100) == 100
-    assert most_births(Life(births=True, regrowth=9), 1, 100) == 10
-
-
 def test_the_state_is_a_map_of_the_world():
     env = colony(foraging(), ants=2)
     with pytest.raises(AssertionError, match=r"^reset\(\) needs to be called before state"):
@@ -134,36 +117,6 @@ def test_the_state_is_a_map_of_the_world():
         assert not headings[ants == 0].any()
     assert trail.max() > 0
     assert (ground == FOOD).sum() < len(MEADOW.foods)
-
-
-def test_agents_have_action_spaces_of_their_own():
-    """So that each can be seeded; both spaces stay the same objects."""
-    env = colony()
-    assert not hasattr(env, "agents")  # before the first reset
-    first, second = (env.action_space(f"ant_{number}") for number in (0, 1))
-    assert first is not second
-    assert env.action_space("ant_0") is first
-    assert env.observation_space("ant_0") is env.observation_space("ant_0")
-
-
-def test_copies_and_pickles_go_on_alike():
-    env = colony(render_mode="rgb_array", observation_format="one_hot")
-    _, infos = env.reset(seed=3)
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        *_, infos = env.step(guided({name: infos[name] for name in env.agents}, rng))
-    assert env.render().dtype == np.uint8
-    others = [copy.deepcopy(env), pickle.loads(pickle.dumps(env))]
-    while env.agents:
-        actions = guided({name: infos[name] for name in env.agents}, rng)
-        observations, *rest, infos = env.step(actions)
-        for other in others:
-            theirs, *more, _ = other.step(actions)
-            assert {k: v.tolist() for k, v in theirs.items()} == {
-                k: v.tolist() for k, v in observations.items()
-            }
-            assert more == rest
-            assert other.agents == env.agents
 
 
 def test_steps_in_the_wrong_order_and_wrong_actions(capsys):
@@ -192,39 +145,3 @@ def test_steps_in_the_wrong_order_and_wrong_actions(capsys):
     assert env.step({}) == ({}, {}, {}, {}, {})  # with PettingZoo's warning
     with pytest.raises(AntsError, match=r"^world lists 2 worlds; it must list at most 1\.$"):
         colony(world=[MEADOW, MEADOW])
-
-
-def test_a_missing_pettingzoo_is_named(tmp_path):
-    code = (
-        "import sys; sys.modules['pettingzoo'] = None\n"
-        "import taichi_ants.envs.colony\n"
-        "from taichi_ants.envs import colony_v0"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=environment(tmp_path), capture_output=True, text=True
-    )
-    assert done.stderr.splitlines()[-1] == (
-        "ImportError: colony_v0 needs pettingzoo, which cannot be imported; run pip install -e "
-        '".[pettingzoo]" in your clone.'
-    )
-
-
-def test_memory_does_not_grow_with_environments_that_are_closed():
-    def loop(times: int) -> int:
-        for _ in range(times):
-            env = colony(paper())
-            env.reset(seed=1)
-            env.step(dict.fromkeys(env.agents, 0))
-            env.close()
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-
-    first = loop(30)
-    assert loop(100) - first < 2000  # kibibytes
-
-
-def test_seeds_are_those_of_gymnasium():
-    env, other = colony(paper(), ants=9), colony(paper(), ants=9)
-    with pytest.raises(gymnasium.error.Error, match="greater or equal"):
-        env.reset(seed=-1)
-    # Only 64 bits count.
-    np.testing.assert_equal(env.reset(seed=2**70 + 5), other.reset(seed=5))

@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
-from command_lines import environment
 from gymnasium.envs.registration import EnvSpec
-from gymnasium.error import ResetNeeded
 
-from taichi_ants import AntsError, Life, World, task, worlds
-from taichi_ants.envs import Event
+from taichi_ants import AntsError, World, task, worlds
 
 ID, COLONY = "taichi_ants/HexForage-v0", "taichi_ants/HexColony-v0"
 MAZE = [1] * 16 + [3] + [1] * 16 + [4]  # delivers in the paper's world
@@ -86,17 +81,6 @@ def test_an_option_of_reset_is_used_or_refused(made: Any) -> None:
             env.reset(options=options)
 
 
-def test_a_step_after_the_end_is_called_so() -> None:
-    env = one()
-    with pytest.raises(ResetNeeded, match=r"no episode has begun; call reset\(\) before step"):
-        env.unwrapped.step(1)
-    env.reset()
-    for action in MAZE:
-        env.step(action)
-    with pytest.raises(ResetNeeded, match=r"the episode has ended; call reset\(\) before step"):
-        env.step(1)
-
-
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
 @pytest.mark.parametrize("delivery", ["terminates", "continues"])
 def test_deliveries_are_counted_by_step_and_by_rollout(mode: str, delivery: str) -> None:
@@ -116,60 +100,3 @@ def test_deliveries_are_counted_by_step_and_by_rollout(mode: str, delivery: str)
     if mode != "Disabled":
         infos, others = (env.step([1, 1])[4]["deliveries"] for env in (stepped, rolled))
         assert infos.tolist() == others.tolist() == [int(delivery == "continues")] * 2
-
-
-def test_deliveries_of_ants_in_colonies() -> None:
-    """Each trip is an episode if deliveries terminate; else an ant counts all of them."""
-    world = World((4, 1, 1), (0, 0, 0), foods=[(3, 0, 0)], ants=[((2, 0, 0), 0)])
-    for delivery in ("terminates", "truncates"):
-        rules = task.Task(life=Life(regrowth=0), delivery=delivery, turns_at_queen=True)
-        env = gymnasium.make_vec(COLONY, num_envs=1, ants=1, world=world, task=rules)
-        env.reset(seed=0)
-        expected = 0
-        for action in [3, 1, 4, 1, 3, 1, 4, 1]:
-            infos = env.step([action])[4]
-            if infos["event"][0] == Event.DELIVERED:
-                expected += 1
-            if "final_info" in infos:
-                assert infos["final_info"]["deliveries"][0] == 1
-            assert infos["deliveries"][0] == expected
-        assert expected == (0 if delivery == "terminates" else 2)
-
-
-def test_completion_lists_public_names_and_imports_nothing() -> None:
-    code = (
-        "import sys, taichi_ants; names = dir(taichi_ants); assert 'envs' in names\n"
-        "assert not {'numpy', 'gymnasium', 'taichi'} & sys.modules.keys()\n"
-        "assert taichi_ants.envs.Event.DELIVERED == 5\n"
-        "public = [getattr(taichi_ants, name) for name in names]\n"
-        "for one in [taichi_ants, *public]:\n"
-        "    if hasattr(one, '__all__'): assert sorted(one.__all__) == dir(one), one\n"
-        "print(dir(taichi_ants.task)[:3], dir(taichi_ants.testing))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=environment(None)
-    )
-    assert done.stdout == (
-        "['Caste', 'Choice', 'Field'] "
-        "['RuleCheck', 'check_learner', 'check_observation', 'check_rule']\n"
-    ), done.stderr
-
-
-def test_paths_where_paths_are_allowed(tmp_path: Path) -> None:
-    from taichi_ants import save_policy
-    from taichi_ants.learners.policies import frozen_policy
-
-    path = tmp_path / "policy.npz"
-    save_policy(path, np.eye(128, 5, dtype=np.float32), {})
-    assert task.Caste(policy=path) == task.Caste(policy=str(path))  # type: ignore[arg-type]
-    assert np.array_equal(frozen_policy(path), frozen_policy(str(path)))
-    env = many()
-    env.reset(seed=0)
-    first = env.rollout(path, 3, seed=1).actions
-    env.reset(seed=0)
-    assert np.array_equal(env.rollout(str(path), 3, seed=1).actions, first)
-
-
-def test_a_colony_is_no_single_environment() -> None:
-    with pytest.raises(AntsError, match=r"use gymnasium\.make_vec"):
-        gymnasium.make("taichi_ants/HexColony-v0")

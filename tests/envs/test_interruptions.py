@@ -9,11 +9,10 @@ import pytest
 from gymnasium.error import ResetNeeded
 from interrupts import interrupted_after_launch
 
-from taichi_ants import AntsError, Task, runtime
+from taichi_ants import Task
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
-from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
-from taichi_ants.task import foraging
+from taichi_ants.envs.forage import HexForageVectorEnv
 
 
 def lone(mode: str) -> Any:
@@ -46,32 +45,6 @@ def test_vector_environments_know_who_has_ended(make: Any, rolls: bool, mode: st
         assert all(np.array_equal(one[k], two[k]) for k in range(4))
 
 
-def test_deliveries_of_interrupted_steps_count() -> None:
-    rules = foraging().replace(life={"regrowth": 0}, delivery="truncates")
-    made = {"task": rules, "ants": 16, "max_steps": 500}
-    ours, theirs = (HexColonyVectorEnv(16, **made) for _ in range(2))
-    for env in (ours, theirs):
-        env.reset(seed=2)
-    for actions in theirs.rollout("trail_follower", 300).actions:
-        with interrupted_after_launch():
-            ours.step(actions)
-    ones, others = (env.step(np.zeros(16, int))[-1]["deliveries"] for env in (ours, theirs))
-    assert np.array_equal(ones, others)
-    assert others.sum() > 10
-
-
-def test_a_lone_ant_does_not_go_on_after_its_last_step() -> None:
-    env = HexForageEnv(max_steps=2)
-    env.reset(seed=1)
-    env.step(1)
-    with interrupted_after_launch():
-        env.step(1)
-    with pytest.raises(ResetNeeded):
-        env.step(1)
-    env.reset()
-    env.step(1)
-
-
 def test_the_last_step_of_a_colony_ends_it() -> None:
     env = parallel_env(ants=4, max_steps=2)
     env.reset(seed=1)
@@ -82,11 +55,3 @@ def test_the_last_step_of_a_colony_ends_it() -> None:
     assert env.agents == []
     with interrupted_after_launch():
         env.reset()
-
-
-def test_a_rollout_on_a_gpu_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    env = lone("NextStep")
-    env.reset(seed=1)
-    monkeypatch.setattr(runtime, "start", lambda *given: runtime.Runtime("cuda", 1))
-    with pytest.raises(AntsError, match=r"^arch is 'cuda', but a rollout of a vector environment"):
-        env.rollout("random", 3)

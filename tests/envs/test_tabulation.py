@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from command_lines import run
 
-from taichi_ants import AntsError, evaluate, load_policy, rollout, save_policy, tabulate, worlds
-from taichi_ants.envs.forage import HexForageEnv, HexForageVectorEnv
+from taichi_ants import AntsError, evaluate, rollout, tabulate, worlds
+from taichi_ants.envs.forage import HexForageEnv
 from taichi_ants.envs.formats import FORMATS, Shown
 from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.task import observations
@@ -40,13 +37,6 @@ def test_a_function_gets_each_state_as_environments_show_it(observation: str, fo
     assert (table == values.astype(np.float32)).all()
 
 
-def test_actions_become_the_best_of_their_state() -> None:
-    actions = np.arange(128) % 5
-    table = tabulate(lambda seen: actions)
-    assert (table.argmax(axis=1) == actions).all()
-    assert (table.sum(axis=1) == 1).all()
-
-
 @pytest.mark.parametrize(
     ("returned", "said"),
     [
@@ -64,37 +54,6 @@ def test_what_a_function_may_not_return(returned, said) -> None:
         tabulate(returned)
 
 
-def test_faults_of_the_function_are_its_own() -> None:
-    with pytest.raises(ZeroDivisionError):
-        tabulate(lambda seen: 1 // 0)
-
-
-def test_observations_and_formats_are_checked() -> None:
-    with pytest.raises(AntsError, match="nothing"):
-        tabulate(network, "nothing")
-    with pytest.raises(AntsError, match="observation_format is 'image'"):
-        tabulate(network, observation_format="image")  # type: ignore[arg-type]
-
-
-@pytest.mark.slow
-def test_a_network_is_rendered_put_into_a_colony_and_compared(
-    kernels: Path, tmp_path: Path
-) -> None:
-    """All that takes policy files takes it."""
-    path = tmp_path / "network.npz"
-    save_policy(path, tabulate(network), {"made by": "a test"})
-    sheet = run("policy_sheet", ["--policy", path, "--out", "sheet.png"], kernels, tmp_path)
-    assert sheet.returncode == 0, sheet.stderr
-    assert (tmp_path / "sheet.png").stat().st_size > 10_000
-    shared = ["--sharing", "frozen", "--ants", 4, "--ticks", 50]
-    live = run("colony", ["live", "--policy", path, *shared], kernels, tmp_path)
-    assert live.returncode == 0, live.stderr
-    ours = evaluate(worlds.paper(), load_policy(path).q_values, rollouts=3)
-    theirs = evaluate(worlds.paper(), FOLLOWER, rollouts=3)
-    assert (ours.returns == theirs.returns).all()
-    assert (ours.steps == theirs.steps).all()
-
-
 def test_a_policy_acts_in_one_environment_as_in_a_rollout() -> None:
     policy, rng = Policy(FOLLOWER, "paper", {}), np.random.default_rng(0)
     trace = rollout(worlds.paper(), FOLLOWER, max_steps=40)
@@ -103,41 +62,6 @@ def test_a_policy_acts_in_one_environment_as_in_a_rollout() -> None:
     for action in trace.actions:
         assert policy.actions(info["state"], rng) == action
         *_, info = env.step(policy.actions(info["state"], rng))
-
-
-def test_a_policy_acts_in_many_environments() -> None:
-    policy, rng = Policy(trail_follower(), "paper", {}), np.random.default_rng(0)
-    envs = HexForageVectorEnv(3, world=worlds.open_world(1, (8, 8, 8)))
-    _, infos = envs.reset(seed=0)
-    for _ in range(5):
-        actions = policy.actions(infos["state"], rng)
-        assert actions.shape == (3,)
-        assert (policy.q_values[infos["state"], actions] == 1).all()
-        *_, infos = envs.step(actions)
-
-
-def test_ties_are_broken_evenly_and_only_ties() -> None:
-    table = np.zeros((128, 5), np.float32)
-    table[7] = [1, 0, 1, 1, 0]
-    policy, rng = Policy(table, "paper", {}), np.random.default_rng(0)
-    taken = np.bincount(policy.actions(np.full((100, 60), 7), rng).ravel(), minlength=5)
-    assert (taken[[1, 4]] == 0).all()
-    assert (abs(taken[[0, 2, 3]] - 2000) < 150).all()
-
-
-@pytest.mark.parametrize("states", [-1, 128, [0, 200], 0.5])
-def test_states_that_are_none(states) -> None:
-    with pytest.raises(AntsError, match="states (contains|is)"):
-        Policy(FOLLOWER, "paper", {}).actions(states, np.random.default_rng(0))
-
-
-def test_one_table_is_evaluated_with_many_seeds() -> None:
-    world = worlds.open_world(3, (8, 8, 8))
-    many = evaluate(world, FOLLOWER, rollouts=4, seeds=range(5))
-    assert many.steps.shape == (5, 4)
-    np.testing.assert_array_equal(
-        many.steps, evaluate(world, np.stack([FOLLOWER] * 5), rollouts=4, seeds=range(5)).steps
-    )
 
 
 def test_a_table_that_was_learned_outside_is_evaluated() -> None:

@@ -51,38 +51,6 @@ def test_two_nests(tmp_path, monkeypatch):
     assert 0.53 < share[8] + 0.02 < share[6] < 0.65
 
 
-@pytest.mark.long
-def test_colonies_on_a_double_bridge_choose_the_short_branch_and_keep_a_long_one(
-    kernels: Path, tmp_path: Path
-) -> None:
-    done = run("models/double_bridge", ["--seeds", 8, "--out", tmp_path], kernels, tmp_path)
-    assert done.returncode == 0, done.stderr
-    shares: dict[tuple[str, str], list[float]] = {}
-    for row in files.read_csv(tmp_path / "double_bridge.csv"):
-        shares.setdefault((row["marks"], row["bridge"]), []).append(row["short_share"])
-    assert [len(several) for several in shares.values()] == [8] * 6
-    for marks in ("both ways", "on the return"):
-        equal, late = (np.array(shares[marks, bridge]) for bridge in ("equal", "short late"))
-        assert (abs(equal - 0.5) >= 0.3).mean() >= 0.75  # of colonies, on one of two branches
-        assert (late > 0.5).mean() <= 0.2
-    assert (np.array(shares["both ways", "short at once"]) > 0.5).mean() >= 0.65
-    assert (tmp_path / "double_bridge.png").stat().st_size > 10_000
-
-
-@pytest.mark.long
-def test_ants_that_misread_cells(kernels: Path, tmp_path: Path) -> None:
-    small = ["--seeds", 2, "--episodes", 6, "--ticks", 300, "--out", tmp_path]
-    done = run("models/misreading", small, kernels, tmp_path)
-    assert done.returncode == 0, done.stderr
-    rows = files.read_csv(tmp_path / "misreading.csv")
-    assert len(rows) == 12
-    for row in rows:
-        assert row["difference"] == row["with trails"] - row["without"]
-    mean = {rate: sum(r["with trails"] for r in rows if r["misread"] == rate) for rate in (0, 0.4)}
-    assert mean[0] > 4 * mean[0.4]
-    assert (tmp_path / "misreading.png").stat().st_size > 10_000
-
-
 @pytest.mark.slow
 def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
     done = run("models/no_entry", ["--seeds", 2, "--out", tmp_path], kernels, tmp_path)
@@ -128,14 +96,3 @@ def test_rules_of_the_no_entry_model(rules_of_scripts):
     )
     for given, action in cases:
         assert wary(*given) == action, given
-
-
-@pytest.mark.slow
-def test_controls_of_the_no_entry_model(rules_of_scripts):
-    """Marks that nobody reads do not matter; those on wrong branches, placed by us, do."""
-    over_time = runpy.run_path(str(MODELS / "no_entry.py"))["deliveries_over_time"]
-    seeds = list(range(8))
-    without = over_time(seeds, "without repellent")
-    for model in ("after a search in vain", "at dead ends", "on wrong branches"):
-        assert np.array_equal(over_time(seeds, model, fear=0.0), without)
-    assert (over_time(seeds, "on wrong branches")[:, -1] > 1.5 * without[:, -1]).all()

@@ -1,4 +1,4 @@
-"""What the study of the colony plans; what comes out is tried as a command."""
+"""What the study of colonies plans; what comes out is tried as a script."""
 
 from __future__ import annotations
 
@@ -6,25 +6,27 @@ import numpy as np
 import pytest
 from colony import (
     COMPARED,
-    POOL,
+    LEARNING,
     TASKS,
+    conditions_of,
     greedy,
-    measured,
     plan,
-    study_of,
+    scheduled,
+    with_bounds,
 )
 from colony_findings import ELSEWHERES, WORLD_KINDS, Condition
 
-from taichi_ants import TrainingConfig, worlds
+from taichi_ants import worlds
 from taichi_ants.analysis.bounds.limits import limits_of
 
-SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 1.0, 0.01)
 SEEDS = (3, 4)
+LENGTHS = {"episodes": 60, "ticks": 1000, "rollouts": 4}
 
 
 @pytest.fixture(scope="module")
 def planned():
-    return plan([*WORLD_KINDS, *ELSEWHERES], (1, 4, 16, 64), SEEDS, SARSA, 60, 1000, 4)
+    training = scheduled(LEARNING, 60)
+    return conditions_of([*WORLD_KINDS, *ELSEWHERES], (1, 4, 16, 64), training, **LENGTHS)
 
 
 def test_every_design_has_its_conditions(planned) -> None:
@@ -50,11 +52,9 @@ def test_nobody_is_evaluated_where_it_was_trained(planned) -> None:
             assert point.pool is None
             assert point.world == worlds.paper()
         elif teacher.pool is not None:
-            assert len(set(teacher.pool)) == POOL
-            seen = point.world if isinstance(point.world, tuple) else (point.world,)
-            assert not set(seen) & set(teacher.pool)
-        places = teacher.places(SEEDS)
-        assert places is None or len(places) == 60
+            assert len(set(teacher.pool)) == 64
+            seen = point.worlds(SEEDS)
+            assert not set(seen if isinstance(seen, list) else [seen]) & set(teacher.pool)
 
 
 def test_epsilon_and_learning_rate_fall_in_the_first_70_percent(planned) -> None:
@@ -66,14 +66,16 @@ def test_epsilon_and_learning_rate_fall_in_the_first_70_percent(planned) -> None
     assert training.next_epsilon(epsilon) == pytest.approx(0.01)
 
 
-def test_every_condition_is_evaluated_without_exploration_too(planned) -> None:
-    points = set(study_of(planned, SEEDS).points)
-    for point in planned.values():
+def test_every_condition_is_evaluated_without_exploration_too() -> None:
+    options = {**LENGTHS, "world_kinds": ["paper", "moving"], "sizes": [1, 4], "seed": 3}
+    asked = plan({**options, "seeds": 2})
+    for point in asked.conditions.values():
         calm = greedy(point)
-        assert {point, calm} <= points
+        assert {point, calm} <= {*asked.study.points}
         assert (calm.exploration, calm.episodes) == (0, 0)
         assert calm.after == (point.after or point)
         assert (calm.world, calm.task, calm.ants) == (point.world, point.task, point.ants)
+    assert asked.study.seeds == SEEDS
 
 
 def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
@@ -81,13 +83,12 @@ def test_a_colony_is_held_against_the_bound_of_its_own_world(planned) -> None:
     elsewhere = Condition("moving", "queueing", "open", 64)
     conditions = {condition: planned[condition] for condition in (one, elsewhere)}
     point = planned[one]
-    expected = [limits_of(world, point.task).deliveries(64) for world in point.world]
+    expected = [limits_of(world, point.task).deliveries(64) for world in point.worlds(SEEDS)]
     assert expected[0] != expected[1]
     values = {point: {"deliveries": np.array([700.0, 700.0])} for point in conditions.values()}
     values |= {greedy(p): {"deliveries": np.array([800.0, 800.0])} for p in conditions.values()}
-    found = measured(conditions, values, len(SEEDS))
+    found = with_bounds(conditions, values, SEEDS)
     assert found[one]["bound"].tolist() == expected
     assert np.isnan(found[elsewhere]["bound"]).all()  # the limits do not hold where food moves
     assert found[one]["greedy"].tolist() == [800, 800]
     assert found[one]["bound_share"] == pytest.approx(700 / np.array(expected))
-    assert np.isnan(found[elsewhere]["bound_share"]).all()

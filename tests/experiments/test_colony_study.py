@@ -3,25 +3,14 @@
 from __future__ import annotations
 
 import csv
-import io
-import json
 from dataclasses import replace
 from pathlib import Path
 
-import colony
-import faults
 import numpy as np
 import pytest
-from colony_findings import ABC, ABC_SILENT, BC, PAPER, A
-from command_lines import (
-    assert_one_sentence,
-    call,
-    contents,
-    load,
-)
+from command_lines import contents, load, run
 
 from taichi_ants import Colony, Life, Pheromone, Task, TrainingConfig, load_policy, worlds
-from taichi_ants.studies.runner import Study
 from taichi_ants.task import foraging, queueing
 
 SEEDS, EPISODES, TICKS, ROLLOUTS = (3, 4), 4, 80, 2
@@ -32,7 +21,7 @@ SMALL = [
 ]
 FILES = {
     *("conditions.csv", "differences.csv", "seeds.csv", "findings.md", "manifest.json"),
-    *("report.html", "report.txt"),
+    *("report.html", "report.txt", "study.json"),
     *(f"figures/{name}.png" for name in ("elsewhere", "rules", "scaling", "training")),
     *(
         f"policies/paper_{rules}_{ants}.npz"
@@ -43,35 +32,19 @@ FILES = {
 
 
 @pytest.fixture(scope="module")
-def remembered():
-    """Colonies that are studied again in this file give at once what they have given before.
-
-    Three of the rules that are not compared with others have kernels of those that are, since
-    each one takes seconds to compile.
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        faults.remember(patch)
-        for rules, like in ((A, PAPER), (BC, ABC), (ABC_SILENT, ABC)):
-            base = colony.TASKS[like]
-            other = replace(base, pheromone=replace(base.pheromone, level=300))
-            patch.setitem(colony.TASKS, rules, other)
-        yield
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory, remembered):
-    """What one run of the command has printed, and its folder; not to be written to."""
-    place, out = tmp_path_factory.mktemp("finished"), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.chdir(place)
-        assert faults.run("colony", [*SMALL, "--out", "out"], out) == (0, "")
-    return out.getvalue(), place / "out"
+def finished(tmp_path_factory, kernels):
+    """What one run of the script has printed, and its folder; not to be written to."""
+    place = tmp_path_factory.mktemp("finished")
+    done = run("colony", [*SMALL, "--out", "out"], kernels, place)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout, place / "out"
 
 
 @pytest.mark.slow
 def test_all_files_are_there(finished):
     out, folder = finished
-    assert set(contents(folder)) == FILES
+    folders = ("blocks", "inputs", "sessions")
+    assert {name for name in contents(folder) if not name.startswith(folders)} == FILES
     report = (folder / "report.txt").read_text("utf-8")
     assert out.startswith(report)
     assert len(out.splitlines()) <= 42
@@ -91,9 +64,6 @@ def test_all_files_are_there(finished):
     # In the paper's world seven rules for one and three ants, and of three rules those that were
     # trained alone, or in open worlds; the latter in small worlds, too.
     assert len(rows) == 7 * 2 + 3 + 3 + 3
-    manifest = json.loads((folder / "manifest.json").read_text("utf-8"))
-    assert manifest["settings"]["training.learner"] == "sarsa"
-    assert manifest["settings"]["seeds"] == list(SEEDS)
 
 
 DECAYS = {"epsilon_decay": (0.01 / 0.3) ** (1 / 3), "learning_rate_decay": 0.1 ** (1 / 3)}
@@ -155,27 +125,6 @@ def assert_measured(folder, condition, outcome):
 
 
 @pytest.mark.slow
-def test_a_finished_study_grows(finished, remembered, tmp_path, monkeypatch):
-    """By a kind of world, then by a seed: in the end, results are those of one study."""
-    _, folder = finished
-    monkeypatch.chdir(tmp_path)
-    at = SMALL.index("--seeds") + 1
-    one_seed = [*SMALL[:at], 1, *SMALL[at + 1 :], "--out", "out"]
-    without_small = [one for one in one_seed if one != "small"]
-    for arguments in (without_small, one_seed, [*SMALL, "--out", "out"]):
-        assert faults.run("colony", arguments) == (0, "")
-    grown, whole = contents(Path("out")), contents(folder)
-    for found in (grown, whole):
-        del found["manifest.json"], found["report.html"]  # they have the time of the work
-    assert grown == whole
-    last_size = SMALL.index("--seeds") - 1
-    fewer_sizes = [*SMALL[:last_size], *SMALL[last_size + 1 :]]
-    status, err = faults.run("colony", [*fewer_sizes, "--out", "out"])
-    assert status == 2
-    assert "that this study lacks (sizes 3)" in err
-
-
-@pytest.mark.slow
 def test_policies_say_where_they_come_from(finished):
     _, folder = finished
     policy = load_policy(folder / "policies" / "paper_foraging_3.npz")
@@ -185,50 +134,7 @@ def test_policies_say_where_they_come_from(finished):
     assert metadata["seed"] in SEEDS
 
 
-@pytest.mark.slow
-def test_a_finished_study_is_shown_and_nothing_is_lost(finished, capsys):
-    _, folder = finished
-    before = contents(folder)
-    status, out, _ = call("colony", [*SMALL, "--out", folder], capsys)
-    assert status == 0
-    assert out.startswith((folder / "report.txt").read_text("utf-8"))
-    assert "already has these results" in out
-    other = [*SMALL, "--out", folder, "--training.learner", "q_learning"]
-    status, _, err = call("colony", other, capsys)
-    assert status == 2
-    assert_one_sentence(err)
-    assert "training.learner" in err
-    assert contents(folder) == before
-
-
 def test_quick_has_a_folder_of_its_own():
     parse = load("colony").parse_arguments
     assert parse(["study"]).out == Path("results", "colony")
     assert parse(["study", "--quick"]).out == Path("results", "colony-quick")
-
-
-def test_other_arenas_are_the_only_difference_and_their_order_is_none(
-    capsys, tmp_path, monkeypatch
-):
-    def stop(study, blocks, *more, **where):
-        (blocks / "0.npz").touch()
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(Study, "reduced", stop)
-    monkeypatch.chdir(tmp_path)
-    small = ["study", "--out", "out", "--seeds", 1, "--sizes", 2, "--world-kinds"]
-    for world_kinds in (["paper", "small"], ["small", "paper", "small"]):
-        assert call("colony", [*small, *world_kinds], capsys)[0] == 130
-    _, _, err = call("colony", [*small, "paper"], capsys)
-    assert "unfinished work that this study lacks (world_kinds 'small')" in err
-    _, _, err = call("colony", [*small, "paper", "small", "--training.discount", 0.8], capsys)
-    assert "(training.discount is 0.9 instead of 0.8)" in err
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("fault", [faults.killed, faults.full])
-def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
-    fault, remembered, tmp_path
-):
-    arguments = [*SMALL, "--world-kinds", "small", "--no-figures"]
-    assert faults.assert_it_survives(fault, "colony", arguments, tmp_path / "out") > 40

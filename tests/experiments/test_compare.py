@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import os
 import re
 import shutil
@@ -14,8 +13,6 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-import compare as module
-import faults
 import numpy as np
 import pytest
 from command_lines import (
@@ -23,12 +20,12 @@ from command_lines import (
     assert_one_sentence,
     call,
     contents,
-    environment,
     load,
     promptly,
     run,
     start,
 )
+from paper import figures, process
 
 from taichi_ants import (
     Task,
@@ -88,7 +85,8 @@ POLICY = f"policies/{SHOWN[0]}.npz"
 RENDERS = {f"renders/{name}.gif" for name in SHOWN}
 FILES = {
     *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "runs.npz"),
-    *("manifest.json", "report.html", "report.txt", "summary.csv", "table2.csv", "table2.md"),
+    *("manifest.json", "report.html", "report.txt", "study.json"),
+    *("summary.csv", "table2.csv", "table2.md"),
     *(f"policies/{name}.npz" for name in SHOWN),
     *FIGURES,
     *RENDERS,
@@ -121,7 +119,7 @@ def copy(finished, tmp_path):
 @pytest.fixture
 def compare(capsys, monkeypatch):
     """Calls the script within this process, without a worker process, which `finished` has."""
-    monkeypatch.setattr(module.runtime, "available_threads", lambda: 1)
+    monkeypatch.setattr(process, "available_threads", lambda: 1)
     return lambda *arguments: call("compare", arguments, capsys)
 
 
@@ -155,8 +153,10 @@ CALM = Task(evaporation_in_evaluation=False)
 
 
 def test_files(finished):
-    assert set(contents(finished)) == FILES
-    assert not (finished / "unfinished").exists()
+    folders = {"blocks", "inputs", "sessions"}
+    found = {name for name in contents(finished) if name.partition("/")[0] not in folders}
+    assert found == FILES
+    assert folders <= {path.name for path in finished.iterdir()}
 
 
 def test_summary_lists_the_grid(finished):
@@ -277,9 +277,6 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     assert np.array_equal(archive["return_all"], trained.returns.mean(axis=2))
     assert np.array_equal(archive["greedy_return"], rollouts.returns.mean(axis=2))
     assert np.array_equal(archive["policy_returns"], once.returns[..., 0])
-    manifest = json.loads((out / "manifest.json").read_text("utf-8"))
-    assert manifest["settings"]["task.evaporation_in_training"] is (training == "on")
-    assert manifest["settings"]["task.evaporation_in_evaluation"] is (greedy == "on")
     words = f"Training {'with' if training == 'on' else 'without'} evaporation of trails, greedy"
     for name in ("report.txt", "table2.md"):
         assert words in (out / name).read_text("utf-8")
@@ -288,7 +285,6 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     status, _, err = compare(*TINY, "--episodes", 30, "--out", out)
     assert status == 2
     assert "task.evaporation_in_evaluation is " in err
-    assert ("task.evaporation_in_training is" in err) == (training == "on")
 
 
 def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
@@ -304,64 +300,6 @@ def test_pictures_show_the_episode_that_told_the_behaviour(finished, tmp_path):
         pictures = frames(episode.snapshots(), (720, 480), title="SARSA, truncates")
         save_animation(path, pictures, pause=PAUSE)
         assert (path.read_bytes() == shown) == (not evaporation)
-
-
-@pytest.mark.parametrize("draws", [False, True])
-def test_what_is_prepared_beside_can_be_done(draws):
-    """Nobody is told if it fails there: then all is ready later."""
-    settings = module.parse_arguments(["--seeds", "1"])
-    point = module.build_study(settings).points[0]
-    module.warm_up(point, None, {"threads": None, "arch": None}, draws)
-
-
-def test_a_page_that_is_gone_is_made_again_from_the_other_files(copy, compare):
-    """To the same bytes: numbers, figures and players."""
-    before = contents(copy)
-    page = before["report.html"].decode("utf-8")
-    assert page.count('class="player"') == 2  # delivers, circles with food
-    assert page.count('class="plot wide"') == 2
-    assert "SARSA" in page
-    (copy / "report.html").unlink()
-    status, out, err = compare(*SMALL, "--out", copy)
-    assert (status, err) == (0, "")
-    assert out.endswith(f"\n{copy}/report.html\n")
-    assert contents(copy) == before
-
-
-@pytest.mark.slow  # the worker process draws animations meanwhile
-def test_a_figure_that_fails_costs_no_results_and_is_drawn_later(tmp_path, compare, monkeypatch):
-    def fails(*given):
-        raise RuntimeError("no font")
-
-    arguments = [*SMALL, "--out", tmp_path / "out"]
-    with monkeypatch.context() as patch:
-        patch.setattr(module, "draw_figures", fails)
-        status, _, err = compare(*arguments)
-    assert status == 0
-    assert "there are no figures, because one failed with RuntimeError: no font." in err
-    assert set(contents(tmp_path / "out")) == FILES - FIGURES - RENDERS
-    assert compare(*arguments)[0] == 0
-    assert set(contents(tmp_path / "out")) == FILES
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        (["--seeds", 2], "that this study lacks (seed "),
-        (["--episodes", 61], "(episodes is 60 instead of 61)"),
-        (["--max-steps", 46], "(max_steps is 45 instead of 46)"),
-        (["--discounts", 0.9], "that this study lacks (training.discount "),
-        (["--world", "open", "--world.seed", 3], "(not the same worlds)"),
-    ],
-)
-def test_other_settings_do_not_mix_with_results(change, named, copy, compare):
-    before = contents(copy)
-    status, _, err = compare(*SMALL, *change, "--out", copy)
-    assert status == 2
-    assert_one_sentence(err)
-    assert named in err
-    assert "--force" in err
-    assert contents(copy) == before
 
 
 def test_lists_drop_what_is_said_twice(tmp_path, compare):
@@ -444,31 +382,10 @@ def test_all_learners_of_the_library_can_be_compared(tmp_path, compare):
     assert "trace_decay=0.5" in " ".join(out.split())
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [
-        pytest.param(faults.killed, marks=pytest.mark.slow),
-        pytest.param(faults.full, marks=pytest.mark.long),
-    ],
-)
-def test_whatever_file_operation_it_ends_at_it_goes_on_to_the_same_results(
-    fault, tmp_path, monkeypatch
-):
-    faults.remember(monkeypatch)
-    both = [*TINY, "--delivery", "both"]
-    assert faults.assert_it_survives(fault, "compare", both, tmp_path / "out") > 40
-
-
 PICTURED = [
     *("--seeds", 2, "--episodes", 20, "--learners", "q_learning", "sarsa", "--discounts", 0.9),
     *("--learning-rates", 0.1, "--epsilons", 0.3, "--epsilon-decays", 0.9),
 ]
-
-
-def blocks_in(folder):
-    """Finished blocks with the time at which they were written."""
-    found = (folder / "unfinished" / "blocks").glob("*.npz")
-    return {path.name: path.stat().st_mtime_ns for path in found}
 
 
 @pytest.mark.slow
@@ -476,8 +393,7 @@ def test_an_interruption_of_the_pictures_keeps_the_runs(kernels, tmp_path):
     """Ctrl-C on a terminal."""
     arguments = [*PICTURED, "--out", "out"]
     process = start("compare", arguments, kernels, tmp_path, start_new_session=True)
-    unfinished = tmp_path / "out" / "unfinished"
-    while process.poll() is None and not list(unfinished.glob("ready/*/policies/*")):
+    while process.poll() is None and not list((tmp_path / "out").glob(".*.tmp/policies/*")):
         time.sleep(0.002)
     time.sleep(0.3)
     os.killpg(process.pid, signal.SIGINT)
@@ -487,43 +403,48 @@ def test_an_interruption_of_the_pictures_keeps_the_runs(kernels, tmp_path):
     assert err.startswith("Stopped")
     assert err.count("\n") == 1
     assert time.perf_counter() - sent < promptly()
-    assert len(blocks_in(tmp_path / "out")) == 2 * 2
+    assert len(list((tmp_path / "out" / "blocks").iterdir())) == 2 * 2
 
 
-REHEARSED = """
-import pathlib, numpy as np
-import compare
-from paper.page import played
-from taichi_ants.task.constants import N_ACTIONS
-from taichi_ants.viewer import record_episode
+@pytest.mark.slow  # the second process draws animations meanwhile
+def test_a_figure_that_fails_costs_no_results_and_is_drawn_later(tmp_path, compare, monkeypatch):
+    def fails(*given):
+        raise RuntimeError("no font")
 
-point = compare.build_study(compare.parse_arguments(["--seeds", "1"])).points[0]
-episode = played(point, np.zeros((point.task.n_states, N_ACTIONS), np.float32), 0)
-compare.warm_up(point, None, {"threads": 1, "arch": None}, False)
-
-from taichi.lang.kernel_impl import Kernel
-materialize, late = Kernel.materialize, []
-
-def noted(self, key=None, **how):
-    if key not in self.compiled_kernels:
-        late.append(self.func.__name__)
-    return materialize(self, key, **how)
-
-Kernel.materialize = noted
-compare.render_policy(pathlib.Path("a.gif"), episode, "title")
-record_episode(episode, "delivers")
-print(late)
-"""
+    arguments = [*SMALL, "--out", tmp_path / "out"]
+    with monkeypatch.context() as patch:
+        patch.setattr(figures, "save_all", fails)
+        status, _, err = compare(*arguments)
+    assert status == 0
+    assert "there are no figures, because one failed with RuntimeError: no font." in err
+    assert not FIGURES & set(contents(tmp_path / "out"))
+    assert compare(*arguments, "--force")[0] == 0
+    assert set(contents(tmp_path / "out")) >= FIGURES | RENDERS
 
 
-@pytest.mark.long
-def test_what_is_prepared_beside_has_all_kernels_that_drawing_needs(kernels, tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-c", REHEARSED],
-        cwd=tmp_path,
-        env=environment(kernels),
-        text=True,
-        capture_output=True,
-        check=True,
-    )
-    assert done.stdout.splitlines()[-1] == "[]"
+def test_more_seeds_keep_what_is_there_and_fewer_are_refused(tmp_path, compare):
+    out = ["--out", tmp_path / "out"]
+    assert compare(*TINY, *out)[0] == 0
+    before = contents(tmp_path / "out" / "blocks")
+    assert compare(*TINY, "--seeds", 3, *out)[0] == 0
+    assert before.items() < contents(tmp_path / "out" / "blocks").items()
+    status, _, err = compare(*TINY, *out)
+    assert status == 2
+    assert_one_sentence(err)
+    assert "that this study lacks (seed 1, 2)" in err
+    assert compare(*TINY, "--seeds", 3, "--out", tmp_path / "at once")[0] == 0
+    names = ("summary.csv", "claims.csv", "table2.csv", "runs.npz", "report.txt")
+    grown, whole = (contents(tmp_path / name) for name in ("out", "at once"))
+    assert [name for name in names if grown[name] != whole[name]] == []
+
+
+def test_example_policies_are_trained_again_on_the_processor_of_the_results(finished, tmp_path):
+    """`taichi-ants tables` writes the same files from the blocks alone."""
+    copy = Path(shutil.copytree(finished, tmp_path / "out"))
+    before = contents(copy)
+    for name in FILES - {"study.json"}:
+        (copy / name).unlink()
+    assert subprocess.run([sys.executable, "-m", "taichi_ants", "tables", copy]).returncode == 0
+    after = contents(copy)
+    differ = {name for name in FILES if before[name] != after[name]}
+    assert differ <= {"manifest.json", "report.html"}

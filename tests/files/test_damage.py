@@ -15,9 +15,9 @@ from taichi_ants import AntsError
 
 KINDS = (
     *("policy", "policy of others", "training result", "data set", "colony", "session", "block"),
-    *("manifest", "table", "map", "sweep", "table of others"),
+    *("manifest", "map", "sweep", "table of others"),
 )
-CHECKED = KINDS[:9]
+CHECKED = KINDS[:8]
 MOST_GROWTH = 64  # MiB of memory
 
 
@@ -99,5 +99,7 @@ def test_what_is_no_regular_file_is_refused_at_once(
             read = outcome(file)
             assert isinstance(read, AntsError)
             assert file.path.name in str(read)
-            (Path.rmdir if place == "folder" else Path.unlink)(file.path)
+            aside = file.path.with_suffix(".damaged")  # where damaged blocks go
+            there = aside if os.path.lexists(aside) else file.path
+            (Path.rmdir if place == "folder" else Path.unlink)(there)
             file.path.touch()

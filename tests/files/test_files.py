@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import errno
 import os
-import shutil
 import stat
 import subprocess
 import sys
@@ -379,18 +378,6 @@ def test_csv_refuses_a_key_that_is_no_column(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="extra"):
         files.write_csv(tmp_path / "a.csv", [{"a": 1, "extra": 2}], ["a"])
     assert names(tmp_path) == []
-
-
-def test_a_disk_with_too_little_room_is_named_before_the_work(tmp_path: Path) -> None:
-    free = shutil.disk_usage(tmp_path).free
-    files.check_room(tmp_path, free // 2)
-    with pytest.raises(AntsError) as caught:
-        files.check_room(tmp_path, free + 10**12)
-    assert str(tmp_path) in str(caught.value)
-    assert "are free; free some space, write less" in str(caught.value)
-
-
-# check_writable_folder.
 
 
 def test_a_folder_is_created_with_its_parents_and_left_empty(tmp_path: Path) -> None:

@@ -280,12 +280,16 @@ def _rules(
     pheromone = random_pheromone(rng, dense)
     lifespan = int(rng.integers(1, 30)) if rng.random() < 0.5 else None
     regrowth = int(rng.choice([0, 0, 1, 2, 7])) if rng.random() < 0.7 else None
-    wander = int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None
+    pile_move_interval = int(rng.choice([1, 2, 5])) if rng.random() < 0.5 else None
     if changes:
         lifespan = 9 if not births and lifespan is None else lifespan
-        wander = 3 if regrowth is None and wander is None else wander
+        pile_move_interval = (
+            3 if regrowth is None and pile_move_interval is None else pile_move_interval
+        )
     start = str(rng.choice(["nest", "spread"]))
-    life = Life(births=births, lifespan=lifespan, regrowth=regrowth, pile_move_interval=wander)
+    life = Life(
+        births=births, lifespan=lifespan, regrowth=regrowth, pile_move_interval=pile_move_interval
+    )
     task = Task(pheromone=pheromone, evaporation_in_training=True, life=life)
     return {"ants": ants, "capacity": capacity, "start": start}, task
 

@@ -11,24 +11,6 @@ from taichi_ants.grid.constants import HEADING_STEPS
 from taichi_ants.grid.hexgrid import AxialGrid
 
 
-def test_normal_forms() -> None:
-    cells = [(5, 3, 8), (-8, 0, 0), (0, 0, 0), (7, 7, 7), (2, 0, -1)]
-    assert hexgrid.normal_form(cells).tolist() == [
-        [2, 0, 5],
-        [0, 8, 8],
-        [0, 0, 0],
-        [0, 0, 0],
-        [3, 1, 0],
-    ]
-
-
-def test_axial_and_back() -> None:
-    assert hexgrid.axial((5, 3, 8)).tolist() == [-3, -5]
-    assert hexgrid.cube((-3, -5)).tolist() == [2, 0, 5]
-    assert hexgrid.cube((4, -1)).tolist() == [5, 0, 1]
-    assert hexgrid.cube((0, 0)).tolist() == [0, 0, 0]
-
-
 @pytest.mark.parametrize(
     ("ranges", "count"),
     [((10, 10, 10), 271), ((1, 1, 1), 1), ((2, 2, 2), 7), ((7, 7, 1), 49), ((4, 1, 1), 4)],
@@ -65,19 +47,6 @@ def test_flat_index_by_hand() -> None:
     assert grid.offsets.tolist() == [1, 9, 8, -1, -9, -8]
     assert grid.cells(4 * 8 + 6).tolist() == [2, 0, 0]
     assert grid.index([(0, 0, 0)]).dtype == grid.cells([36]).dtype == grid.offsets.dtype == np.int32
-
-
-def test_numbers_are_lexicographic() -> None:
-    grid = AxialGrid((3, 2, 4))
-    cells = sorted(map(tuple, grid.cells(np.flatnonzero(grid.exists)).tolist()))
-    assert grid.number(cells).tolist() == list(range(grid.count))
-
-
-def test_grid_arrays_are_read_only() -> None:
-    grid = AxialGrid((3, 3, 3))
-    for array in (grid.exists, grid.offsets):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 1
 
 
 @pytest.mark.parametrize("size", [1.0, 7.5])
@@ -117,8 +86,3 @@ def test_cells_beyond_the_array_are_refused() -> None:
             match=r"^index .*; (all must lie between 0 and 24|it must be an array)",
         ):
             grid.cells([index])
-
-
-def test_huge_ranges_are_refused() -> None:
-    with pytest.raises(AntsError, match="smaller ranges"):
-        AxialGrid((1 << 15, 1 << 15, 1))

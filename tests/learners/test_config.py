@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import pickle
-from dataclasses import FrozenInstanceError, asdict
+from dataclasses import asdict
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from taichi_ants import AntsError, TrainingConfig, learners
-from taichi_ants.arguments import checked_share
 
 GOOD = {
     **{"learner": "dyna_q", "learning_rate": 0.1, "discount": 0.9, "epsilon": 0.3},
@@ -21,16 +20,6 @@ GOOD = {
 NOT_ZERO = ("learning_rate", "epsilon_decay", "learning_rate_decay")
 FALLING = {"learning_rate_decay": 0.25, "min_learning_rate": 0.02}
 MAY_BE_ZERO = ("discount", "epsilon", "min_epsilon", "min_learning_rate")
-
-
-def test_defaults():
-    config = TrainingConfig("q_learning", 0.1, 0.9, 0.3, 0.99)
-    assert (config.min_epsilon, config.planning_steps, config.hyperparameters) == (0.01, 0, ())
-    assert learners.with_hyperparameters(config) == config
-    config = learners.with_hyperparameters(
-        TrainingConfig("sarsa_lambda", 0.1, 0.9, 0.3, 0.99, trace_length=4)
-    )
-    assert config.hyperparameters == (("trace_decay", 0.9), ("trace_length", 4))
 
 
 @pytest.mark.parametrize(
@@ -46,17 +35,6 @@ def test_defaults():
 )
 def test_bounds_are_allowed(name, value):
     assert getattr(TrainingConfig(**{**GOOD, name: value}), name) == value
-
-
-NO_SHARES = [-1e-9, 1.0000001, float("nan"), float("inf"), 10**400, True, "0.5", None, [0.5], 1j]
-
-
-@pytest.mark.parametrize("decay", [0.5, 1.0])
-def test_a_lower_bound_never_raises_what_it_bounds(decay):
-    more = {"learning_rate_decay": decay, "min_learning_rate": 0.2}
-    config = TrainingConfig("sarsa", 0.1, 0.9, 0.0, decay, 0.01, **more)
-    assert (config.least_epsilon, config.next_epsilon(0.0)) == (0.0, 0.0)
-    assert (config.least_learning_rate, config.next_learning_rate(0.1)) == (0.1, 0.1)
 
 
 def test_rates_fall_by_their_factors_down_to_their_least():
@@ -129,19 +107,3 @@ def test_numbers_of_any_kind_are_stored_as_plain_ones():
     assert type(dict(other.hyperparameters)["planning_steps"]) is int
     assert TrainingConfig(**json.loads(json.dumps(other.as_dict()))) == plain
     assert pickle.loads(pickle.dumps(other)) == plain
-
-
-def test_configurations_cannot_be_changed():
-    with pytest.raises(FrozenInstanceError):
-        TrainingConfig(**GOOD).epsilon = 2
-
-
-@pytest.mark.parametrize("value", NO_SHARES)
-def test_no_share_of_one(value):
-    with pytest.raises(AntsError, match="must be a number between 0 and 1"):
-        checked_share("epsilon", value)
-
-
-@pytest.mark.parametrize("value", [0, 1, 0.5, np.float32(0.25), np.int64(1), Fraction(1, 3)])
-def test_share_of_one(value):
-    assert checked_share("epsilon", value) == float(value)

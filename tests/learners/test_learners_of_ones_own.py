@@ -15,7 +15,6 @@ from taichi_ants import (
     AntsError,
     Colony,
     TrainingConfig,
-    TrainingResult,
     continue_training,
     trace_training,
     train,
@@ -30,8 +29,6 @@ from taichi_ants.learners import (
     td_learner,
 )
 from taichi_ants.worlds import paper
-
-NUMBERS = np.arange(5, dtype=np.float32)
 
 
 @pytest.fixture(autouse=True)
@@ -99,74 +96,8 @@ def test_what_is_natural_works(like, td_error, engine):
 
 
 @ti.func
-def of_zero(value, reward, discount, next_values, next_action, epsilon):
-    return 0.0
-
-
-@ti.func
-def of_one(value, reward, discount, next_values, next_action, epsilon):
-    return 1
-
-
-@ti.func
-def of_infinity(value, reward, discount, next_values, next_action, epsilon):
-    return ti.exp(1000.0)
-
-
-@ti.func
-def of_its_own_value_kept_inside(value, reward, discount, next_values, next_action, epsilon):
-    return reward + next_values[min(max(int(value), 0), 4)] - value
-
-
-@pytest.mark.filterwarnings("ignore:overflow encountered in exp")
-@pytest.mark.parametrize("engine", ONE_ENGINE)
-@pytest.mark.slow
-def test_a_number_of_pythons_is_a_td_error(engine):
-    register(td_learner("mine", of_zero))
-    assert not engine().any()
-    register(td_learner("ones", of_one))
-    values = engine("ones")
-    assert np.isclose(values[values != 0].min(), 0.1)  # one update at the learning rate of 0.1
-    register(td_learner("infinite", of_infinity))
-    with pytest.raises(AntsError, match="'infinite' computed action values that are not finite"):
-        engine("infinite")
-
-
-def test_an_index_that_is_kept_inside_passes():
-    register(td_learner("mine", of_its_own_value_kept_inside))
-    assert in_runs().any()
-
-
-@ti.func
-def checks_the_next_action(value, reward, discount, next_values, next_action, epsilon):
-    valid = ti.cast(next_action >= 0, ti.f32) * ti.cast(next_action < 5, ti.f32)
-    return 1.0 - valid
-
-
-def test_the_next_action_is_always_a_valid_index():
-    """Also after a delivery, where none is drawn."""
-    register(td_learner("mine", checks_the_next_action, draws_next_action=True))
-    result = train(paper(), config(), range(5), 30)
-    assert result.deliveries.any()
-    assert not result.q_values.any()
-    colony = Colony(paper(), None, config(), ants=5)
-    assert colony.run(5, 600).deliveries.any()
-    assert not colony.q_values.any()
-
-
-@ti.func
 def of_a_vector(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * next_values - value
-
-
-@ti.func
-def of_pythons_max(value, reward, discount, next_values, next_action, epsilon):
-    return reward + discount * max(next_values) - value
-
-
-@ti.func
-def of_a_tuple(value, reward, discount, next_values, next_action, epsilon):
-    return reward, value
 
 
 @ti.func
@@ -177,11 +108,6 @@ def of_nothing(value, reward, discount, next_values, next_action, epsilon):
 @ti.func
 def of_a_truth(value, reward, discount, next_values, next_action, epsilon):
     return True
-
-
-@ti.func
-def of_an_expression_in_integers(value, reward, discount, next_values, next_action, epsilon):
-    return ti.cast(reward, ti.i32)
 
 
 @ti.func
@@ -200,16 +126,6 @@ def of_itself(value, reward, discount, next_values, next_action, epsilon):
 
 
 @ti.func
-def of_a_global_array(value, reward, discount, next_values, next_action, epsilon):
-    return NUMBERS[next_action]
-
-
-@ti.func
-def of_round(value, reward, discount, next_values, next_action, epsilon):
-    return round(reward)
-
-
-@ti.func
 def of_a_lost_name(value, reward, discount, next_values, next_action, epsilon):
     return lost  # noqa: F821
 
@@ -218,14 +134,9 @@ def of_a_lost_name(value, reward, discount, next_values, next_action, epsilon):
     ("td_error", "says"),
     [
         (of_a_vector, "it returns a vector"),
-        pytest.param(of_pythons_max, "it returns a vector", marks=pytest.mark.slow),
-        (of_a_tuple, "returns a value of the type tuple where"),
         (of_nothing, "returns nothing"),
         (of_a_truth, "returns a value of the type bool where"),
-        pytest.param(of_an_expression_in_integers, "of the type i32", marks=pytest.mark.slow),
         (of_itself, "recursion"),
-        (of_a_global_array, "valid indices"),
-        (of_round, "round"),
         (of_a_lost_name, '"lost" is not defined'),
     ],
 )
@@ -245,27 +156,6 @@ def test_what_taichi_cannot_compile_is_named_and_taichi_goes_on(td_error, says, 
 @ti.func
 def of_three(value, reward, discount):
     return reward - value
-
-
-def plain_function(value, reward, discount, next_values, next_action, epsilon):
-    return reward - value
-
-
-@pytest.mark.parametrize(
-    ("td_error", "says"),
-    [
-        (
-            of_three,
-            "has 3 arguments; it needs 6: value, reward, discount, next_values, next_action",
-        ),
-        (plain_function, "is not a Taichi function"),
-        (None, "is not a Taichi function"),
-    ],
-)
-def test_td_errors_that_are_refused_at_once(td_error, says):
-    with pytest.raises(AntsError, match=r"^the TD error of 'mine' ") as caught:
-        td_learner("mine", td_error)
-    assert says in str(caught.value)
 
 
 @dataclass(frozen=True)
@@ -318,18 +208,6 @@ def test_a_memory_lives_through_a_run_and_belongs_to_it():
     sarsa = train(paper(), config("sarsa"), range(3), 8, 200)
     assert np.array_equal(result.q_values[1], sarsa.q_values[0])
     assert not np.array_equal(result.q_values[0], sarsa.q_values[0])
-
-
-def test_a_memory_in_a_colony_belongs_to_an_ant():
-    register(with_memory())
-    kinds = [(with_momentum(0.5), 0), (with_momentum(0.0), 1), (config("sarsa"), 2)]
-    tables = {}
-    for training, kind in kinds:
-        colony = Colony(paper(), None, training, ants=5, sharing="independent")
-        colony.run(2, 100)
-        tables[kind] = colony.q_values
-    assert np.array_equal(tables[1], tables[2])
-    assert not np.array_equal(tables[0], tables[2])
 
 
 @ti.func
@@ -409,8 +287,6 @@ FAILS = "learner 'mine' cannot be used: "
     ("changes", "says"),
     [
         ({"learn": of_three}, "the function learn of 'mine' has 3 arguments; it needs 5: memory"),
-        ({"begin": learn}, "the function begin of 'mine' has 5 arguments; it needs 2: memory and"),
-        ({"learn": plain_function}, "the function learn of 'mine' is not a Taichi function"),
         ({"hyperparameters": Clashing}, "'discount' is a setting of all learners"),
         (
             {"hyperparameters": OfText},
@@ -420,13 +296,8 @@ FAILS = "learner 'mine' cannot be used: "
             {"hyperparameters": OutOfRange},
             f"{FAILS}hyperparameters fails (`training.depth` is 3; it must be",
         ),
-        ({"hyperparameters": 5}, f"{FAILS}hyperparameters fails"),
         ({"memory": lambda settings, n: None}, f"{FAILS}memory fails (its result is None; it"),
-        ({"memory": lambda settings, n: Memory(floats=-3)}, f"{FAILS}memory fails (floats of a "),
         ({"memory": lambda settings, n: n / 0}, f"{FAILS}memory fails (division by zero)"),
-        ({"memory": Memory(floats=9)}, f"{FAILS}memory fails ('Memory' object"),
-        ({"cost": 5}, f"{FAILS}cost fails ('int' object"),
-        ({"cost": lambda settings: "x"}, f"{FAILS}cost fails ("),
         ({"cost": lambda settings: -1}, f"{FAILS}cost fails (it returns -1, which must be above"),
     ],
 )
@@ -435,15 +306,6 @@ def test_learners_that_are_refused_when_they_are_registered(changes, says):
         register(replace(with_memory(), **changes))
     assert str(caught.value).startswith(says)
     assert "mine" not in registry.names()
-
-
-def test_a_learner_that_has_come_to_need_more_memory(tmp_path):
-    register(with_memory())
-    train(paper(), with_momentum(0.5), 0, 2, 50).save(tmp_path / "x.npz")
-    registry.LEARNERS.yours.clear()
-    register(with_memory(memory=lambda settings, n_states: Memory(floats=9, integers=1)))
-    with pytest.raises(AntsError, match="'mine' needs more memory than when"):
-        continue_training(TrainingResult.load(tmp_path / "x.npz"), 1)
 
 
 def test_the_examples_memory_makes_the_difference(tmp_path):
@@ -467,16 +329,8 @@ def of_a_logarithm(value, reward, discount, next_values, next_action, epsilon):
     return reward - ti.log(value - 0.5)
 
 
-@ti.func
-def that_explodes(value, reward, discount, next_values, next_action, epsilon):
-    return (reward - value) * 1e30
-
-
-@pytest.mark.parametrize(
-    "td_error", [of_a_logarithm, pytest.param(that_explodes, marks=pytest.mark.slow)]
-)
-def test_values_that_are_not_finite_are_named(td_error):
-    register(td_learner("mine", td_error))
+def test_values_that_are_not_finite_are_named():
+    register(td_learner("mine", of_a_logarithm))
     named = (
         r"^learner 'mine' computed action values that are not finite, with .*rate=0\.1.* seed 0; "
     )
@@ -486,18 +340,3 @@ def test_values_that_are_not_finite_are_named(td_error):
         in_a_colony()
     actions = trace_training(paper(), config(), 0, 3).actions  # a trace shows what happens
     assert (actions.min(), actions.max()) == (0, 4)
-
-
-def test_values_that_are_not_finite_are_named_while_a_colony_is_stepped(tmp_path):
-    register(td_learner("mine", of_a_logarithm))
-    colony = Colony(paper(), None, config(), ants=5, sharing="independent")
-    colony.begin_episode()
-    colony.tick(100)
-    path = tmp_path / "colony.npz"
-    named = "^learner 'mine' computed action values that are not finite"
-    with pytest.raises(AntsError, match=named):
-        colony.outcome()
-    with pytest.raises(AntsError, match=named):
-        colony.save(path)
-    assert not path.exists()
-    assert "ticks: 100" in repr(colony)

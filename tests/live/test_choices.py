@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 import pytest
 from command_lines import ROOT
 
-from taichi_ants import AntsError, TrainingConfig
+from taichi_ants import TrainingConfig
 from taichi_ants.commands import watch
-from taichi_ants.learners.policies import Policy, trail_follower
 from taichi_ants.live.choices import TASKS, Choices, fields
 from taichi_ants.settings import Named, all_of
 from taichi_ants.task import Labour, Task
@@ -41,28 +39,6 @@ def test_the_form_has_every_setting_with_its_bounds():
     assert half_life["only"] == ["task.pheromone.evaporation", "exponential"]
     assert offered["training.planning_steps"]["learner"] != ""
     assert offered["world.aside"]["world"] == "double_bridge"
-
-
-def test_fields_that_the_form_lacks_are_refused():
-    chosen = Choices({}).chosen(Choices({}).setup(watch.START))
-    Choices({}).setup(chosen)  # without the cues, which the form does not have
-    for rules in ({"fields": {"home": {}}}, {"homing_cue": "trail"}):
-        policy = Policy(trail_follower(), "paper", {"task": Task(**rules).as_dict()})
-        with pytest.raises(AntsError, match=r"the form of the live page has only the trail and"):
-            Choices({"mine": policy})
-        setup = replace(Choices({}).setup(watch.START), task=Task(**rules))
-        assert Choices({}).chosen(setup)["settings"]["task.outbound_cue"] == "trail"
-    with pytest.raises(AntsError, match=r"^pheromone is 'hme'; it must be one of trail, home\.$"):
-        replace(setup, task=Task(fields={"home": {}}), pheromone="hme")
-
-
-def test_settings_of_the_form_reach_the_session():
-    given = {"task.life.lifespan": 70, "training.epsilon": 0.5, "training.planning_steps": 2}
-    chosen = {**watch.START, "policy": "learn dyna_q", "world": "double_bridge"}
-    setup = Choices({}).setup({**chosen, "settings": {**given, "world.long": 30}})
-    assert (setup.task.life.lifespan, setup.policy.epsilon) == (70, 0.5)
-    assert (setup.policy.planning_steps, setup.world_settings) == (2, {"long": 30})
-    assert given.items() <= Choices({}).chosen(setup)["settings"].items()
 
 
 def test_what_the_command_begins_with_can_be_chosen():

@@ -12,13 +12,6 @@ from taichi_ants.task.events import Event
 from taichi_ants.worlds import World
 
 
-def test_the_last_tick_of_a_run_truncates_for_all():
-    world = World((5, 5, 5), (0, 0, 4), ants=[((0, 0, 0), 0), ((2, 0, 0), 3)])
-    colony = ReferenceColony(world, None, training(), 0, ants=2)
-    ticks = [[step.truncated for step in steps] for steps in colony.run_episode(3)]
-    assert ticks == [[False, False], [False, False], [True, True]]
-
-
 @pytest.mark.parametrize(
     ("delivery", "ends_at_delivery", "terminated", "truncated"),
     [

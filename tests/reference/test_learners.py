@@ -101,14 +101,6 @@ def test_double_q_by_hand():
     assert values_of(learner) == {(0, 1): 2.875, (1, 0): 2, (1, 1): 2.375, (1, 2): 3}
 
 
-def test_double_q_takes_the_first_of_the_best_actions():
-    learner = made("double_q", {(1, 1): 4, (1, 2): 4})
-    # A(1, 1) = 4 + 0.5 * (0 - 4) = 2: ended.
-    learn(learner, transition(1, 1, 0, 0, terminated=True), rng_state=TO_A)
-    # B has a tie of actions 1 and 2; in A they are worth 2 and 4.
-    assert learn(learner, transition(0, 0, 0, 1), rng_state=TO_B) == [1]
-
-
 def test_sarsa_lambda_by_hand():
     # Traces fade by discount * decay = 1/4; two of them are kept.
     learner = made("sarsa_lambda", {(1, 0): 4}, trace_decay=0.5, trace_length=2)
@@ -129,14 +121,6 @@ def test_sarsa_lambda_by_hand():
     # 2 + 0 - 0, of this pair alone.
     assert learn(learner, transition(3, 3, 2, 4, next_action=0)) == [2]
     assert values_of(learner) == {(0, 0): 2.75, (1, 0): 2.0625, (2, 1): 4, (3, 3): 1}
-
-
-def test_sarsa_lambda_keeps_one_trace_of_a_pair():
-    learner = made("sarsa_lambda", trace_decay=0.5)
-    # 2, so 1; then 3 + 0.5 * 1 - 1 = 2.5, so 1 + 1.25 * 1, and nothing for the older trace.
-    steps = transition(0, 0, 2, 1, next_action=0), transition(0, 0, 3, 0, next_action=0)
-    assert learn(learner, *steps) == [2, 2.5]
-    assert values_of(learner) == {(0, 0): 2.25}
 
 
 def test_n_step_sarsa_by_hand():
@@ -189,16 +173,6 @@ def test_prioritized_sweeping_goes_on_from_errors_above_the_threshold_alone():
         assert learner.rows[0][0] == value
 
 
-def test_prioritized_sweeping_follows_no_pair_back_from_where_it_ended():
-    # (0, 0) leads to state 1 too, but ended there: its value is 0.5 * 4, and stays.
-    learner = made("prioritized_sweeping", planning_steps=3, threshold=0.0)
-    learn(learner, transition(0, 0, 4, 1, terminated=True))
-    before = learner.rows[0][0]
-    assert before == 2  # an error of 2 is left, but nothing has led to it
-    learn(learner, transition(1, 0, 8, 2))
-    assert learner.rows[0][0] == before
-
-
 def test_prioritized_sweeping_forgets_an_old_priority_where_the_pair_is_seen_again():
     learner = made("prioritized_sweeping", planning_steps=1, threshold=0.5)
     learn(learner, transition(0, 0, 0, 1), transition(3, 0, 0, 1))
@@ -207,21 +181,6 @@ def test_prioritized_sweeping_forgets_an_old_priority_where_the_pair_is_seen_aga
     # (0, 0) again, with the reward -1: error -1 + 2 = 1. So (3, 0) is first: 0 + 0.5 * 2.
     learn(learner, transition(0, 0, -1, 1))
     assert values_of(learner) == {(1, 0): 4, (3, 0): 1}
-
-
-def test_prioritized_sweeping_keeps_a_larger_priority_where_a_next_value_changes():
-    learner = made("prioritized_sweeping", planning_steps=1, threshold=0.5)
-    learn(learner, transition(0, 0, 0, 1), transition(3, 0, 0, 1))
-    # (1, 0): error 40, so 20; (0, 0) and (3, 0) wait with 10.
-    learn(learner, transition(1, 0, 40, 2, terminated=True))
-    # (0, 0) with the reward -4: error 6. (3, 0) is updated: 5.
-    learn(learner, transition(0, 0, -4, 1))
-    # (1, 0): error 6 - 20 = -14, so 13. The error of (0, 0) is now -4 + 6.5 = 2.5; it keeps its 6.
-    learn(learner, transition(1, 0, 6, 2, terminated=True))
-    assert values_of(learner) == {(1, 0): 13, (3, 0): 5}
-    # So it comes before (2, 0) with an error of 4.
-    learn(learner, transition(2, 0, 4, 4))
-    assert values_of(learner) == {(0, 0): 1.25, (1, 0): 13, (3, 0): 5}
 
 
 # The first draw from state 0 is 0xE220A839 (0.883 of the range), 0x7B1DCDAF (0.481); from state

@@ -56,14 +56,6 @@ def test_a_food_given_becomes_an_ant_that_faces_away(seed):
     assert n_draws(born.stream.state, stream_state(seed, STREAM_BORN, 1)) == 1
 
 
-def test_the_one_free_neighbour_takes_a_draw_too():
-    colony = begun(around(0, 1, 2, 3, 4), births=True)
-    load(colony, 0)
-    act(colony, *[GIVE] * 5)
-    assert colony.ants[5].cell == neighbour(QUEEN, 5)
-    assert n_draws(colony.queen_stream.state, stream_state(0, STREAM_QUEEN, 0)) == 1
-
-
 def test_the_food_waits_while_no_neighbour_is_free():
     colony = begun(around(*range(6)), births=True)
     load(colony, *range(6))
@@ -76,24 +68,6 @@ def test_the_food_waits_while_no_neighbour_is_free():
     act(colony, GIVE, GIVE, FORWARD, GIVE, GIVE, GIVE)
     assert (len(colony.ants), colony.stores[0], colony.record.births) == (7, 5, 1)
     assert (colony.ants[6].cell, colony.ants[6].heading) == (neighbour(QUEEN, 2), 2)
-
-
-def test_the_food_waits_while_the_colony_is_full_and_slots_are_free_a_tick_after_a_death():
-    colony = begun(around(1, 4), births=True, capacity=3, lifespan=3)
-    load(colony, 0, 1)
-    act(colony, GIVE, GIVE)
-    assert (sorted(colony.ants), colony.stores[0]) == ([0, 1, 2], 1)
-    act(colony, *[GIVE] * 3)
-    act(colony, *[GIVE] * 3)
-    # Ticks 0, 1, 2: the first two are 3 ticks old and die, after the births of this tick.
-    assert (sorted(colony.ants), colony.stores[0]) == ([2], 1)
-    assert colony.ants[2].age == 2
-    act(colony, GIVE)
-    # The newborn takes the lowest slot; the ant in slot 2 has died in turn.
-    assert {slot: ant.number for slot, ant in colony.ants.items()} == {0: 3}
-    assert colony.stores[0] == 0
-    record = colony.record
-    assert (record.births, record.deaths) == (2, 3)
 
 
 # Ant 0 heads up to ant 1, who looks at the queen.

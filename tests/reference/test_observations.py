@@ -130,26 +130,6 @@ def test_trails_behind_are_measured_against_the_strongest_ahead(levels, codes):
     assert with_trails("six_cells", levels) == digits(4, 0, *codes, 0)
 
 
-@pytest.mark.parametrize("pheromone", [Pheromone(), Pheromone(diffusion=1e-9)])
-@pytest.mark.parametrize(
-    ("levels", "codes"),
-    [
-        ((0, 0, 0), (0, 0, 0)),
-        ((1, 0, 0), (4, 0, 0)),
-        ((9, 3, 2), (4, 3, 2)),  # all, a third, less
-        ((9, 6, 5), (4, 4, 3)),  # all, two thirds, less
-        ((10, 3, 4), (4, 2, 3)),  # a third of 10 lies between 3 and 4
-        ((6, 7, 10), (3, 4, 4)),  # and two thirds between 6 and 7
-        ((1_000_000_000, 333_333_333, 666_666_667), (4, 2, 4)),  # no sum overflows
-    ],
-)
-def test_trails_in_thirds_of_the_strongest(levels, codes, pheromone):
-    if pheromone.dense and max(levels) > 2**24:
-        codes = (4, 3, 4)  # in float32 a third
-    row = with_trails("trail_levels", (900, *levels), pheromone)
-    assert row == digits(6, 0, *codes)
-
-
 # Ant 0 looks up at another one; beside that a rock and the end of the world.
 CROWD = """
     3
@@ -224,12 +204,3 @@ def test_ants_choose_and_learn_by_the_row_and_act_by_the_paper_state(name):
     learnt = colony.q_values
     assert learnt.shape == (n_states, 5)
     assert learnt[step.state, LEFT] == 2.5  # 4 + 0.5 * (1 - 4)
-
-
-def test_each_observation_has_a_twin():
-    own = [
-        name
-        for name in observations.names()
-        if observations.get(name).encode.__module__.startswith("taichi_ants.")
-    ]
-    assert list(OBSERVATIONS) == own

@@ -9,13 +9,12 @@ from functools import partial
 
 import numpy as np
 import pytest
-from colonies import GAMMA, act, begun, load, n_draws, training
+from colonies import GAMMA, act, begun, load, training
 from transitions import transition
 
-from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.learners.config import update_weights
 from taichi_ants.reference import LEARNERS
-from taichi_ants.reference.random_stream import RandomStream, stream_state
+from taichi_ants.reference.random_stream import RandomStream
 from taichi_ants.reference.sharing import SharedTable, mean_error
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP
 from taichi_ants.worlds import World
@@ -46,27 +45,27 @@ def table(**values):
     return q_values
 
 
-def changed(minds):
+def changed(learners):
     """The values that are not zero, by state and action."""
-    q_values = minds.tables[0].table()
+    q_values = learners.tables[0].table()
     return {(int(s), int(a)): float(q_values[s, a]) for s, a in np.argwhere(q_values)}
 
 
 def test_three_errors_of_one_pair_and_one_of_another():
     # Errors by the table as it was before: 3 + 4/2 - 2 = 3, -1 + 0 - 2 = -3, 10 - 2 = 8 (ended);
     # the mean 8/3 times 1 - 1/8; both in float32. The other pair: 1 + 2/2 - 4 = -2.
-    minds = shared(q_values=table(s0a1=2, s5a0=4))
+    learners = shared(q_values=table(s0a1=2, s5a0=4))
     steps = [
         transition(0, 1, 3, 5),
         transition(5, 0, 1, 0, number=1),
         transition(0, 1, -1, 6, number=2),
         transition(0, 1, 10, 5, number=3, terminated=True),
     ]
-    minds.learn(steps, streams(4), 0.0)
+    learners.learn(steps, streams(4), 0.0)
     assert [step.td_error for step in steps] == [3, -2, -3, 8]
     mean = np.float32(8 / 3)
     value = np.float32(2) + np.float32(0.875) * mean
-    assert changed(minds) == {(0, 1): float(value), (5, 0): 3.0}
+    assert changed(learners) == {(0, 1): float(value), (5, 0): 3.0}
 
 
 @pytest.mark.parametrize(
@@ -102,20 +101,6 @@ def test_the_weights():
     assert update_weights(0.3, 0).tolist() == [0]
 
 
-# In the world: two ants want one cell, both by (0, forward).
-MEETING = World((5, 5, 5), (0, 0, 4), ants=[((0, 0, 0), 0), ((2, 0, 0), 3)])
-
-
-@pytest.mark.parametrize(("learner", "n"), [("sarsa", 3), ("dyna_q", 3), ("q_learning", 3)])
-def test_with_a_fixed_table_ants_draw_for_their_actions_alone(learner, n):
-    colony = begun(MEETING, training(learner), sharing="frozen", seed=4)
-    for _ in range(n):
-        colony.tick()
-    for number, ant in colony.ants.items():
-        assert n_draws(ant.stream.state, stream_state(4, STREAM_ANT, number)) == n
-        assert ant.chosen is None
-
-
 @pytest.mark.parametrize(("learner", "then"), [("sarsa", FORWARD), ("q_learning", LEFT)])
 def test_sarsa_chooses_by_the_table_before_the_update(learner, then):
     # Two ants far apart go forward over free land. Q(E E E, forward) falls from 1/4, by 3/4 of
@@ -132,18 +117,18 @@ def test_sarsa_chooses_by_the_table_before_the_update(learner, then):
     assert [step.action for step in colony.transitions] == [then] * 2
 
 
-def entries(minds):
+def entries(learners):
     return [
         (*pair, seen.reward, seen.next_state, seen.terminated)
-        for pair, seen in minds.tables[0].model.items()
+        for pair, seen in learners.tables[0].model.items()
     ]
 
 
 def test_the_model_of_all():
-    minds = shared("dyna_q", learning_rate=1.0, planning_steps=1)
+    learners = shared("dyna_q", learning_rate=1.0, planning_steps=1)
     # Of one pair the highest number counts (not the slot, not the place in the list), and new
     # pairs come in ascending order of 5 * state + action.
-    minds.learn(
+    learners.learn(
         [
             transition(9, 2, 0, 3, number=4, slot=1),
             transition(7, 3, 3, 4, number=7, slot=0),
@@ -154,27 +139,27 @@ def test_the_model_of_all():
         0.0,
     )
     first = [(7, 0, 1, 6, False), (7, 3, 3, 4, False), (9, 2, 0, 3, False)]
-    assert entries(minds) == first
+    assert entries(learners) == first
     # Pairs known already keep their places; what was seen last replaces what was seen before, be
     # the ant's number as low as it may.
-    minds.learn(
+    learners.learn(
         [transition(9, 2, 10, 1, number=0, terminated=True), transition(1, 1, 0, 2, number=1)],
         streams(2),
         0.0,
     )
-    assert entries(minds) == [*first[:2], (9, 2, 10, 1, True), (1, 1, 0, 2, False)]
+    assert entries(learners) == [*first[:2], (9, 2, 10, 1, True), (1, 1, 0, 2, False)]
 
 
 def test_a_round_of_planning_by_hand():
     # Real updates: pair (0, 1), reward 8, ended, by two ants: 8 * 3/4 = 6. Then one round: both
     # draw the one visited pair, error 8 - 6 = 2, twice: 6 + 2 * 3/4 = 7.5. Another: 7.875.
     for rounds, value in ((1, 7.5), (2, 7.875)):
-        minds = shared("dyna_q", planning_steps=rounds)
+        learners = shared("dyna_q", planning_steps=rounds)
         ants = streams(2)
         steps = [transition(0, 1, 8, 5, number=k, terminated=True) for k in range(2)]
-        minds.learn(steps, ants, 0.0)
+        learners.learn(steps, ants, 0.0)
         assert [step.td_error for step in steps] == [8, 8]  # of the real transitions alone
-        assert changed(minds) == {(0, 1): value}
+        assert changed(learners) == {(0, 1): value}
         assert [stream.state for stream in ants] == [rounds * GAMMA % 2**64] * 2
 
 
@@ -192,15 +177,15 @@ def test_an_ant_born_into_a_slot_begins_with_nothing():
     load(colony, 0)
     act(colony, GIVE, FORWARD)
     assert sorted(colony.ants) == [0, 2]
-    assert len(colony.minds.tables[1].model) == 1
+    assert len(colony.learners.tables[1].model) == 1
     load(colony, 0)
     act(colony, GIVE, PICK_UP)
-    tables, minds = colony.q_values, colony.minds.tables
+    tables, learners = colony.q_values, colony.learners.tables
     assert {slot: ant.number for slot, ant in colony.ants.items()} == {0: 0, 1: 3, 2: 2}
     assert not tables[1].any()
-    assert minds[1].model == {}
+    assert learners[1].model == {}
     # The one that was born first has learnt since: a pick-up in vain.
-    [(pair, seen)] = minds[2].model.items()
+    [(pair, seen)] = learners[2].model.items()
     assert (pair, seen.reward) == (colony.transitions[1].pair, -1)
     assert tables[2].min() == -0.75
     # A table stays with its slot in the next episode.

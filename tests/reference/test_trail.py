@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from colonies import act, begun, load
 
-from taichi_ants.reference.geometry import existing_cells, neighbour
+from taichi_ants.reference.geometry import neighbour
 from taichi_ants.reference.world_state import Trail
 from taichi_ants.task import Pheromone
 from taichi_ants.task.constants import FORWARD, GIVE, PICK_UP
@@ -70,39 +70,6 @@ def test_one_tick_of_diffusion_by_hand():
     assert float(trail.level(neighbour(neighbour(MIDDLE, 2), 2))) == 0
 
 
-def test_what_is_aimed_out_of_the_world_stays():
-    # The corner (4, 0, 0) of ranges (5, 5, 5): headings 0, 1, 5 lead out.
-    trail = after(Trail(plain_world(768, (4, 0, 0)), Pheromone("none", diffusion=0.75)), 1)
-    assert float(trail.level((4, 0, 0))) == 768 - 3 * 96
-    around = [float(trail.level(neighbour((4, 0, 0), h))) for h in range(6)]
-    assert around == [0, 0, 96, 96, 96, 0]
-
-
-def test_a_level_below_one_that_was_spread_lasts_until_the_next_evaporation():
-    # 8 falls to 4, of which 0.5 goes to each neighbour and 1 stays; all that halves to below 1.
-    trail = after(Trail(plain_world(8), Pheromone("exponential", 1, diffusion=0.75)), 1)
-    assert [float(trail.level(cell)) for cell in (MIDDLE, neighbour(MIDDLE, 2))] == [1, 0.5]
-    assert total(after(trail, 1), plain_world(8)) == 0
-
-
-def total(trail, world):
-    return sum(float(trail.level(cell)) for cell in existing_cells(world.ranges))
-
-
-@pytest.mark.parametrize("rate", [0.3, 1.0])
-def test_the_mean_squared_distance_grows_by_the_rate(rate):
-    # A share `rate` of everything goes one step in each direction alike: the mean squared distance
-    # grows by exactly `rate` per tick, until the edge is reached.
-    ticks = 9
-    world = plain_world(level=10**6, ranges=(11, 11, 11))
-    trail = after(Trail(world, Pheromone("none", diffusion=rate)), ticks)
-    spread = 0.0
-    for cell in existing_cells(world.ranges):
-        q, r = cell[0] - cell[2], cell[1] - cell[2]
-        spread += float(trail.level(cell)) * (q * q + r * r - q * r)
-    assert spread / total(trail, world) == pytest.approx(rate * ticks, rel=1e-5)
-
-
 # An ant with heading 0 below three free cells; the queen is beside, out of the way.
 LANE = """
 trail = 600
@@ -151,18 +118,6 @@ def test_the_deposit_of_a_carrying_ant(pheromone, bare, trodden):
     second = colony.ants[0].cell
     assert second != first
     assert colony.world.trail.level(second) == trodden
-
-
-def test_the_first_observation_sees_the_start_undiminished_and_the_next_a_tick_later():
-    # Levels 1 and 2 to the left and to the right: seen E E T, then 0 and 1, and nothing at last.
-    cells = [(neighbour(MIDDLE, 0), 1), (neighbour(MIDDLE, 2), 2)]
-    world = World((5, 5, 5), FAR_QUEEN, trails=cells, ants=[(MIDDLE, 1)])
-    colony = begun(world)
-    seen = [colony.ants[0].state]
-    for _ in range(2):
-        act(colony, GIVE)
-        seen.append(colony.ants[0].state)
-    assert seen == [2 * 16 + 2, 2, 0]
 
 
 def test_dense_levels_are_seen_from_one_on_and_from_half_of_the_strongest():

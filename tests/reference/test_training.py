@@ -33,7 +33,7 @@ def prepared(learning, task=None, rng_state=0):
     q_values = np.zeros((128, 5), np.float32)
     q_values[12, PICK_UP], q_values[76, GIVE], q_values[4, 1] = 1, 2, 4
     run = train(TWO_STEPS, learning, 0, 0, 600, task)
-    run.colony.minds.tables[0] = LEARNERS[learning.learner](learning, 128, q_values)
+    run.colony.learners.tables[0] = LEARNERS[learning.learner](learning, 128, q_values)
     run.colony.streams[0].state = rng_state
     return run
 
@@ -42,12 +42,6 @@ def train_once(learning, delivery="terminates", max_steps=600, rng_state=0):
     task = Task(delivery=delivery)
     begun = prepared(learning, task, rng_state)
     return train(TWO_STEPS, learning, 0, 1, max_steps, task, start_from=begun)
-
-
-def outcomes_of(run):
-    return [
-        (pair, (seen.reward, seen.next_state, seen.terminated)) for pair, seen in run.model.items()
-    ]
 
 
 def draws(run):
@@ -67,16 +61,6 @@ def test_td_errors_by_delivery_setting(learner, delivery, last):
     assert run.deliveries == [1]
 
 
-@pytest.mark.parametrize("delivery", ["terminates", "truncates"])
-@pytest.mark.parametrize("learner", LEARNERS)
-def test_truncation_bootstraps(learner, delivery):
-    run = train_once(training(learner), delivery, max_steps=1)
-    [step] = run.trace
-    assert (step.truncated, step.terminated) == (True, False)
-    assert step.td_error == 3.0  # as without the limit
-    assert (run.returns, run.steps, run.deliveries) == ([3], [1], [0])
-
-
 @pytest.mark.parametrize(
     ("learner", "delivery", "max_steps", "expected"),
     [
@@ -91,42 +75,3 @@ def test_truncation_bootstraps(learner, delivery):
 def test_how_many_draws_are_made(learner, delivery, max_steps, expected):
     run = train_once(training(learner), delivery, max_steps)
     assert draws(run) == expected
-
-
-@pytest.mark.parametrize(
-    ("rng_state", "pick_up", "give"),
-    [
-        # Step 0: 1 -> 2.5, planned towards 4: 3.25. Step 1: Q(76, give) 2 -> 6 (target 10).
-        # The draw of the second planning step is the fourth: 0xF88BB8A8 (0.97) from state 0, the
-        # second of two pairs, 6 -> 8; 0x1B39896A (0.11) from state GAMMA, the first pair, whose
-        # target is now 3 + 0.5 * 6 = 6: 3.25 -> 4.625.
-        (0, 3.25, 8.0),
-        (GAMMA, 4.625, 6.0),
-    ],
-)
-def test_planning_draws_one_of_the_visited_pairs(rng_state, pick_up, give):
-    run = train_once(training("dyna_q", planning_steps=1), rng_state=rng_state)
-    assert run.q_values[12, PICK_UP] == pick_up
-    assert run.q_values[76, GIVE] == give
-    assert outcomes_of(run) == [
-        ((12, PICK_UP), (3, 76, False)),
-        ((76, GIVE), (10, 4, True)),
-    ]
-
-
-def test_the_model_holds_the_last_outcome_in_the_order_of_first_visit():
-    learning = training("dyna_q", epsilon=1.0)
-    run = train(TWO_STEPS, learning, 3, 8, 40, Task(delivery="truncates"))
-    outcomes, changed = {}, 0
-    for step in run.trace:
-        pair, outcome = (step.state, step.action), (step.reward, step.next_state, False)
-        changed += outcomes.get(pair, outcome) != outcome
-        outcomes[pair] = outcome
-    assert outcomes_of(run) == list(outcomes.items())
-    assert changed > 0  # the test would not see the difference otherwise
-
-
-def test_epsilon_decays_to_its_floor():
-    learning = training(epsilon=0.5, epsilon_decay=0.5, min_epsilon=0.2)
-    epsilons = [train(TWO_STEPS, learning, 0, n, 5).epsilon for n in range(4)]
-    assert epsilons == [0.5, 0.25, 0.2, 0.2]

@@ -13,8 +13,7 @@ from taichi_ants import AntsError, TrainingConfig, files, worlds
 from taichi_ants.protocol import At, Every
 from taichi_ants.report.odd import Model, described
 from taichi_ants.settings import MISSING, all_of, declared, flat
-from taichi_ants.studies.points import ColonyPoint, FixedPolicy, RunPoint
-from taichi_ants.studies.runner import Study
+from taichi_ants.studies.points import ColonyPoint, FixedPolicy, RunPoint, settings_of
 from taichi_ants.studies.sweep import read_sweep, sweep_of
 from taichi_ants.task import Field, Food, Task, foraging
 
@@ -27,8 +26,12 @@ def of_facts(facts, sweep=None):
     return described(Model(json.loads(files.to_json(facts)), sweep or {}), "taichi-ants sweep x")
 
 
+def of_sweep(sweep, file):
+    return of_facts(settings_of(sweep.study.points, sweep.study.seeds) | sweep.facts(), file)
+
+
 def text_of(*points):
-    return of_facts(Study(points, (3, 4)).settings())
+    return of_facts(settings_of(points, (3, 4)))
 
 
 def values_in(text):
@@ -163,7 +166,7 @@ task.fields.a.level = [100, 200]
 
 def test_a_study_without_learning_has_no_parameters_of_learning():
     file = files.tomllib.loads(MINIMAL)
-    text = of_facts(sweep_of(file).facts(), file)
+    text = of_sweep(sweep_of(file), file)
     found = values_in(text)
     assert not [name for name in found if name.startswith("training.")]
     assert found.keys().isdisjoint({"sharing", "task.delivery", "task.evaporation_in_training"})
@@ -251,7 +254,7 @@ def test_rows_of_tables_have_as_many_cells_as_their_heads():
 
 def test_the_guide_shows_a_part_of_a_real_description():
     path = ROOT / "experiments/sweeps/trails.toml"
-    text = of_facts(read_sweep(path).facts(), files.tomllib.loads(path.read_text()))
+    text = of_sweep(read_sweep(path), files.tomllib.loads(path.read_text()))
     guide = (ROOT / "docs/archives.md").read_text("utf-8")
     shown = guide.split("```markdown\n")[1].split("```")[0]
     assert len(shown) > 500

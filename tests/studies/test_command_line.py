@@ -6,6 +6,7 @@ import io
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from command_lines import environment
@@ -16,12 +17,11 @@ from taichi_ants.errors import AntsError
 from taichi_ants.studies import command_line
 from taichi_ants.studies.command_line import (
     Parser,
-    load_plugin,
     progress_bar,
-    read_plugin,
     run_command,
     whole_number,
 )
+from taichi_ants.studies.plugins import load_code, load_plugin, read_plugin
 
 
 @pytest.fixture
@@ -259,21 +259,34 @@ def test_a_plugin_imports_files_of_its_folder(tmp_path, monkeypatch):
     assert sys.modules["second_file"].VALUE == 22
 
 
+def test_the_packages_and_texts_of_a_plugin_travel_with_it(tmp_path):
+    (tmp_path / "study.py").write_text("import parts.inner\nVALUE = parts.inner.VALUE\n")
+    (tmp_path / "study_words.toml").write_text("")
+    (tmp_path / "parts").mkdir()
+    for name, text in {"__init__.py": "", "inner.py": "VALUE = 3\n", "page.html": ""}.items():
+        (tmp_path / "parts" / name).write_text(text)
+    code = read_plugin(str(tmp_path / "study.py"))
+    names = ["study.py", "study_words.toml", "parts/__init__.py", "parts/inner.py"]
+    assert list(code) == [str(tmp_path / name) for name in (*names, "parts/page.html")]
+    load_code([code])
+    assert sys.modules["plugin_study"].VALUE == 3
+    assert Path(sys.modules["parts"].__file__).parents[1] != tmp_path
+    with pytest.raises(AntsError, match=r"loaded another file 'study\.py'; start new workers"):
+        load_code([{**code, "more": b""}])
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
         ("import random", r"random\.py' has an installed module's name; rename it"),
         ("from numpy import pi", r"numpy\.py' has an installed module's name; rename it"),
         ("import not_there", "'not_there'; install it, or save it in the plugin's folder."),
-        ("import inner", "'inner'; install it, or save it in the plugin's folder."),
         ("import broken", "SyntaxError: .*broken.py"),
     ],
 )
 def test_files_that_a_plugin_cannot_import(text, says, tmp_path):
     for name in ("random", "numpy", "broken"):
         (tmp_path / f"{name}.py").write_text("(")
-    (tmp_path / "inner").mkdir()
-    (tmp_path / "inner/__init__.py").write_text("")
     (tmp_path / "own.py").write_text(text)
     with pytest.raises(AntsError, match=says):
         load_plugin(str(tmp_path / "own.py"))

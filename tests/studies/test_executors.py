@@ -13,24 +13,43 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_lines import promptly
 
-from taichi_ants import AntsError, TrainingConfig
-from taichi_ants.studies import executors
-from taichi_ants.studies.executors import TRIES, LocalWorkers, Work, completed, do
-from taichi_ants.studies.points import ColonyPoint, RunPoint
-from taichi_ants.studies.runner import FailedBlocksError, Study
+from taichi_ants import PHYSICS, AntsError, TrainingConfig
+from taichi_ants.studies import executors, plugins
+from taichi_ants.studies.executors import TRIES, LostWorkersError, Workers, completed, do
+from taichi_ants.studies.points import ColonyPoint, Drawn, RunPoint
+from taichi_ants.studies.store import Store
+from taichi_ants.studies.study import FailedBlocksError, Study, run
 from taichi_ants.task import Life, Task
-from taichi_ants.worlds import open_world, paper
+from taichi_ants.worlds import paper
 
 SARSA = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
 LIVELY = Task(delivery="truncates", evaporation_in_training=True, life=Life(regrowth=0))
 SEEDS = (3, 5, 8, 1)
-WORLDS = tuple(open_world(seed, (12, 12, 12)) for seed in SEEDS)
-ALONE = ColonyPoint(WORLDS, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
-COLONIES = Study((ALONE, replace(ALONE, ants=4, episodes=0, after=ALONE)), SEEDS)
+DRAWN = Drawn.by("open", ranges=(12, 12, 12))
+ALONE = ColonyPoint(DRAWN, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
+COLONIES = Study((ALONE, replace(ALONE, ants=4, episodes=0, after=ALONE)), SEEDS, ("deliveries",))
 RUNS = Study(
-    tuple(RunPoint(paper(), Task(), replace(SARSA, epsilon=e), 6, 80, 3) for e in (0.1, 0.3)), SEEDS
+    tuple(RunPoint(paper(), Task(), replace(SARSA, epsilon=e), 6, 80, 3) for e in (0.1, 0.3)),
+    *(SEEDS, ("returns", "q_values")),
 )
+
+
+def outcome(study, folder, **how):
+    run(study, store := Store(folder), **how)
+    return store.read(study.keys, study.seeds, study.arrays)
+
+
+def same(one, other):
+    return one.keys() == other.keys() and all(
+        np.array_equal(array, other[name]) and array.dtype == other[name].dtype
+        for name, array in one.items()
+    )
+
+
+def files_in(folder):
+    return list((folder / "blocks").iterdir())
 
 
 class Here:
@@ -52,37 +71,16 @@ class Here:
         return future
 
 
-def same(one, other):
-    assert one.keys() == other.keys()
-    for point, arrays in one.items():
-        assert arrays.keys() == other[point].keys()
-        for name, array in arrays.items():
-            if name != "seconds":
-                np.testing.assert_array_equal(array, other[point][name])
-                assert array.dtype == other[point][name].dtype
-    return True
-
-
-def folder(path: Path) -> Path:
-    path.mkdir()
-    return path
-
-
-@pytest.mark.parametrize(
-    "study",
-    [COLONIES, pytest.param(RUNS, marks=pytest.mark.slow)],
-    ids=["colonies", "runs"],
-)
+@pytest.mark.parametrize("study", [COLONIES, RUNS], ids=["colonies", "runs"])
 def test_pickled_blocks_have_the_same_outcomes(study, tmp_path):
     executor, shares = Here(), []
-    plain = study.run(folder(tmp_path / "plain"))
-    other = study.run(folder(tmp_path / "other"), shares.append, executor=executor)
-    assert same(plain, other)
-    assert executor.calls == len(list((tmp_path / "other").iterdir()))
+    plain = outcome(study, tmp_path / "plain")
+    assert same(plain, outcome(study, tmp_path, progress=shares.append, executor=executor))
+    assert executor.calls == len(files_in(tmp_path))
     assert shares[0] == 0
     assert shares[-1] == pytest.approx(1)
     again = executor.calls
-    assert same(plain, study.run(tmp_path / "other", executor=executor))
+    assert same(plain, outcome(study, tmp_path, executor=executor))
     assert executor.calls == again  # nothing is missing
 
 
@@ -94,7 +92,7 @@ def die_once(marker: str) -> int:
     return os.getpid()
 
 
-class Deadly(LocalWorkers):
+class Deadly(Workers):
     """Workers of which one dies before its first block."""
 
     def __init__(self, workers: int, marker: Path) -> None:
@@ -113,13 +111,12 @@ def _die_or_do(marker, arguments):
 
 @pytest.mark.slow
 def test_a_killed_worker_process_costs_its_blocks_only(tmp_path, monkeypatch):
-    plain = COLONIES.run(folder(tmp_path / "plain"))
+    plain = outcome(COLONIES, tmp_path / "plain")
     monkeypatch.setattr(ColonyPoint, "runs_of_a_block", 2)
     with Deadly(2, tmp_path / "died") as executor:
-        other = COLONIES.run(folder(tmp_path / "other"), executor=executor)
-    assert same(plain, other)
+        assert same(plain, outcome(COLONIES, tmp_path / "other", executor=executor))
     assert (tmp_path / "died").exists()
-    assert 4 < executor.calls <= 4 * TRIES
+    assert 4 < executor.calls <= 4 + 2  # the dead worker had two blocks
 
 
 class Fails(Here):
@@ -139,24 +136,35 @@ class Fails(Here):
         return super().submit(call, *arguments)
 
 
-def test_what_fails_now_and_then_is_tried_again(tmp_path):
-    executor = Fails(lambda work, n: OSError("no memory") if n % TRIES else None)
-    assert same(
-        RUNS.run(folder(tmp_path / "a"), executor=executor), RUNS.run(folder(tmp_path / "b"))
-    )
+@pytest.mark.slow
+def test_the_calls_of_a_dead_worker_are_lost_and_no_others(tmp_path):
+    """And workers end when their executor does, or fails."""
+    with Workers(2) as workers:
+        first, other = workers.submit(os.getpid), workers.submit(os.getpid)
+        assert first.result() != other.result()
+        dies, stays = workers.submit(os.kill, first.result(), 9), workers.submit(time.sleep, 0.5)
+        assert isinstance(dies.exception(), BrokenProcessPool)
+        assert stays.result() is None
+        new = [workers.submit(os.getpid).result() for _ in range(2)]
+        assert first.result() not in new
+    began, workers = time.monotonic(), Workers(1)
+    pid = workers.submit(os.getpid).result()
+    workers.submit(time.sleep, 100)
+    workers.__exit__(KeyError)
+    while Path(f"/proc/{pid}").exists():
+        assert time.monotonic() - began < promptly()
+        time.sleep(0.05)
 
 
-def test_numbers_of_workers_and_blocks_are_checked(tmp_path):
+def test_the_number_of_workers_is_checked():
     with pytest.raises(AntsError, match=r"^workers is 0; it must lie between 1 and"):
-        LocalWorkers(0)
-    with pytest.raises(AntsError, match=r"^in_flight is 0; it must lie between 1 and"):
-        RUNS.run(tmp_path, executor=Here(), in_flight=0)
+        Workers(0)
 
 
 def test_workers_can_be_threads_of_this_process(tmp_path, monkeypatch):
     """Taichi serves one of them at a time."""
     monkeypatch.setattr(RunPoint, "runs_of_a_block", 2)
-    plain, busy, most = RUNS.run(folder(tmp_path / "plain")), [], []
+    plain, busy, most = outcome(RUNS, tmp_path / "plain"), [], []
 
     def notes(*_):
         busy.append(1)
@@ -164,60 +172,79 @@ def test_workers_can_be_threads_of_this_process(tmp_path, monkeypatch):
         time.sleep(0.02)  # for others to come, if they can
         busy.pop()
 
-    monkeypatch.setattr(executors, "compile_once", notes)
+    monkeypatch.setattr(executors, "load_code", notes)
     with ThreadPoolExecutor(4) as executor:
-        assert same(plain, RUNS.run(folder(tmp_path / "other"), executor=executor))
+        assert same(plain, outcome(RUNS, tmp_path / "other", executor=executor))
     assert len(most) > 2
     assert max(most) == 1
 
 
-def test_a_block_that_always_fails_is_named_and_the_others_are_done(tmp_path, monkeypatch):
+def block_of(work):
+    """The points and seeds of pickled work."""
+    return work.args[:2]
+
+
+def test_a_block_that_fails_is_named_and_the_others_are_done(tmp_path, monkeypatch):
     monkeypatch.setattr(RunPoint, "runs_of_a_block", 2)
-    executor = Fails(
-        lambda work, n: (
-            KeyError("x") if work.points[0].training.epsilon == 0.3 and 8 in work.seeds else None
-        )
-    )
+
+    def fails(work, n):
+        points, seeds = block_of(work)
+        return KeyError("x") if points[0].training.epsilon == 0.3 and 8 in seeds else None
+
+    executor = Fails(fails)
     with pytest.raises(FailedBlocksError) as caught:
-        RUNS.run(tmp_path, executor=executor)
+        run(RUNS, Store(tmp_path), executor=executor)
     assert str(caught.value) == (
         "1 block failed: training.epsilon 0.3, seeds 8 to 1 (KeyError: 'x'); all others are saved, "
         "so correct the cause and run the same command again, or with another --out if you change "
         "a plugin."
     )
-    assert executor.calls == 3 + TRIES
-    assert len(list(tmp_path.iterdir())) == 3
+    assert executor.calls == 4
+    assert len(files_in(tmp_path)) == 3
 
 
 @pytest.mark.parametrize("fails", ["one", "all"])
 def test_a_block_at_which_all_workers_die_is_named(fails, tmp_path, monkeypatch):
     monkeypatch.setattr(RunPoint, "runs_of_a_block", 2)
     died = BrokenProcessPool("A process in the process pool was terminated abruptly")
-    executor = Fails(lambda work, n: died if fails == "all" or 8 in work.seeds else None)
+    executor = Fails(lambda work, n: died if fails == "all" or 8 in block_of(work)[1] else None)
     with pytest.raises(AntsError) as caught:
-        RUNS.run(tmp_path, executor=executor)
+        run(RUNS, Store(tmp_path), executor=executor)
     assert caught.value.exit_status == 1
-    assert f"{TRIES} workers died at this block, perhaps because memory was" in str(caught.value)
+    assert f"{TRIES} workers died at it, perhaps because memory was" in str(caught.value)
     assert ("2 blocks failed: " in str(caught.value)) == (fails == "one")
     assert "abruptly" not in str(caught.value)
 
 
-def test_points_whose_training_failed_are_left_out_and_no_others(tmp_path, monkeypatch):
+def test_an_executor_that_takes_no_more_work_ends_the_study(tmp_path):
+    class Broken:
+        def submit(self, *_):
+            raise BrokenProcessPool("no more")
+
+    with pytest.raises(
+        LostWorkersError, match=r"no more work \(BrokenProcessPool: no more\); fini"
+    ):
+        run(RUNS, Store(tmp_path), executor=Broken())
+
+
+def test_copies_whose_training_failed_wait_for_it(tmp_path, monkeypatch):
     monkeypatch.setattr(ColonyPoint, "runs_of_a_block", 1)
-    executor = Fails(
-        lambda work, n: OSError("full") if work.points[0].episodes and 8 in work.seeds else None
-    )
-    with pytest.raises(FailedBlocksError, match=r"^1 block failed: .*, seed 8 \(OSError: full\)"):
-        COLONIES.run(tmp_path, executor=executor)
-    assert len(list(tmp_path.iterdir())) == 3 + 3
+
+    def fails(work, n):
+        points, seeds = block_of(work)
+        return OSError("full") if points[0].episodes and 8 in seeds else None
+
+    with pytest.raises(FailedBlocksError, match=r"^1 block failed: seed 8 \(OSError: full\)"):
+        run(COLONIES, Store(tmp_path), executor=Fails(fails))
+    assert len(files_in(tmp_path)) == 3
 
 
-def test_a_study_of_which_nothing_succeeds_ends_with_the_error(tmp_path, monkeypatch):
+def test_a_study_of_which_nothing_succeeds_ends_early(tmp_path, monkeypatch):
     monkeypatch.setattr(RunPoint, "runs_of_a_block", 1)
     executor = Fails(lambda work, n: AntsError("no good"))
     with pytest.raises(AntsError, match="no good"):
-        RUNS.run(tmp_path, executor=executor)
-    assert executor.calls < 8 * TRIES
+        run(RUNS, Store(tmp_path), executor=executor)
+    assert executor.calls < 8
 
 
 def test_few_blocks_are_in_flight():
@@ -243,17 +270,17 @@ def test_few_blocks_are_in_flight():
 
 
 def test_workers_of_another_version_are_refused():
-    work = pickle.dumps(Work(RUNS.points[:1], (0,), None, None, {}))
-    with pytest.raises(AntsError, match=r"taichi_ants 0\.0\.1 and Python 3\.8, but a worker has"):
-        do(("0.0.1", "3.8"), (), work)
+    said = rf"taichi_ants 0\.0\.1 \(physics {PHYSICS}\) and Python 3\.8, but a worker has"
+    with pytest.raises(AntsError, match=said):
+        do(("0.0.1", PHYSICS, "3.8"), (), pickle.dumps(None))
 
 
-def test_a_plugin_travels_as_text(tmp_path, monkeypatch):
-    monkeypatch.setattr(executors, "_loaded", {})
+def test_a_plugin_travels_as_text(monkeypatch):
+    monkeypatch.setattr(plugins, "_loaded", {})
     text = b"import beside_it, pathlib\npathlib.Path(__file__).with_name('ran').touch()\n"
     plugin = {"here/plugin_that_travels.py": text, "here/beside_it.py": b"VALUE = 1\n"}
-    work = pickle.dumps(Work(RUNS.points[:1], (0,), None, None, {}))
-    do(executors.versions(), (plugin,), work)
-    assert Path(executors._folders[-1].name, "ran").exists()
-    with pytest.raises(AntsError, match=r"another plugin 'plugin_that_travels\.py'"):
-        do(executors.versions(), ({**plugin, "here/beside_it.py": b"VALUE = 2\n"},), work)
+    assert do(executors.versions(), (plugin,), pickle.dumps(dict)) == {}
+    assert Path(plugins._folders[-1].name, "ran").exists()
+    changed = {**plugin, "here/beside_it.py": b"VALUE = 2\n"}
+    with pytest.raises(AntsError, match=r"another file 'plugin_that_travels\.py'"):
+        do(executors.versions(), (changed,), pickle.dumps(dict))

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from colony import colony_page
 from colony_figures import draw_all as draw_study
 from colony_findings import Results as StudyResults
-from paper.comparison import DYNA_P5
-from paper.figures import draw_all
+from paper.claims import Audit, assess
+from paper.comparison import DYNA_P5, Comparison
+from paper.figures import for_page
 from paper.page import Seen, comparison_page
-from paper.report import Results
+from paper.table2 import Line, summarise, table2
 from synthetic_colony_study import build as build_study
 from synthetic_comparison import build, change, unchanged
 
@@ -27,11 +29,24 @@ FACTS = {"World": "the <paper's>", "Command": "compare.py --out 'a & b'"}
 BASELINES = [Baseline("shortest delivery", None, 45.0, 34.0, 1.0)]
 
 
+class Results(NamedTuple):
+    """A comparison, our table 2 of it, and the findings on the claims."""
+
+    comparison: Comparison
+    lines: list[Line]
+    audit: Audit
+
+    @classmethod
+    def of(cls, comparison: Comparison) -> Results:
+        """Return the results of a comparison."""
+        return cls(comparison, table2(comparison, summarise(comparison)), assess(comparison))
+
+
 @cache
 def results() -> Results:
     """Return a comparison in which all claims hold if delivery truncates, but not otherwise."""
     edits = {"truncates": unchanged, "terminates": change(DYNA_P5, late_return=200)}
-    return Results.of(build(edits, seeds=6), BASELINES)
+    return Results.of(build(edits, seeds=6))
 
 
 @cache
@@ -39,10 +54,11 @@ def comparison_html() -> str:
     """Return the page of `results`."""
     recording = record_episode(Episode.play(worlds.paper(), trail_follower()))
     sheet = Picture("a <policy>", np.full((20, 30, 3), 200, np.uint8))
+    comparison, lines, audit = results()
     return comparison_page(
-        results(),
+        *(comparison, BASELINES, lines, audit),
         Seen(
-            drawings(draw_all(results().comparison, BASELINES)),
+            for_page(comparison, BASELINES),
             [Player(f"Delivers {n}", "As it <should>", recording) for n in (1, 2)],
             sheet,
         ),

@@ -13,7 +13,7 @@ class Run:
 
     def __init__(self, colony: ReferenceColony, trace: list[Transition]) -> None:
         self.colony, self.trace = colony, trace
-        self.learner = colony.minds.tables[0]
+        self.learner = colony.learners.tables[0]
         self.q_values = self.learner.table()
         self.model = self.learner.model
         self.epsilon = colony.epsilon

@@ -71,7 +71,7 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     stores = colony.arrays["nests"][NestRow.STORE].reshape(-1, colony.n_nests)[world]
     assert stores.tolist() == plain.stores
     apart = outcome.deliveries_by_nest_and_kind[0, world]
-    assert {(int(n), int(k)): int(apart[n, k]) for n, k in np.argwhere(apart)} == record.apart
+    assert {(int(n), int(k)): int(apart[n, k]) for n, k in np.argwhere(apart)} == record.delivered
     by_caste = dict(enumerate(outcome.caste_deliveries[0, world].tolist()))
     assert {caste: n for caste, n in by_caste.items() if n} == record.by_caste
     assert colony.stimuli[world].tolist() == plain.stimuli
@@ -85,4 +85,4 @@ def _assert_equal_records(colony: Colony, plain: ReferenceColony, world: int) ->
     assert cells == [list(source.cell) for source in theirs]
     assert food_sources[FoodSourceRow.KIND].tolist() == [source.kind for source in theirs]
     if colony.sharing == "shared" and colony.training.learner == "dyna_q":
-        assert colony.arrays["integers"][0] == len(plain.minds.tables[0].model)
+        assert colony.arrays["integers"][0] == len(plain.learners.tables[0].model)

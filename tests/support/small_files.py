@@ -23,11 +23,11 @@ from taichi_ants import (
     worlds,
 )
 from taichi_ants.engines.runs.results import RunState
-from taichi_ants.files.results import ResultFolder
 from taichi_ants.live.session import Session
 from taichi_ants.live.setup import Setup
 from taichi_ants.offline.dataset import COLUMNS
-from taichi_ants.studies.blocks import kept
+from taichi_ants.studies.folder import manifest_in, write_json
+from taichi_ants.studies.store import BLOCKS, Store
 from taichi_ants.studies.sweep import read_sweep
 from taichi_ants.worlds import World
 
@@ -76,9 +76,8 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
         "data set": of("data.npz", Dataset.load),
         "colony": of("colony.npz", Colony.load),
         "session": of("session.npz", lambda path: Session.load(path).interventions.state()),
-        "block": of("block.npz", _block),
-        "manifest": of("finished/manifest.json", lambda path: _finished(path.parent)),
-        "table": of("finished/table.csv", lambda path: _finished(path.parent)),
+        "block": SmallFile(_block(folder), lambda: _read_block(folder)),
+        "manifest": of("manifest.json", lambda path: manifest_in(path.parent)),
         "map": of("map.txt", worlds.load_map)._replace(checked=False),
         "sweep": of("sweep.toml", _sweep)._replace(checked=False),
         "table of others": of("other.csv", files.read_csv)._replace(checked=False),
@@ -92,10 +91,7 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
     colony.begin_episode()
     colony.save(found["colony"].path)
     Session(Setup("paper", TASK, SARSA, ants=2)).save(found["session"].path)
-    _block(found["block"].path, first=True)
-    with ResultFolder(folder / "finished", {"seeds": (0, 1)}).work() as (_, ready):
-        files.write_csv(ready / "table.csv", [{"a": 1.5, "b": "text"}], ("a", "b"))
-        ResultFolder(folder / "finished", {"seeds": (0, 1)}).publish(ready, {"seconds": 2.0})
+    write_json(folder / "manifest.json", {"seconds": 2.0, "files": {}})
     files.write_csv(found["table of others"].path, [{"a": 1.5, "b": None}], ("a", "b"))
     found["map"].path.write_text(MAP)
     found["sweep"].path.write_text(SWEEP)
@@ -138,7 +134,7 @@ def _policy(path: Path) -> dict[str, Any]:
 
 def _training() -> TrainingResult:
     arrays = {name: np.ones((1, 1, 2), np.int32) for name in ("returns", "steps", "deliveries")}
-    state = RunState.fresh([SARSA], [0], TASK.n_states)
+    state = RunState.initial([SARSA], [0], TASK.n_states)
     return TrainingResult(WORLD, (SARSA,), (0,), 9, TASK, **arrays, seconds=1.0, state=state)
 
 
@@ -149,24 +145,19 @@ def _dataset() -> Dataset:
     return Dataset(WORLD, TASK, (0,), {"policy": "random"}, **columns)
 
 
-def _block(path: Path, first: bool = False) -> dict[str, np.ndarray]:
-    """Return a block; raise AntsError if its file is missing or not valid, unless `first`."""
-
-    def make() -> dict[str, np.ndarray]:
-        if not first:
-            raise AntsError(f"{str(path)!r} has to be computed again.")
-        return {"steps": np.arange(6).reshape(2, 3), "q_values": Q_VALUES[:2]}
-
-    return kept(path, {"seeds": [0, 1]}, make)
+def _block(folder: Path) -> Path:
+    """Return the file of a block in a new store."""
+    steps = {"steps": np.arange(6).reshape(2, 3), "q_values": np.zeros((2, 3, 4), np.float32)}
+    Store(folder).add(["a", "b"], [1, 2, 3], steps)
+    return next((folder / BLOCKS).iterdir())
 
 
-def _finished(folder: Path) -> dict[str, Any]:
-    results = ResultFolder(folder, {"seeds": (0, 1)})
-    assert results.is_finished()
-    results.check()
-    manifest = json.loads((folder / "manifest.json").read_text())
-    told = {name: manifest[name] for name in ("files", "settings", "seconds")}
-    return {"table": files.read_csv(folder / "table.csv"), **told}
+def _read_block(folder: Path) -> dict[str, np.ndarray]:
+    """Return the block; raise AntsError if it is damaged, so that it was set aside."""
+    store = Store(folder)
+    for path in store.damaged:
+        raise AntsError(f"{str(path)!r} is damaged.")
+    return store.read(["a", "b"], [1, 2, 3], ["steps", "q_values"])
 
 
 def _sweep(path: Path) -> Any:

@@ -21,7 +21,7 @@ from paper.comparison import (
     Row,
     Variant,
 )
-from paper.figures import curves_of
+from paper.figures import curves_of, spans, sums
 
 from taichi_ants.analysis.behaviour import DELIVERS, WALKS
 from taichi_ants.measures.finished import Run, values_of
@@ -171,8 +171,9 @@ def comparison_of(arrays: dict[str, np.ndarray], rows: tuple[Row, ...], **fields
 def remeasured(made: Made) -> Made:
     """Return a comparison with measures and learning curves recomputed from its episodes."""
     made = replace(made, measures=values_of(Run.of_lone_ant(made.arrays)))
-    each = ({n: made.arrays[n][row] for n in EPISODES} for row in range(len(made.rows)))
-    return replace(made, curves=curves_of(made, enumerate(each)))
+    edges = spans(made.episodes)[:-1]
+    each = {sums(n): np.add.reduceat(made.arrays[n], edges, axis=2, dtype=int) for n in EPISODES}
+    return replace(made, curves=curves_of(made, each))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -6,16 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, record, task, train, worlds
+from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, train, worlds
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
-from taichi_ants.offline import record_colony
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.reference.choice import weighted
-from taichi_ants.reference.numbers import power
 from taichi_ants.task import Choice, Field, Noise, Pheromone
-from taichi_ants.task.constants import FORWARD, LEFT, N_ACTIONS, RIGHT
+from taichi_ants.task.constants import FORWARD, N_ACTIONS
 
 N, GRID = 6_000, AxialGrid((10, 10, 2))
 PLAIN = TrainingConfig("q_learning", 0.5, 0.9, 0.0, 1.0)
@@ -55,12 +52,6 @@ def test_softmax_frequencies(epsilon):
     assert_counts(chosen, shares)
     known = action_probabilities(GREEDY_VALUES[0], epsilon, rules.choice)
     np.testing.assert_allclose(known, shares, atol=1e-9)
-
-
-def test_a_low_temperature_is_greedy():
-    rules = Task(choice=Choice("softmax", temperature=1e-6))
-    chosen, *_ = first_actions(rules, lone_ant(), 500, training=PLAIN, q_values=GREEDY_VALUES)
-    assert (chosen == 1).all()
 
 
 @pytest.mark.parametrize(("k", "exponent"), [(20.0, 2.0), (20.0, 1.5), (1.0, 0.0)])
@@ -134,32 +125,6 @@ def test_ants_with_food_and_without_a_compass_weigh_all_open_cells(homing, outbo
     assert GRID.index(plain.ants[0].cell) == colony.cells[0, 0]
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "share"), [(0, 0, 0.5), (20, 0, 0.8), (60, 20, 0.8), (100, 0, 0.973)]
-)
-def test_choice_function_of_the_literature(one, other, share):
-    """P(A) = (k + A)^n / ((k + A)^n + (k + B)^n) with k = 20 and n = 2."""
-    weights = [power(20.0 + level, 2.0) for level in (one, other)]
-    assert weights[0] / sum(weights) == pytest.approx(share, abs=5e-4)
-    last = [weighted(weights, word) for word in (0, int(2**32 * share * 0.999), 2**32 - 1)]
-    assert last == [0, 0, 1]
-
-
-def test_ants_without_an_open_cell_turn():
-    walled = World(
-        (10, 10, 2),
-        (0, 9, 0),
-        foods=[(9, 0, 0)],
-        obstacles=[
-            tuple(cell) for cell in GRID.cells(GRID.index((5, 5, 0)) + GRID.offsets).tolist()
-        ],
-        ants=[((5, 5, 0), 0)],
-    )
-    chosen, *_ = first_actions(Task(choice="deneubourg"), walled, training=None)
-    assert_counts(chosen, [0.5, 0, 0.5])
-    assert {LEFT, RIGHT} == set(chosen.tolist())
-
-
 def test_slips():
     rules = Task(noise=Noise(slip=0.4))
     chosen, executed, _ = first_actions(rules, lone_ant(), training=PLAIN, q_values=GREEDY_VALUES)
@@ -190,61 +155,11 @@ def test_a_task_without_noise_draws_nothing():
     assert one == two
 
 
-def test_worlds_that_begin_again_do_not_misread_twice():
-    """A world that has begun but not ticked keeps what its ants see while others begin."""
-    rules = Task(noise=Noise(misread=0.5))
-    colony = Colony(worlds.paper(), rules, PLAIN, (1, 2), 9)
-    colony.begin_episode()
-    seen, streams = colony.states[1].copy(), colony.streams[1].copy()
-    colony.reset_worlds(np.array([True, False]))
-    assert (colony.states[1] == seen).all()
-    assert (colony.streams[1] == streams).all()
-
-
-def test_files_and_pickles_keep_rules_of_choice(tmp_path):
-    rules = task.foraging().replace(
-        observation="paper", choice={"rule": "deneubourg", "k": 7.5}, noise={"slip": 0.1}
-    )
-    colony = Colony(worlds.paper(), rules, None, (1, 2), 20, sharing="frozen")
-    colony.begin_episode()
-    colony.tick(20)
-    colony.save(tmp_path / "colony.npz")
-    other = Colony.load(tmp_path / "colony.npz")
-    assert other == colony
-    colony.tick(20)
-    other.tick(20)
-    assert other == colony
-    assert "training: None" in repr(colony)
-
-
-def test_recorded_probabilities_are_those_of_softmax():
-    rules = Task(choice=Choice("softmax", temperature=2.0), noise=Noise(0.2, 0.2))
-    data = record(worlds.paper(), GREEDY_VALUES, 3, range(2), 50, rules, epsilon=0.1)
-    values = GREEDY_VALUES[data.state]
-    known = action_probabilities(values, 0.1, rules.choice)
-    known = known[np.arange(len(values)), data.action]
-    np.testing.assert_allclose(data.behaviour_probability, known, rtol=1e-6)
-    colony = Colony(worlds.paper(), rules, PLAIN, 1, 5, sharing="frozen", q_values=GREEDY_VALUES)
-    data = record_colony(colony, 1, 20)
-    known = action_probabilities(GREEDY_VALUES[data.state], 0.0, rules.choice)
-    known = known[np.arange(len(data.action)), data.action]
-    np.testing.assert_allclose(data.behaviour_probability, known, rtol=1e-6)
-
-
 CELLS = Task(choice="deneubourg")
 GIVEN = Arguments("paper", 9, "index", None, None)  # to environments
 REFUSED = [
     (lambda: Choice("greedy", temperature=2.0), "`task.choice.temperature` is 2.0; leave it out"),
-    (lambda: Choice("softmax", temperature=0), "`task.choice.temperature` is 0; it must be"),
-    (lambda: Choice("deneubourg", k=0), "`task.choice.k` is 0; it must be"),
-    (lambda: Choice("deneubourg", exponent=-1), "`task.choice.exponent` is -1; it must be"),
-    (lambda: Task(choice="boltzmann"), "`task.choice` is 'boltzmann'; it must be a Choice, or one"),
     (lambda: Noise(slip=1.5), "`task.noise.slip` is 1.5; it must be between 0 and 1."),
-    (lambda: Choice(carriers_follow="trail"), "`task.choice.carriers_follow` is 'trail'; leave it"),
-    (
-        lambda: Task(choice=Choice("deneubourg", carriers_follow="home")),
-        "`task.choice.carriers_follow` is 'home'; it must be one of trail, or the name of a field",
-    ),
     (
         lambda: Task(choice=Choice("deneubourg", carriers_follow="trail"), homing_cue="trail"),
         "but `task.homing_cue` is 'trail', which ants with food follow already",
@@ -284,3 +199,14 @@ def test_refusals_name_the_setting(make, says):
     with pytest.raises(AntsError) as caught:
         make()
     assert says in str(caught.value)
+
+
+def test_worlds_that_begin_again_do_not_misread_twice():
+    """A world that has begun but not ticked keeps what its ants see while others begin."""
+    rules = Task(noise=Noise(misread=0.5))
+    colony = Colony(worlds.paper(), rules, PLAIN, (1, 2), 9)
+    colony.begin_episode()
+    seen, streams = colony.states[1].copy(), colony.streams[1].copy()
+    colony.reset_worlds(np.array([True, False]))
+    assert (colony.states[1] == seen).all()
+    assert (colony.streams[1] == streams).all()

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taichi_ants.errors import AntsError
 from taichi_ants.task.constants import N_STATES
 from taichi_ants.task.states import (
     REACHABLE_STATES,
@@ -40,16 +39,6 @@ def test_every_index_comes_back_from_its_state(index: int) -> None:
     assert index == 64 * state.carries + 16 * state.left + 4 * state.forward + state.right
 
 
-def test_names_are_unique() -> None:
-    assert len({state_name(index) for index in range(N_STATES)}) == N_STATES
-
-
-@pytest.mark.parametrize("index", [-1, 128, 1.5])
-def test_an_index_out_of_range_is_refused(index: float) -> None:
-    with pytest.raises(AntsError, match="the state index is"):
-        state_from_index(index)
-
-
 def test_the_reachable_states_are_those_that_the_paper_counts() -> None:
     views = {state_name(index) for index in REACHABLE_STATES}
     foraging = {name for name in views if name.startswith("foraging")}
@@ -66,8 +55,3 @@ def test_the_reachable_states_are_those_that_the_paper_counts() -> None:
     expected |= {f"carrying {a} Q {b}" for a, b in pairs}
     expected |= {f"carrying {a} {b} Q" for a, b in pairs}
     assert with_queen == expected
-
-
-def test_the_reachable_states_are_ascending() -> None:
-    assert list(REACHABLE_STATES) == sorted(set(REACHABLE_STATES))
-    assert isinstance(REACHABLE_STATES, tuple)

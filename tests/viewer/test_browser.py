@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import base64
 import math
 import re
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from browser import Page, assert_policy_holds, printed, shares, started
-from command_lines import crowding
+from browser import Page, started
 from playback import played
 
-from taichi_ants import Colony, Task, TrainingConfig, World, trace_training, worlds
+from taichi_ants import Colony, Task, TrainingConfig, worlds
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
-from taichi_ants.task import Caste, Food, Labour, Life, Pheromone, Threshold, foraging
-from taichi_ants.task.constants import ACTION_NAMES, FOOD
+from taichi_ants.task import Life, Pheromone
+from taichi_ants.task.constants import ACTION_NAMES
 from taichi_ants.task.events import Event
-from taichi_ants.viewer import Recording, page, record_colony, record_episode, record_trace
+from taichi_ants.viewer import Recording, page, record_colony, record_episode
 from taichi_ants.viewer.page import SCRIPTS, part
 
 pytestmark = pytest.mark.browser
@@ -158,25 +156,6 @@ def test_a_followed_ant_is_explained(ant, episode):
     assert ant.text("#now").startswith("tick 34 ants 1 with food 0 delivered 1 return 45")
 
 
-def test_what_an_ant_learns_is_told(browser, folder):
-    config = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.99)
-    trace = trace_training(worlds.paper(), config, seed=7, episodes=2, max_steps=60)
-    one = Page(browser, written(folder, "trace", record_trace(trace)))
-    for step in (0, 5, 30, 70):
-        moment = step + int(trace.episodes[step])
-        one.read("moment => viewer.player.go(moment)", moment)
-        said, state = one.text("#ant").replace(MINUS, "-"), trace.states[step]
-        (error,) = re.findall(r"TD error ([-+]?[\d.]+)", said)
-        assert float(error) == pytest.approx(trace.td_errors[step], abs=0.0051)
-        (now, then) = map(float, re.findall(r"([-\d.]+) → ([-\d.]+)", said)[0])
-        action = trace.actions[step]
-        assert now == pytest.approx(trace.q_values[step, action], abs=0.0051)
-        assert then == pytest.approx(trace.tables[step, state, action], abs=0.0051)
-        assert f"episode {trace.episodes[step]} tick {trace.steps[step]} " in one.text("#now")
-    assert "episode 1" in one.text("#place")
-    one.close()
-
-
 def test_buttons_and_keys_move_through_time(ant):
     assert ant.tab.is_disabled("#back")
     for control, moment in [("#forward", 1), ("#last", 34), ("#back", 33), ("#first", 0)]:
@@ -190,49 +169,6 @@ def test_buttons_and_keys_move_through_time(ant):
     ]:
         ant.press(key)
         assert ant.moment == moment, key
-
-
-def test_it_plays_pauses_and_starts_again(ant):
-    ant.tab.keyboard.press("Space")
-    assert ant.tab.get_attribute("#play", "aria-label") in ("Play", "Pause")
-    ant.tab.wait_for_function("viewer.player.moment >= 2")
-    assert ant.tab.get_attribute("#play", "aria-label") == "Pause"
-    ant.click("#play")
-    stopped = ant.moment
-    ant.tab.wait_for_timeout(200)
-    assert ant.moment == stopped
-    for _ in range(20):
-        ant.tab.keyboard.press("ArrowUp")
-    assert ant.read("viewer.player.speed") == 200
-    assert ant.text("#speed-value") == "200 ticks/s"
-    ant.click("#play")  # until its end
-    assert ant.moment == 34
-    ant.tab.keyboard.press("ArrowDown")
-    assert ant.read("viewer.player.speed") == 160
-    ant.tab.fill("#speed", "0")
-    assert ant.read("viewer.player.speed") == 0.5
-    ant.tab.keyboard.press("Space")
-    assert ant.moment == 0
-    ant.tab.keyboard.press("Space")
-    ant.settle()
-
-
-def test_the_time_line_and_the_curves_seek(ant):
-    ant.tab.fill("#time", "21")
-    ant.settle()
-    assert ant.moment == 21
-    assert ant.tab.get_attribute("#time", "aria-valuetext") == "tick 21"
-    assert ant.text("#place") == "tick 21 of 34"
-    box = ant.tab.locator(".curve svg").nth(1).bounding_box()
-    ant.tab.mouse.click(box["x"] + box["width"] / 2, box["y"] + 10)
-    ant.settle()
-    assert ant.moment == 17
-    events = ant.read("viewer.history.events.map(({ moment, kind }) => [moment, kind])")
-    assert events == [[17, "PICKED_UP"], [34, "DELIVERED"]]
-    assert ant.tab.locator("#events .picked").get_attribute("d").count("M") == 1
-    assert ant.tab.locator("#events .gaps").get_attribute("d") == ""  # each action is recorded
-    # Who never explores has no curve of epsilon.
-    assert ant.tab.locator(".curve:visible b").all_inner_texts() == ["0", "19"]
 
 
 def test_a_click_follows_an_ant_or_looks_at_a_cell(crowd, colony):
@@ -263,31 +199,6 @@ def test_a_click_follows_an_ant_or_looks_at_a_cell(crowd, colony):
     assert f"trail {true.trail[cell]:.2f} (darkest from 250)" in crowd.text("#cell")
     crowd.click("#cell-close")
     crowd.tab.wait_for_selector("#cell", state="hidden")
-
-
-def test_who_wants_a_cell_is_told(crowd, colony):
-    """Two ants that move to one cell: one enters it, the other tries in vain."""
-    found = 0
-    for moment, (before, after) in enumerate(pairwise(colony[1])):
-        wanted: dict[int, list[int]] = {}
-        grid = crowd.read("viewer.history.grid.offsets")
-        for place, action in enumerate(after.actions.tolist()):
-            if action < 3:
-                heading = (int(before.headings[place]) + action - 1) % 6
-                cell = int(before.cells[place]) + grid[heading]
-                wanted.setdefault(cell, []).append(int(before.numbers[place]))
-        for cell, numbers in wanted.items():
-            if len(numbers) < 2 or found == 5:
-                continue
-            found += 1
-            crowd.read("([m, c]) => { viewer.player.go(m); viewer.chooseCell(c); }", [moment, cell])
-            said = crowd.text("#cell")
-            for number in numbers:
-                assert f"ant {number} (" in said
-            assert "failed" in said
-            crowd.tab.click(f'#cell [data-follow="{numbers[0]}"]')
-            assert crowd.read("viewer.followed") == numbers[0]
-    assert found == 5
 
 
 def test_everything_can_be_done_by_keyboard(crowd, colony):
@@ -339,78 +250,6 @@ def test_everything_can_be_done_by_keyboard(crowd, colony):
     assert crowd.tab.inner_text("#spoken").startswith("Tick 1, ")
 
 
-def test_the_view_moves_and_comes_back(crowd):
-    camera = "({ ...viewer.stage.camera })"
-    whole = crowd.read(camera)
-    crowd.click("#zoom-in")
-    assert crowd.read(camera)["scale"] == pytest.approx(1.4 * whole["scale"])
-    crowd.click("#zoom-out")
-    assert crowd.read(camera)["scale"] == pytest.approx(whole["scale"])
-    box = crowd.tab.locator("#world").bounding_box()
-    x, y = box["x"] + 0.6 * box["width"], box["y"] + 0.4 * box["height"]
-    under = "([x, y]) => viewer.stage.cellAt(x, y)"
-    place = [x - box["x"], y - box["y"]]
-    before = crowd.read(under, place)
-    crowd.tab.mouse.move(x, y)
-    crowd.tab.mouse.wheel(0, -300)
-    crowd.tab.wait_for_function("scale => viewer.stage.camera.scale > scale", arg=whole["scale"])
-    assert crowd.read(under, place) == before  # what lies under the mouse stays there
-    crowd.tab.mouse.down()
-    crowd.tab.mouse.move(x + 40, y + 30, steps=4)
-    crowd.tab.mouse.up()
-    assert crowd.read(under, [place[0] + 40, place[1] + 30]) == before
-    assert crowd.read("viewer.cell") == -1  # a drag is no click
-    crowd.tab.focus("#world")
-    for key, axis, sign in [("w", "y", -1), ("s", "y", 1), ("a", "x", -1), ("d", "x", 1)]:
-        now = crowd.read(camera)
-        crowd.press(key)
-        assert np.sign(crowd.read(camera)[axis] - now[axis]) == sign
-    crowd.press("+", "-", "0")
-    assert crowd.read(camera) == whole
-    crowd.click("#zoom-in")
-    crowd.click("#fit")
-    assert crowd.read(camera) == whole
-
-
-def test_fingers_tap_and_pinch(browser, colony):
-    phone = Page(browser, colony[0], (390, 844), has_touch=True, device_scale_factor=2)
-    cell = int(colony[1][0].cells[3])
-    x, y = phone.read("cell => viewer.stage.toPage(viewer.history.grid.centre(cell))", cell)
-    box = phone.tab.locator("#world").bounding_box()
-    phone.tab.touchscreen.tap(box["x"] + x, box["y"] + y)
-    phone.settle()
-    assert phone.read("viewer.followed") == colony[1][0].numbers[3]
-    scale = phone.read("viewer.stage.camera.scale")
-    session = phone.context.new_cdp_session(phone.tab)
-    middle = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-    def touch(kind: str, apart: float) -> None:
-        points = [
-            {"x": middle[0] + s * apart, "y": middle[1], "id": i} for i, s in ((0, -1), (1, 1))
-        ]
-        given = {"type": kind, "touchPoints": [] if kind == "touchEnd" else points}
-        session.send("Input.dispatchTouchEvent", given)
-
-    touch("touchStart", 30)
-    for apart in (36, 45, 60):
-        touch("touchMove", apart)
-    touch("touchEnd", 0)
-    assert phone.read("viewer.stage.camera.scale") == pytest.approx(2 * scale, rel=0.05)
-    # Nothing is wider than the screen, and no two controls lie over each other.
-    assert phone.read("document.documentElement.scrollWidth") == 390
-    boxes = [phone.tab.locator(s).bounding_box() for s in ("#play", "#place", "#speed", "#time")]
-    for k, one in enumerate(boxes):
-        for other in boxes[k + 1 :]:
-            apart = (
-                one["x"] + one["width"] <= other["x"] + 1
-                or other["x"] + other["width"] <= one["x"] + 1
-                or one["y"] + one["height"] <= other["y"] + 1
-                or other["y"] + other["height"] <= one["y"] + 1
-            )
-            assert apart
-    phone.close()
-
-
 def test_a_page_on_which_nothing_changes_rests(ant):
     frames = """() => { let n = 0; const next = window.requestAnimationFrame;
       window.requestAnimationFrame = (act) => { n++; return next(act); };
@@ -421,60 +260,6 @@ def test_a_page_on_which_nothing_changes_rests(ant):
     assert ant.read(frames) > 2
     ant.tab.keyboard.press("Space")
     ant.settle()
-
-
-def test_food_is_a_dot_with_a_ring_where_cells_are_small(browser, folder):
-    """A trail may be as light as food; the ring is lighter then."""
-    world = World((60, 60, 60), (0, 0, 0), foods=[(30, 0, 0)], trails=[((29, 0, 0), 250)])
-    many = Colony(world, Task(), TrainingConfig("sarsa", 0.1, 0.9, 0.1, 0.9), ants=1)
-    many.begin_episode()
-    page = Page(browser, written(folder, "small", record_colony(many)))
-    assert page.read("viewer.stage.camera.scale < 6")
-    names = page.read(
-        """cell => { const { stage } = viewer, { colours, ratio } = stage;
-          const [x, y] = stage.toPage(viewer.history.grid.centre(cell)), found = [];
-          for (let k = 0; k < 81; k++) {
-            const across = k % 9 - 4, up = Math.floor(k / 9) - 4;
-            const { data } = stage.context.getImageData(x * ratio + across, y * ratio + up, 1, 1);
-            const same = (colour) => bytesOf(colour).every((byte, i) => byte === data[i]);
-            found.push(Object.keys(colours).find((name) => same(colours[name])));
-          }
-          return found; }""",
-        int(world.grid.index((30, 0, 0))),
-    )
-    assert {"food", "food-floor"} <= set(names)
-    page.close()
-
-
-def test_large_numbers_keep_apart(ant):
-    ant.read("() => { viewer.history.frames[0].returns = 30779170; viewer.player.go(0); }")
-    ant.settle()
-    shown = ant.tab.inner_text("#now").replace("\N{NARROW NO-BREAK SPACE}", " ")
-    assert "30 779 170" in shown
-    boxes = ant.read(
-        """[...document.querySelectorAll("#now dd")].map((one) => {
-          const range = document.createRange();
-          range.selectNodeContents(one);
-          const { left, right, top } = range.getBoundingClientRect();
-          return [Math.round(top), left, right]; })"""
-    )
-    for (row, _, right), (other, left, _) in pairwise(boxes):
-        assert row != other or right + 6 < left
-
-
-def test_the_panel_shows_what_an_ant_with_food_sees(ant, episode):
-    """It sees no trails: the cells in its view look so, and the panel says why."""
-    fills = """[...document.querySelectorAll(".sees g text")].map((it) =>
-        it.previousElementSibling.getAttribute("fill"))"""
-    moment = int(np.flatnonzero(episode[1].states >= 64)[3])
-    ant.read("moment => viewer.player.go(moment)", moment)
-    ant.settle()
-    ant.read("() => { viewer.history.world.trail.fill(100); viewer.draw(0, false); }")
-    letters = ant.text("#ant b").split()[1:]
-    colours = {"E": "var(--empty)", "O": "var(--rock)", "S": "var(--empty)"}
-    assert ant.read(fills) == [colours[letter] for letter in letters]
-    assert "ants with food do not see the trail" in ant.text("#ant")
-    ant.read("() => { viewer.history.kept = []; viewer.history.world.moment = 1e9; }")
 
 
 def test_a_page_is_printed_light_and_without_controls(browser, episode):
@@ -489,28 +274,6 @@ def test_a_page_is_printed_light_and_without_controls(browser, episode):
         assert dark.tab.is_visible(shown), shown
     dark.read("dispatchEvent(new Event('afterprint'))")
     assert dark.read("document.documentElement.dataset.theme") == "dark"
-    dark.close()
-
-
-def test_ants_are_printed_in_their_world(browser, episode, tmp_path):
-    """The first print of a page has cells, trails and marks, in light colours, and all facts."""
-    dark = Page(browser, episode[0], color_scheme="dark")
-    dark.read("viewer.player.go(9)")
-    dark.settle()
-    text, sheets = printed(dark.tab, tmp_path)
-    assert len(sheets) <= 2
-    assert dark.read("document.documentElement.dataset.theme") == "dark"
-    light = dark.read(
-        """() => { viewer.wear("light"); const { ramp, colours } = viewer.stage;
-          const level = ramp[Math.round(255 * (25 - 9) / 250)].map((one) => one.toString(16));
-          return [colours.empty, "#" + level.join(""), colours.food, colours.queen]; }"""
-    )
-    empty, trail, food, queen = shares(sheets, *light)
-    assert empty > 0.08  # much more than in the legend
-    assert trail > 0.002
-    assert food > 5e-5
-    assert queen > 5e-5
-    assert all(words in text for words in ("Chooses forward", "observation", "delivered", "trail"))
     dark.close()
 
 
@@ -571,105 +334,6 @@ def test_cells_have_the_colours_of_what_they_hold(crowd, colony):
         assert colour == [*expected, 255]
 
 
-def test_nests_have_their_colours_and_their_tables(browser, folder):
-    """The queen and the ants of the second nest, and the values by which a followed ant acts."""
-    world = World((8, 8, 8), [(6, 0, 0), (0, 0, 0)], foods=[(3, 1, 0), (4, 1, 0)])
-    many = Colony(world, None, TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0), 3, ants=8)
-    many.begin_episode()
-    opened = Page(browser, written(folder, "nests", record_colony(many, 40)))
-    opened.read("viewer.player.go(40)")
-    opened.settle()
-    queens = many.grid.index(world.queens).tolist()
-    assert opened.read("cell => viewer.stage.queenColour(cell)", queens[0]) == "queen"
-    assert opened.read("cell => viewer.stage.queenColour(cell)", queens[1]) == "queen 1"
-    assert opened.read("viewer.stage.colours['queen 1']") == "#83000f"
-    assert opened.text("#legend").count("nest") == 2
-    legend = opened.read("document.querySelector('#legend').innerHTML")
-    assert all(colour in legend for colour in ("#83000f", "#a312dc", "nest 0", "nest 1"))
-    nests, numbers = many.nests[0], many.numbers[0]
-    for slot, number in enumerate(numbers.tolist()):
-        shown = opened.read("number => viewer.history.ant(40, number)", number)
-        assert shown["nest"] == nests[slot]
-        values = many.q_values[0, nests[slot], many.states[0, slot]]
-        assert np.array_equal(np.float32(shown["values"]), values)
-        assert shown["loaded"] == many.carrying[0, slot]
-    drawn = opened.read("[...viewer.stage.sprites.keys()].map((key) => key.split('.')[0])")
-    assert any(key.startswith("ant 2") for key in drawn)
-    opened.close()
-
-
-def test_castes_and_kinds_of_food_have_names_colours_and_tables(browser, folder):
-    castes = {"nurse": Caste(threshold=Threshold("fixed", value=5)), "scout": Caste(share=0.5)}
-    foods = {"seed": Food(deliver=90, regrowth=2), "sap": Food(deliver=40, regrowth=2)}
-    labour = Labour("thresholds", demand=0.05, relief=1, stop_probability=0.5)
-    task = foraging().replace(castes=castes, foods=foods, labour=labour, life={"regrowth": None})
-    world = World((8, 8, 8), (6, 0, 0), [(5, 0, 1), (3, 1, 0), (4, 1, 0)], food_kinds=[0, 1, 1])
-    many = Colony(world, task, TrainingConfig("q_learning", 0.2, 0.9, 0.3, 1.0), 3, ants=16)
-    many.begin_episode()
-    many.tick(60)
-    opened = Page(browser, written(folder, "groups", record_colony(many, 40)))
-    opened.read("viewer.player.go(40)")
-    opened.settle()
-    legend = opened.text("#legend")
-    assert all(name in legend for name in ("idle ant", "seed", "sap"))
-    snapshot = many.snapshot()
-    for kind in (0, 1):
-        there = np.flatnonzero((snapshot.ground == FOOD) & (snapshot.food_kinds == kind)).tolist()
-        assert opened.read("kind => viewer.stage.foods[kind] ?? []", kind) == there
-    met = set()
-    for slot, number in enumerate(many.numbers[0].tolist()):
-        shown = opened.read("number => viewer.history.ant(40, number)", number)
-        caste, idle = int(many.castes[0, slot]), bool(many.idle[0, slot])
-        assert (shown["caste"], shown["idle"]) == (caste, idle)
-        values = many.q_values[0, caste, many.states[0, slot]]
-        assert np.array_equal(np.float32(shown["values"]), values)
-        met.add((caste, idle))
-    assert {(0, True), (1, False)} <= met
-    slot = int(np.flatnonzero(many.idle[0])[0])
-    opened.read("number => viewer.follow(number)", int(many.numbers[0, slot]))
-    opened.settle()
-    assert opened.text("#ant .groups") == "nurse · idle"
-    opened.close()
-
-
-def test_the_page_works_under_its_policy(browser, colony):
-    path, *_ = colony
-    assert_policy_holds(browser, path)
-
-
-def test_a_source_can_be_live(browser, folder, colony):
-    """Frames that come one by one; the page waits at the end, and goes on when there are more."""
-    path, moments, recording = colony
-    empty = re.sub(r'(id="recording">)[^<]*', r"\1", path.read_text(encoding="utf-8"))
-    live = folder / "live.html"
-    live.write_text(empty, encoding="utf-8")
-    context = browser.new_context(viewport={"width": 1280, "height": 720}, bypass_csp=True)
-    tab = context.new_page()
-    faults: list[str] = []
-    tab.on("pageerror", lambda error: faults.append(str(error)))
-    tab.goto(live.as_uri())
-    frames = [base64.b64encode(frame).decode() for frame in recording.frames]
-    bytes_of = "(text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer"
-    tab.evaluate(
-        f"""([header, first]) => {{ const bytes = {bytes_of};
-          show({{ header, live: true, start(receive) {{
-            window.push = (text) => receive(bytes(text)); receive(bytes(first)); }} }});
-          viewer.timeline.setSpeed(200); viewer.player.play(); }}""",
-        [recording.header, frames[0]],
-    )
-    for frame in frames[1:40]:
-        tab.evaluate("push", frame)
-    tab.wait_for_function("viewer.player.moment === 39")
-    assert tab.evaluate("viewer.player.playing")
-    for frame in frames[40:]:
-        tab.evaluate("push", frame)
-    tab.wait_for_function("viewer.player.moment === 90 && !viewer.dirty")
-    assert tab.evaluate(STATE, 90)["ground"] == moments[90].ground.tolist()
-    assert tab.evaluate("document.querySelector('#time').max") == "90"
-    context.close()
-    assert not faults
-
-
 def test_the_page_asks_for_nothing_and_runs_no_text(browser, episode):
     """Its policy forbids the network and all scripts but its own; it plays all the same."""
     context = browser.new_context()
@@ -688,52 +352,6 @@ def test_the_page_asks_for_nothing_and_runs_no_text(browser, episode):
     context.close()
 
 
-def test_one_moment_has_no_time_line(browser, folder):
-    world = World((4, 4, 4), (0, 0, 0), foods=[(3, 0, 0)])
-    one = Colony(world, None, TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0))
-    one.begin_episode()
-    opened = Page(browser, written(folder, "moment", record_colony(one)))
-    assert not opened.tab.is_visible("#transport")
-    opened.press("Space", "ArrowRight", "End")
-    assert opened.moment == 0
-    opened.close()
-
-
-@pytest.mark.long
-def test_frames_per_second(browser, folder):
-    """A hundred thousand cells and five thousand ants, drawn without a graphics processor."""
-    world = worlds.open_world(1, (183, 183, 183))
-    config = TrainingConfig("sarsa", 0.01, 0.9, 0.05, 1.0)
-    rules = {"sharing": "frozen", "q_values": trail_follower(), "start": "spread"}
-    many = Colony(world, None, config, ants=5000, **rules)
-    many.begin_episode()
-    opened = Page(browser, written(folder, "large", record_colony(many, 100)))
-    for zoom in (1, 8):
-        rate, script = opened.read(
-            """async (zoom) => {
-              viewer.stage.zoom(zoom); viewer.player.go(0);
-              viewer.timeline.setSpeed(20); viewer.player.play();
-              const pause = (ms) => new Promise((done) => setTimeout(done, ms));
-              await pause(500);
-              let spent = 0; const draw = viewer.draw.bind(viewer);
-              viewer.draw = (...all) => {
-                const start = performance.now();
-                draw(...all);
-                spent += performance.now() - start;
-              };
-              const before = viewer.frames, from = performance.now();
-              await pause(3000);
-              const drawn = viewer.frames - before, took = performance.now() - from;
-              viewer.player.pause(); viewer.draw = draw;
-              return [1000 * drawn / took, spent / drawn]; }""",
-            zoom,
-        )
-        print(f"zoom {zoom}: {rate:.0f} frames a second, {script:.1f} ms of script each")
-        assert script < 33 * crowding()
-        assert rate > 15 / crowding()
-    opened.close()
-
-
 def test_the_script_is_whole():
     """Each part is in the page once, in an order in which classes stand before their use."""
     whole = "".join(map(part, SCRIPTS))
@@ -750,35 +368,3 @@ def test_the_script_is_whole():
                 "Error",
             ),
         )
-
-
-def test_what_lies_between_moments_is_not_made_up(browser, folder):
-    """The pace is in ticks, and there is no way from a cell to one far away."""
-    rules = TrainingConfig("q_learning", 0.2, 0.9, 0.2, 1.0)
-    one = Colony(worlds.paper(), Task("queues", life=Life(births=True)), rules)
-    one.begin_episode()
-    recording = record_colony(one, 60, frame_interval=10)
-    assert recording.header["title"].startswith("Ants in a world of ")
-    opened = Page(browser, written(folder, "thinned", recording))
-    opened.read("viewer.player.go(6)")
-    assert opened.read("viewer.history.path(6, 0).length") == 1
-    assert opened.tab.get_attribute("#time", "max") == "60"
-    assert opened.tab.locator("#events .gaps").get_attribute("d") == "M0.0 7H1000.0"
-    opened.read("viewer.timeline.setSpeed(12)")
-    assert opened.text("#speed-value") == "120 ticks/s"
-    opened.tab.focus("#time")
-    opened.press("ArrowLeft")
-    assert opened.moment == 5
-    opened.press("ArrowRight")
-    assert opened.moment == 6
-    opened.read("viewer.follow(0)")
-    meaning = opened.text("#ant .sees small")
-    assert re.match(r"[A-Z] \w+(, [A-Z] [\w ]+)*", meaning)
-    letters = (
-        "P ant with the other load on a better cell, A on a cell that is not better, "
-        "p ant with the same load on a better cell"
-    )
-    view = {"task": "", "rest": "EPA", "letters": ["E", "P", "A"]}
-    opened.read("view => { viewer.history.stateName = () => view; viewer.dirty = true; }", view)
-    assert opened.text("#ant .sees small") == f"E empty; {letters}"
-    opened.close()

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import taichi_ants
-from taichi_ants import AntsError, Colony, TrainingConfig, World, rollout, task, worlds
+from taichi_ants import Colony, TrainingConfig, World, rollout, worlds
 from taichi_ants.commands import render
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import Episode, colours
 from taichi_ants.task import Caste, Food, Task
-from taichi_ants.viewer import page, record_colony, record_episode, save_page
+from taichi_ants.viewer import record_colony, record_episode
 from taichi_ants.viewer.page import part
 
 TITLE = 'An <ant> & its "trail"'
@@ -26,29 +26,6 @@ TITLE = 'An <ant> & its "trail"'
 @pytest.fixture(scope="module")
 def episode():
     return record_episode(Episode.play(worlds.paper(), trail_follower()), TITLE)
-
-
-def test_the_papers_episode_takes_the_space_that_the_docs_say(episode):
-    assert 105_000 < len(page(episode).encode()) < 115_000  # docs/rendering.md
-
-
-def test_eighty_ants_that_learn_for_400_ticks_take_less_than_3_megabytes():
-    config = TrainingConfig("q_learning", 0.1, 0.9, 0.2, 1.0)
-    rules = task.Task(evaporation_in_training=True)
-    colony = Colony(worlds.open_world(1), rules, config, ants=80)
-    colony.begin_episode()
-    content = page(record_colony(colony, 400)).encode()
-    assert len(content) < 1_000_000
-
-
-def test_a_page_asks_for_nothing_else(episode):
-    content = page(episode)
-    assert "<!-- " not in content
-    assert not re.findall(
-        r"https?://|@import|url\(|<link(?! rel=\"icon\" href=\"data:,\")", content
-    )
-    assert re.findall(r'\b(?:src|href)="([^"]*)"', content) == ["data:,"]
-    assert "<title>An &lt;ant&gt; &amp; its &quot;trail&quot;</title>" in content
 
 
 def test_light_colours_are_those_of_the_pictures():
@@ -150,25 +127,3 @@ def test_the_command_writes_pages(tmp_path, capsys):
     assert capsys.readouterr().out.startswith(f"{ant}: 34 steps, return 45, delivered\n")
     assert "<title>walks</title>" in ant.read_text(encoding="utf-8")
     assert ants.read_text(encoding="utf-8").endswith("</html>\n")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["episode", "--size", "300x300"], "--size has no effect on a page"),
-        (["colony", "--fps", "9"], "--fps has no effect on a page"),
-        (["episode", "--no-overlay"], "--no-overlay has no effect on a page"),
-    ],
-)
-def test_options_of_pictures_are_refused(arguments, message, capsys):
-    with pytest.raises(SystemExit):
-        render.parse_arguments([*arguments, "--out", "a.html"])
-    assert message in capsys.readouterr().err
-
-
-def test_pages_have_a_name_of_their_own(tmp_path, episode):
-    with pytest.raises(AntsError, match=r"ends in \.html"):
-        save_page(tmp_path / "a.txt", episode)
-    with pytest.raises(AntsError, match="cannot write"):
-        save_page("/proc/nope/a.html", episode)
-    assert list(tmp_path.iterdir()) == []

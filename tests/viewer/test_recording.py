@@ -24,8 +24,6 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.interventions import Place
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.rendering import Episode
-from taichi_ants.task.events import Event
 from taichi_ants.viewer import (
     Recorder,
     Recording,
@@ -140,23 +138,6 @@ def test_a_recording_of_several_nests(sharing):
     assert ["nests", "2"] in list(map(list, recorder.header()["about"]))
 
 
-@pytest.mark.parametrize("epsilon", [0.0, 0.4])
-def test_an_episode_is_its_trace(epsilon):
-    episode = Episode.play(worlds.paper(), trail_follower(), seed=5, max_steps=60, epsilon=epsilon)
-    trace, recording = episode.trace, record_episode(episode)
-    moments = list(played(recording))
-    assert len(moments) == len(trace) + 1
-    assert recording.header["follow"] == 0
-    for step, (moment, after) in enumerate(pairwise(moments)):
-        assert episode.made.world.grid.cells(moment.cells).tolist() == [trace.cells[step].tolist()]
-        assert moment.headings == trace.headings[step]
-        assert moment.states == trace.states[step]
-        assert after.actions == trace.actions[step]
-        assert after.events == trace.events[step]
-        assert np.array_equal(moment.row(trace.states[step], 128), trace.q_values[step])
-    assert moments[-1].clock[3] == trace.rewards.sum()
-
-
 @pytest.mark.parametrize("learner", ["sarsa", "double_q"])
 def test_a_trace_of_training_holds_tables_and_td_errors(learner):
     config = TrainingConfig(learner, 0.1, 0.9, 0.3, 0.99)
@@ -221,12 +202,6 @@ def test_what_is_skipped_and_what_is_changed_by_hand():
         12,
         13,
     ]
-
-
-def test_a_delivery_is_in_the_totals_and_the_events():
-    moments = list(played(record_episode(Episode.play(worlds.paper(), trail_follower()))))
-    assert [moment.clock[2] for moment in moments[-2:]] == [0, 1]
-    assert moments[-1].events.tolist() == [Event.DELIVERED]
 
 
 def test_cells_and_states_take_as_many_bytes_as_they_need():

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.reference.geometry import Cell, existing_cells, listed_cells, neighbour
 from taichi_ants.worlds import World
@@ -69,37 +67,6 @@ def test_a_mirrored_bridge_is_the_mirror_image(short: int, long: int, aside: int
     assert (unnamed[0] == unnamed[1]) == (short == long and not aside)
 
 
-@pytest.mark.parametrize(("short", "long", "aside"), ASIDE)
-def test_ants_can_pass_each_other_everywhere(short: int, long: int, aside: int) -> None:
-    """No cell but the junctions, taken for itself, is a place that all of a branch goes through."""
-    cells = walkable(double_bridge(short, long, aside=aside))
-    nest, food = listed_cells(junction_cells(short, long, aside=aside))
-    branches = [set(listed_cells(one)) for one in branch_cells(short, long, aside=aside)]
-    for open_branch, closed in (branches, branches[::-1]):
-        for blocked in open_branch:
-            assert food in steps(cells - closed - {blocked}, nest)
-
-
-def test_the_short_branch_lies_to_the_right_unless_mirrored() -> None:
-    (nest, _) = listed_cells(junction_cells())
-    for flip, heading in ((False, 1), (True, 5)):
-        short, long = (set(listed_cells(branch)) for branch in branch_cells(mirrored=flip))
-        assert neighbour(nest, heading) in short
-        assert neighbour(nest, -heading) in long
-
-
-def test_an_ant_at_a_junction_sees_the_same_on_both_sides() -> None:
-    cells = walkable(double_bridge())
-    closer = double_bridge().closer()
-    for junction, ahead in zip(listed_cells(junction_cells()), (0, 3), strict=True):
-        assert neighbour(junction, ahead) not in cells
-        for turn in (1, 2, 3):
-            sides = [neighbour(junction, ahead + side * turn) for side in (1, -1)]
-            assert len({cell in cells for cell in sides}) == 1
-        bits = int(closer[double_bridge().grid.index(junction)])
-        assert (bits >> (ahead + 1) % 6) & 1 == (bits >> (ahead - 1) % 6) & 1
-
-
 @pytest.mark.parametrize("flip", [False, True])
 def test_with_food_aside_the_short_branch_alone_leads_nearer_to_the_queen(flip: bool) -> None:
     for aside in (1, 2, 3):
@@ -130,19 +97,6 @@ def test_the_way_to_the_food_and_who_starts_where() -> None:
     assert len(world.trails) == len(world.ants) == 0
 
 
-def test_it_has_a_name_with_settings() -> None:
-    with pytest.raises(
-        AntsError,
-        match=r"`world.width` is not a setting of the world .*; choose one of aside, long, ",
-    ):
-        worlds.build("double_bridge", width=3)
-    built = worlds.build("double_bridge", 7, short=10, long=13, mirrored=True, aside=2)
-    assert built == double_bridge(10, 13, True, 2)
-    assert worlds.build("double_bridge") == double_bridge()
-    with pytest.raises(AntsError, match=r"--world\.seed has no effect on .*double_bridge"):
-        worlds.check_seed_counts("double_bridge")
-
-
 @pytest.mark.parametrize(
     ("given", "message"),
     [
@@ -157,10 +111,3 @@ def test_errors_name_what_is_wrong(given: dict, message: str) -> None:
     for build in (double_bridge, branch_cells):
         with pytest.raises(AntsError, match=message):
             build(**given)
-
-
-def test_cells_are_listed_once() -> None:
-    for short, long, aside in ASIDE:
-        where = {"short": short, "long": long, "aside": aside}
-        cells = np.concatenate([*branch_cells(**where), junction_cells(**where)])
-        assert len(np.unique(cells, axis=0)) == len(cells)

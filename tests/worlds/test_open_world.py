@@ -65,25 +65,6 @@ def test_rocks_cover_their_share_and_no_rock_more(ranges: tuple, share: float) -
     assert 0 <= excess < 1 + 3 * radius * (radius + 1)
 
 
-def test_rocks_are_placed_one_by_one_in_the_order_of_the_draws() -> None:
-    grid = AxialGrid((50, 45, 40))  # radii 0 to 2
-    cells = grid.cells(np.flatnonzero(grid.exists))
-    stream, covered = Stream(1, 2, 3), np.zeros(len(cells), dtype=bool)
-    while covered.sum() < 0.15 * len(cells):
-        word = int(stream.bits(1)[0])
-        centre = cells[((word >> 32) * len(cells)) >> 32]
-        radius = ((word & 0xFFFF_FFFF) * 3) >> 32
-        covered |= distance(cells, centre) <= radius
-    found = module.scatter_rocks(grid, 0.15, Stream(1, 2, 3))
-    assert (found[grid.index(cells)] == covered).all()
-
-
-def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = open_world(4, (60, 50, 70))
-    monkeypatch.setattr(module, "_BATCH_CELLS", 100)
-    assert open_world(4, (60, 50, 70)) == world
-
-
 def test_rocks_make_way_for_the_clearing_and_the_piles_only() -> None:
     ranges = (40, 30, 35)
     world = open_world(5, ranges)
@@ -93,18 +74,6 @@ def test_rocks_make_way_for_the_clearing_and_the_piles_only() -> None:
     clearing = set(map(tuple, cells[distance(cells, (0, 0, 0)) <= 3].tolist()))
     assert clearing & rocks
     assert set(map(tuple, world.obstacles.tolist())) == rocks - clearing - pile_cells(world)
-
-
-def test_the_same_seed_gives_the_same_world() -> None:
-    assert open_world(1) == open_world(1)
-    assert open_world(1) != open_world(2)
-    assert open_world(-1, (20, 20, 20)) == open_world(2**64 - 1, [np.int32(20), 20, 20])
-
-
-def test_more_food_leaves_the_rocks_alone() -> None:
-    little, much = (open_world(7, (40, 40, 40), food_share=share) for share in (0.01, 0.2))
-    assert (little.obstacles == much.obstacles).all()
-    assert len(little.foods) < len(much.foods)
 
 
 def test_drawn_ranges_fill_their_bounds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,15 +91,6 @@ def test_drawn_ranges_fill_their_bounds(monkeypatch: pytest.MonkeyPatch) -> None
     assert drawn.max() == 100
     # The mean of 1000 numbers drawn evenly from 10 .. 100 has a standard deviation of 0.83.
     assert np.abs(drawn.mean(axis=0) - 55).max() < 5
-
-
-def test_rocks_and_food_are_spread_evenly() -> None:
-    world = open_world(3, (200, 200, 1))
-    for kind, share in (("obstacles", 0.15), ("foods", 0.03)):
-        cells = getattr(world, kind)
-        for low in (60, 100):  # two quarters with neither clearing nor pile in them
-            inside = ((cells[:, :2] >= low) & (cells[:, :2] < low + 40)).all(axis=1).sum()
-            assert abs(inside / 1600 - share) < 0.35 * share
 
 
 def test_pinned_worlds() -> None:
@@ -162,34 +122,6 @@ def test_a_world_without_reachable_food_is_drawn_again(monkeypatch: pytest.Monke
 def test_a_hundred_worlds_without_food_are_an_error(ranges: tuple) -> None:
     with pytest.raises(AntsError, match=r"in 100 open worlds of ranges .* choose larger ranges"):
         open_world(0, ranges)
-
-
-def test_no_rocks_and_no_single_food() -> None:
-    world = open_world(0, (20, 20, 20), rock_share=0, food_share=0)
-    assert len(world.obstacles) == 0
-    assert set(map(tuple, world.foods.tolist())) == pile_cells(world)
-
-
-def test_more_food_than_room_fills_the_room() -> None:
-    world = open_world(0, (6, 6, 1), rock_share=0, food_share=0.9)
-    assert (world.ground() == EMPTY).sum() == 16 - 1  # the clearing less the queen's cell
-
-
-def test_shares_leave_room() -> None:
-    with pytest.raises(AntsError, match=r"rock_share 0\.5 and food_share 0\.5 .* smaller shares"):
-        open_world(0, (20, 20, 20), rock_share=0.5, food_share=0.5)
-
-
-@pytest.mark.parametrize("ranges", [(20, 20), (0, 20, 20), (20.0, 20, 20), 20, "20"])
-def test_ranges_are_checked(ranges: object) -> None:
-    with pytest.raises(AntsError, match="ranges"):
-        open_world(0, ranges)
-
-
-@pytest.mark.parametrize("seed", [0.5, "1", None])
-def test_seeds_are_whole(seed: object) -> None:
-    with pytest.raises(AntsError, match="seed is"):
-        open_world(seed, (20, 20, 20))
 
 
 def test_piles_lie_along_the_first_ranges_and_may_be_all_food() -> None:

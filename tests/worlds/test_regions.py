@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import pickle
 
-import numpy as np
 import pytest
 
 from taichi_ants import AntsError, At, Colony, Task, World, worlds
-from taichi_ants.interventions import Clear, Place, RemoveAnts, from_dict
 from taichi_ants.task.constants import EMPTY, OBSTACLE
 from taichi_ants.worlds import from_text, to_text
 
@@ -81,15 +79,6 @@ def test_a_wrong_region_is_named(regions, says):
         worlds.paper().with_regions(regions)
 
 
-def test_a_disc_has_the_cells_within_a_radius():
-    world = worlds.paper().with_regions({"disc": {"centre": (-1, -1, 0), "radius": 2}})
-    far = world.grid.distances((0, 0, 1))
-    assert set(world.region("disc")) == set(np.flatnonzero(world.grid.exists & (far <= 2)))
-    both = world.with_regions({"one": [(0, 0, 0), (1, 1, 1)]})
-    assert list(both.regions) == ["disc", "one"]
-    assert len(both.regions["one"]) == 1
-
-
 def test_interventions_take_the_regions_of_each_world(tmp_path):
     """Worlds of a colony can have different cells in a region of the same name."""
     shared = worlds.open_world(3, (6, 6, 6))
@@ -105,19 +94,3 @@ def test_interventions_take_the_regions_of_each_world(tmp_path):
     assert Colony.load(tmp_path / "colony.npz").worlds == tuple(some)
     with pytest.raises(AntsError, match=r"no region 'gte' in the world, whose regions are: gate"):
         colony.run(1, 5, protocol=[At(1, clear="gte")])
-
-
-def test_the_name_of_a_region_stands_for_its_cells():
-    assert from_dict({"clear": "gate"}) == Clear("gate")
-    assert from_dict({"remove_ants": "gate"}) == RemoveAnts(cells="gate")
-    assert Clear("gate").facts() == {"clear": {"cells": "gate"}}
-    with pytest.raises(AntsError, match=r"^`place\.cells` is 'gate'; give a list of a single cell"):
-        Place("queen", "gate")
-    with pytest.raises(AntsError, match=r"^`move\.cells` is 'gate'; give the cell to move from"):
-        from_dict({"move": "gate"})
-
-
-def test_the_measure_needs_regions():
-    colony = Colony(worlds.paper(), Task(choice="deneubourg"), None, 0, sharing="frozen")
-    with pytest.raises(AntsError, match=r"needs a world with regions; add them with World\.with_"):
-        colony.run(1, 1, measures=["regions"])

@@ -65,14 +65,3 @@ def test_no_world_that_holds_the_cells_is_smaller(cells: list[tuple[int, int]]) 
         AxialGrid(tuple((cube(axials - other).max(axis=0) + 1).tolist())).count for other in origins
     )
     assert AxialGrid(ranges).count == smallest
-
-
-@given(axial_cells, coordinates, coordinates)
-def test_the_smallest_world_moves_with_its_cells(
-    cells: list[tuple[int, int]], q: int, r: int
-) -> None:
-    axials = np.array(cells)
-    ranges, origin = smallest_world(axials)
-    moved_ranges, moved_origin = smallest_world(axials + (q, r))
-    assert moved_ranges == ranges
-    assert moved_origin == (origin[0] + q, origin[1] + r)

@@ -42,19 +42,3 @@ def test_foods_are_reachable_where_a_walk_leads(world: World) -> None:
             frontier += [other for other in beside(cell) if empty(other)]
     expected = [not reached.isdisjoint(beside(tuple(food))) for food in world.foods.tolist()]
     assert world.reachable_foods().tolist() == expected
-
-
-@given(crowded_worlds(), st.integers())
-def test_ants_start_on_the_nearest_free_cells(world: World, seed: int) -> None:
-    free = np.flatnonzero(world.ground() == EMPTY)
-    if len(free) == 0:
-        return
-    n = (len(free) + 1) // 2
-    cells, headings = world.start(seed, n)
-    assert len(set(cells.tolist())) == n
-    assert set(cells.tolist()) <= set(free.tolist())
-    assert ((headings >= 0) & (headings < 6)).all()
-    far = world.distances()
-    left_over = np.setdiff1d(free, cells)
-    assert (np.diff(far[cells]) >= 0).all()
-    assert len(left_over) == 0 or far[cells].max() <= far[left_over].min()

@@ -1,7 +1,6 @@
 """Every way to misdescribe a world is refused with a sentence that names the value."""
 
 import pickle
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -21,17 +20,11 @@ def world(**changes: object) -> World:
     "ranges",
     [
         (5, 5),
-        (5, 5, 5, 5),
-        (5.0, 5, 5),
         np.array([5.0, 5, 5]),
         (0, 5, 5),
-        (-1, 5, 5),
         (True, 5, 5),
         "555",
-        5,
-        None,
         (1, 1, HUGE),
-        (1, 1, 2**40),
         {"x": 1, "y": 2, "z": 3},
     ],
 )
@@ -54,15 +47,6 @@ def test_several_nests_and_kinds_of_food() -> None:
     assert one.grid.cells(here).tolist() == [[1, 0, 1]]
 
 
-def test_ants_start_around_their_own_queen() -> None:
-    one = World((9, 9, 9), [(0, 0, 0), (8, 0, 0)], ants=[((7, 0, 0), 3), ((1, 0, 0), 0)])
-    assert one.nests_of(6).tolist() == [1, 0, 0, 1, 0, 1]  # listed ants are next to queens 1, 0
-    cells, _ = one.start(5, 6)
-    far = np.stack([one.distances(0), one.distances(1)])[:, cells]
-    assert (far[one.nests_of(6), range(6)] == 1).all()
-    assert len(set(cells.tolist())) == 6
-
-
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -80,11 +64,6 @@ def test_wrong_nests_and_kinds(changes: dict, message: str) -> None:
     assert message in str(caught.value)
 
 
-def test_ranges_that_need_too_much_memory() -> None:
-    with pytest.raises(AntsError, match=r"\(100000, 100000, 1\).*smaller ranges"):
-        world(ranges=(100_000, 100_000, 1))
-
-
 @pytest.mark.parametrize(
     "queen", [(0, 0), (0.0, 0, 0), (np.nan, 0, 0), "000", None, 7, [], np.zeros(3)]
 )
@@ -93,35 +72,15 @@ def test_the_queen_is_one_cell(queen: object) -> None:
         world(queen=queen)
 
 
-@pytest.mark.parametrize("queen", [(5, 0, 0), (-5, 0, 0), (7, 2, 2)])
-def test_the_queen_is_inside(queen: tuple) -> None:
-    with pytest.raises(AntsError, match=rf"queen is {re.escape(str(queen))}, outside.*\(5, 5, 5\)"):
-        world(queen=queen)
-
-
 @pytest.mark.parametrize("name", ["foods", "obstacles"])
 @pytest.mark.parametrize(
     ("cells", "named"),
     [
         ([(1, 0, 0), (2.0, 0, 0)], "[1] is (2.0, 0, 0)"),
-        ([(1, 0, np.nan)], "[0] is (1, 0, nan)"),
         ([(1, 0)], "[0] is (1, 0)"),
-        ([(1, 0, 0, 0)], "[0] is (1, 0, 0, 0)"),
-        ([(True, 0, 0)], "[0] is (True, 0, 0)"),
-        (["100"], "[0] is '100'"),
-        ((1, 0, 0), "[0] is 1"),
         ("100", " is '100'"),
-        (None, " is None"),
-        (3, " is 3"),
-        ({(1, 0, 0): 2}, " is {"),
-        ([(10**30, 0, 0)], "[0] is (1000"),
         ([(HUGE, 0, 0)], "[0] is a huge number"),
-        (np.array([1, 0, 0]), " is an array of shape (3,)"),
-        (np.ones((2, 5), dtype=int), " is an array of shape (2, 5)"),
         (np.ones((2, 3)), " is an array of shape (2, 3) and type float64"),
-        (np.array([["1", "0", "0"]]), " is an array of shape (1, 3) and type <U1"),
-        (np.array([[2**63 - 1, -(2**63), 0]]), "[0] is (9223372036854775807"),
-        (np.array([[2**64 - 1, 0, 0]], dtype=np.uint64), "[0] is (18446744073709551615"),
     ],
 )
 def test_cells_are_three_whole_numbers(name: str, cells: object, named: str) -> None:
@@ -137,8 +96,6 @@ def test_cells_are_inside(name: str) -> None:
         world(**{name: [(1, 0, 0), (1, 6, 1)]})
     with pytest.raises(AntsError, match=message):
         world(**{name: np.array([(1, 0, 0), (1, 6, 1)])})
-    with pytest.raises(AntsError, match=r"\[0\] is \(5, 0, 0\), outside"):
-        world(**{name: [(i, 0, 0) for i in range(5, 10)]})
 
 
 @pytest.mark.parametrize(
@@ -159,7 +116,6 @@ def test_nothing_is_listed_twice(name: str, entries: object) -> None:
     ("changes", "message"),
     [
         ({"foods": [(3, 3, 3)]}, r"foods contain \(0, 0, 0\), the cell of the queen"),
-        ({"obstacles": [(0, 0, 0)]}, r"obstacles contain \(0, 0, 0\), the cell of the queen"),
         (
             {"foods": [(1, 0, 0)], "obstacles": [(2, 1, 1)]},
             r"obstacles contain \(1, 0, 0\), the cell of a food item",
@@ -167,11 +123,6 @@ def test_nothing_is_listed_twice(name: str, entries: object) -> None:
         (
             {"obstacles": [(1, 0, 0)], "trails": [((1, 0, 0), 3)]},
             r"trails contain \(1, 0, 0\), the cell of an obstacle",
-        ),
-        ({"ants": [((0, 0, 0), 3)]}, r"ants contain \(0, 0, 0\), the cell of the queen"),
-        (
-            {"foods": [(1, 0, 0)], "ants": [((1, 0, 0), 3)]},
-            r"ants contain \(1, 0, 0\), the cell of a food item",
         ),
         (
             {"obstacles": [(1, 0, 0)], "ants": [((1, 0, 0), 3)]},
@@ -209,30 +160,3 @@ def test_headings_and_levels_have_bounds(name: str, entry: tuple, named: str) ->
             world(**{name: entries})
         assert f"{name}[0] is {flat}" in str(caught.value)
         assert f"the {named} (the last number) must lie between 0 and" in str(caught.value)
-
-
-@pytest.mark.parametrize("name", ["trails", "ants"])
-@pytest.mark.parametrize(
-    "entry",
-    [
-        ((1, 0, 0), 1.0),
-        ((1, 0, 0), "1"),
-        ((1, 0, 0), None),
-        ((1, 0, 0),),
-        (1, 0, 0),
-        ((1, 0), 1),
-        ("100", 1),
-        ((1, 0, 0), 1, 2),
-        ((1, 0, 0.5), 1),
-        (1, 2),
-    ],
-)
-def test_entries_with_a_number_have_their_form(name: str, entry: object) -> None:
-    with pytest.raises(AntsError) as caught:
-        world(**{name: [entry]})
-    assert f"{name}[0] is {entry}; it must be ((x, y, z), " in str(caught.value)
-
-
-def test_ants_are_inside() -> None:
-    with pytest.raises(AntsError, match=r"ants\[0\] is \(0, -5, 0, 2\), outside"):
-        world(ants=[((0, -5, 0), 2)])

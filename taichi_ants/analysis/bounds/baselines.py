@@ -58,11 +58,9 @@ def policy_rows(
     note = f"mean over {count(len(seeds), 'seed')} of {count(rollouts, 'rollout')}"
     rows = []
     for name, policy in (("random policy", random_policy()), ("trail follower", trail_follower())):
-        found = evaluate(world, np.repeat(policy[None], len(seeds), axis=0), **how)
-        outcome = ExpectedEpisode(
-            *map(float, map(np.mean, (found.returns, found.steps, found.deliveries)))
-        )
-        rows.append(Baseline(name, None, *outcome, note))
+        result = evaluate(world, np.repeat(policy[None], len(seeds), axis=0), **how)
+        means = map(np.mean, (result.returns, result.steps, result.deliveries))
+        rows.append(Baseline(name, None, *ExpectedEpisode(*map(float, means)), note))
     return rows
 
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from taichi_ants.engines.records import Record
 from taichi_ants.measures.series import Series
 from taichi_ants.measures.tidy import Measured, Tidy, seed_array
+from taichi_ants.records import Record
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,14 +54,14 @@ class ColonyEpisodes(Record, Tidy):
 
     def counts(self) -> dict[str, np.ndarray]:
         """Return the arrays of all counts of worlds by name."""
-        arrays = (one for one in vars(self).items() if isinstance(one[1], np.ndarray))
+        arrays = (item for item in vars(self).items() if isinstance(item[1], np.ndarray))
         return {name: array for name, array in arrays if array.ndim == 2}
 
     def measured(self) -> Measured:
         """Return the values of the measures, or all counts if `Colony.run` was asked for none."""
         shape, series = self.returns.shape, self.series
         if series is None:
-            episodes, worlds = (one.ravel().astype(np.int32) for one in np.indices(shape))
+            episodes, worlds = (numbers.ravel().astype(np.int32) for numbers in np.indices(shape))
             ticks = self.ticks.ravel()
             values = {name: array.ravel() for name, array in self.counts().items()}
             plotted: tuple[str, ...] = ("deliveries",)

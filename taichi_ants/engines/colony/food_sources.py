@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from taichi_ants.engines.colony.layout import FoodSourceRow, WorldRow
+from taichi_ants.task.constants import FOOD
 from taichi_ants.worlds.world import World
 
 
@@ -64,3 +65,42 @@ def at_start(world: World) -> np.ndarray:
     _, first, numbers = np.unique(labels, return_index=True, return_inverse=True)
     piles = np.argsort(np.argsort(first))[numbers].astype(np.int32)
     return np.stack([cells, np.full(len(cells), -1), piles, world.kinds_by_cell()[cells]])
+
+
+def of_world(arrays: Mapping[str, np.ndarray], w: int, room: int) -> np.ndarray:
+    """Return the present food sources of a world as `arrays` takes them, int (4, n)."""
+    n = arrays["worlds"][WorldRow.FOOD_SOURCES, w]
+    rows = [FoodSourceRow.CELL, FoodSourceRow.TAKEN, FoodSourceRow.PILE, FoodSourceRow.KIND]
+    return arrays["food_sources"][rows, w * room : w * room + n]
+
+
+def changed(
+    sources: np.ndarray, cells: np.ndarray, what: int, kind: int, offsets: np.ndarray
+) -> np.ndarray:
+    """Return sources (4, n) with those of new FOOD on cells, or without those under other things.
+
+    A waiting source of a cell gets its food back. A new source joins the pile of the first adjacent
+    source, or forms a new pile. The source of the food takes its kind. `offsets` are the grid's.
+    """
+    if what != FOOD:
+        sources = sources[:, ~np.isin(sources[0], cells)]
+    at, taken, pile, kinds = sources.tolist()
+    on: dict[int, list[int]] = {}
+    for source, cell in enumerate(at):
+        on.setdefault(cell, []).append(source)
+    for cell in cells.tolist() if what == FOOD else ():
+        here = on.setdefault(cell, [])
+        if not here:
+            around = [on.get(cell + step, ()) for step in offsets.tolist()]
+            first = min((source for there in around for source in there), default=None)
+            here.append(len(at))
+            at.append(cell)
+            taken.append(0)
+            kinds.append(kind)
+            pile.append(max(pile, default=-1) + 1 if first is None else pile[first])
+        if all(taken[source] >= 0 for source in here):
+            taken[here[0]] = -1
+        (full,) = [source for source in here if taken[source] < 0]
+        kinds[full] = kind
+    _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
+    return np.array([at, taken, pile, kinds], int).reshape(4, -1)

@@ -12,9 +12,9 @@ change.
 
 Random numbers come from the stream of (seed, STREAM_INTERVENTION, episode) of each world, in the
 order of the changes. Adding n ants draws n headings and, with several castes, n castes, by the
-probabilities for newborn ants. Removing n of m living ants draws m words of
-64 bits, one for each ant in the order of numbers, and removes the ants with the n smallest words.
-With a nest given, m counts the ants of that nest.
+probabilities for newborn ants. Removing n of m living ants draws m words of 64 bits, one for each
+ant in the order of numbers, and removes the ants with the n smallest words. With a nest given, m
+counts the ants of that nest.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from functools import wraps
+from typing import Any
 
 import numpy as np
 
@@ -31,12 +32,12 @@ from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import (
     ANT_STANDS,
     FoodRow,
-    FoodSourceRow,
     NestRow,
     Stage,
     WorldRow,
     array_of,
 )
+from taichi_ants.engines.colony.ticking import TickingColony
 from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, checked_whole, count, entries_of, shown
 from taichi_ants.grid.constants import (
@@ -53,9 +54,6 @@ from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, 
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World
 
-if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony
-
 Cells = np.ndarray | str  # flat indices (n,), or the name of a region
 Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
@@ -71,316 +69,161 @@ _STEPS = axial(_CELLS[_ORDER[1:]])
 _CONTENT, _NUMBER = 15, 4
 
 
-class Interventions:
-    """Changes of some worlds of a colony, and of the start of their later episodes.
+class _World:
+    """One world of a colony with interventions; its slots, cells and arrays are of this world.
 
-    Cells are flat indices, int (n,), without duplicates, or the name of a region, see `index`. A
-    cell on which something
-    cannot be placed, because an ant, a rock or the queen is on it, does not change. A method that
-    raises an error changes nothing in any world.
-
-    Args:
-        worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
-            of the task, epsilon, the learning rate and the number of ants at the start, so these
-            can only change in all worlds that are still running.
-        lasting: Whether later episodes start with the changes, which requires room for the ants
-            and, if they learn, food.
-
-    Attributes:
-        ants: The number of ants at the start of later episodes.
-        length: The `length` of episodes that an intervention begins.
-
-    Raises:
-        AntsError: The colony does not have one of the worlds.
+    A method that returns a `Change` yields once, between its checks and its effects.
     """
 
-    def __init__(
-        self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
-    ) -> None:
-        self.colony, self.ants, self.lasting = colony, colony.ants, lasting
-        self.length: int | None = None
-        self.worlds = self._checked_worlds(worlds)
-        self._first = colony.worlds
-        self._starts = [_start_of(world) for world in colony.worlds] if lasting else []
-        self._streams: dict[int, tuple[int, Stream]] = {}  # by world: the episode and its stream
-        self._changed = False  # whether the start of the next episode differs from the present one
+    def __init__(self, interventions: Interventions, w: int) -> None:
+        self.all, self.w, self.colony = interventions, w, interventions.colony
+        self.rows = self.colony.arrays["worlds"][:, w]
 
-    def _checked_worlds(self, worlds: Sequence[int] | None) -> tuple[int, ...]:
-        n = len(self.colony.worlds)
-        several = range(n) if worlds is None else entries_of(worlds)
-        if several is None or not all(
-            isinstance(w, (int, np.integer)) and 0 <= w < n for w in several
-        ):
-            raise AntsError(
-                f"worlds is {shown(worlds)}; it must be a list of numbers from 0 to {n - 1}, or "
-                "None for all worlds."
-            )
-        return tuple(dict.fromkeys(map(int, several)))
-
-    @property
-    def living(self) -> int:
-        """The number of living ants in the first of the worlds."""
-        return int(self.colony.arrays["worlds"][WorldRow.LIVING, self.worlds[0]])
-
-    def index(self, cells: Sequence[Any] | str) -> Cells:
-        """Return the flat indices of cells (x, y, z) or flat indices, without duplicates.
-
-        The name of a region remains. AntsError if a cell or the region does not exist.
-        """
-        if not isinstance(cells, str):
-            return indices(self.colony.grid, cells)
-        for one in self._each():
-            one.index(cells)
-        return cells
-
-    def is_empty(self, cell: int) -> bool:
-        """Return whether a cell is empty and has no ant, in all of the worlds."""
-        return all(one.view("ground")[cell] == EMPTY for one in self._each())
-
-    def everywhere(self) -> np.ndarray:
-        """Return the flat indices of all cells."""
-        return np.flatnonzero(self.colony.grid.exists)
-
-    def put(self, cells: Cells, what: int, kind: int = 0) -> None:
+    def put(self, cells: Cells, what: int, kind: int = 0) -> Change:
         """Make cells EMPTY, OBSTACLE or FOOD, except those of queens and of ants that stay.
 
         Rock and food move ants aside, and rocks remove trails. Food of a kind fills its cell with
         all loads. Each new food item gets a food source: it grows back, and wanders with adjacent
         food. AntsError if later episodes would have no room for the ants, or no food to learn from.
         """
-        self._change(lambda one: one.put(one.index(cells), what, kind))
+        there = self.index(cells)
+        held = self.view("ground")[there]
+        ants, to = self._aside(there) if what != EMPTY else (there[:0], there[:0])
+        at = self.cells[ants]
+        there = there[((held >> 4 == 0) | np.isin(there, at)) & (held != QUEEN)]  # see `layout`
+        yield from self._start_with(there, what | kind << _NUMBER)
+        self._step_aside(ants, to)
+        self._put(there, what, kind)
 
-    def move_queen(self, cell: int, nest: int = 0) -> None:
+    def move(self, cell: int, to: int) -> Change:
+        """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
+
+        Has no effect if the first cell has none of them, or the other one is not free.
+        """
+        what, colony = int(self.view("ground")[cell]), self.colony
+        if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
+            yield
+        elif what == QUEEN:
+            yield from self.move_queen(to, int(np.argmax(self.queen_cells == cell)))
+        else:
+            of = self.view("kind_of") if colony.n_kinds > 1 else np.zeros(cell + 1, int)
+            kind = int(of[cell]) if what == FOOD else 0
+            loads = (
+                int(self.view("loads")[cell]) if what == FOOD and colony.task.has_loads else None
+            )
+            yield from self._start_with([cell, to], [EMPTY, what | kind << _NUMBER])
+            self._step_aside(*self._aside(np.array([to])))
+            self._put(np.array([cell]), EMPTY, 0)
+            self._put(np.array([to]), what, kind, loads)
+
+    def move_queen(self, cell: int, nest: int = 0) -> Change:
         """Move the queen of a nest to a cell without rock or food; an ant there moves aside.
 
         AntsError if the cell is not free, or there is no such nest.
         """
         self._check_nest(nest)
-        self._change(lambda one: one.move_queen(cell, nest))
+        grid, ground = self.colony.grid, self.view("ground")
+        if not self._can_be_free(cell):
+            raise AntsError(
+                f"the queen cannot move to cell {tuple(grid.cells(cell).tolist())}, because it is "
+                "not empty; choose an empty cell."
+            )
+        old = int(self.queen_cells[nest])
+        yield from self._start_with([old, cell], [EMPTY, QUEEN | nest << _NUMBER])
+        self._step_aside(*self._aside(np.array([cell])))
+        ground[old], ground[cell] = EMPTY, QUEEN
+        self.queen_cells[nest] = cell
+        closer = World(grid.ranges, grid.cells(cell).tolist()).closer()
+        self.view("closer").reshape(self.colony.n_nests, -1)[nest] = closer
+        self.colony.changed[self.w] = True
+        self._change_food_sources(np.array([cell]), QUEEN)
 
-    def move(self, cell: int, to: int) -> None:
-        """Move the rock, the food or the queen of a cell to another; an ant there moves aside.
-
-        Has no effect if the first cell has none of them, or the other one is not free.
-        """
-        self._change(lambda one: one.move(cell, to))
-
-    def lay_trail(self, cells: Cells, level: int, field: str = TRAIL) -> None:
+    def lay_trail(self, cells: Cells, level: int, field: str = TRAIL) -> Change:
         """Set the trail, or a further field, of cells other than rocks."""
+        cells = self.index(cells)
         number = [TRAIL, *self.colony.fields].index(field)
-        self._change(lambda one: one.lay_in(one.index(cells), level, number))
+        yield
+        self._lay(cells[self.view("walls")[cells] == 0], level, number)
 
-    def add_ants(self, cells: Cells, heading: int | None = None, nest: int | None = None) -> None:
+    def add_ants(self, cells: Cells, heading: int | None = None, nest: int | None = None) -> Change:
         """Put newborn ants on those of the cells that are empty, with random headings by default.
 
         By default, each belongs to the nest of the nearest queen. AntsError if the capacity of the
         colony is too small, or there is no such nest.
         """
         self._check_nest(nest)
-
-        def add(one: _World) -> Change:
-            places = one.index(cells)
-            nests = one.nearest_nests(places) if nest is None else np.full(len(places), nest)
-            return one.add(places, nests, heading)
-
-        self._change(add)
+        cells = self.index(cells)
+        distances = [self.colony.grid.distances(queen)[cells] for queen in self._queens()]
+        nests = np.argmin(distances, axis=0) if nest is None else np.full(len(cells), nest)
+        return self._add(cells, nests, heading)
 
     def add_some(
         self,
         number: int | None,
-        share: float | None,
+        share: float | None = None,
         heading: int | None = None,
         nest: int | None = None,
-    ) -> None:
+    ) -> Change:
         """Put a number of newborn ants, or a share of the living ones, on free start cells.
 
         With a nest, they belong to it, and the share is that of its ants. Else nests take turns.
         AntsError if there is too little room, or no such nest.
         """
         self._check_nest(nest)
-        self._change(lambda one: one.add_some(one.amount(number, share, nest), heading, nest))
+        n, colony, grid = self._amount(number, share, nest), self.colony, self.colony.grid
+        free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
+        if n > len(free):
+            raise AntsError(
+                f"{count(n, 'ant')} cannot join, because there are {count(len(free), 'free cell')};"
+                " add fewer ants."
+            )
+        words = stream_state(colony.seeds[self.w], STREAM_START_CELL, grid.number(grid.cells(free)))
+        queens, near = self._queens(), colony.start == "nest"
+        wanted = range(len(queens)) if nest is None else [nest]
+        orders = [
+            free[np.lexsort((words, grid.distances(queens[nest])[free] * near))] for nest in wanted
+        ]
+        return self._add(_in_turn(orders, n), np.resize(wanted, n), heading)
 
-    def remove_ants(self, cells: Cells, nest: int | None = None) -> None:
+    def remove_ants(self, cells: Cells, nest: int | None = None) -> Change:
         """Remove the ants on these cells, or those of a nest, with the food that they carry."""
         self._check_nest(nest)
-        self._change(lambda one: one.remove_on(one.index(cells), nest))
+        cells = self.index(cells)
+        yield
+        slots = self._living_slots(nest)
+        self._remove(slots[np.isin(self.cells[slots], cells)])
 
-    def remove_some(self, number: int | None, share: float | None, nest: int | None = None) -> None:
+    def remove_some(
+        self, number: int | None, share: float | None = None, nest: int | None = None
+    ) -> Change:
         """Remove a number of random ants, or a share; all ants if there are fewer.
 
         With a nest, remove only its ants.
         """
         self._check_nest(nest)
-        self._change(lambda one: one.remove_some(one.amount(number, share, nest), nest))
+        n = self._amount(number, share, nest)
+        yield
+        slots = self._living_slots(nest)
+        words = self.all.stream(self.w).bits(len(slots))
+        self._remove(slots[np.argsort(words, kind="stable")[:n]])
 
-    def set_ants(self, n: int) -> None:
-        """Set the number of ants, now and, if the changes are lasting, in later episodes.
+    def set_ants(self, n: int) -> Change:
+        """Set the number of ants; see `Interventions.set_ants`."""
+        living = self._living_slots()
+        free = int(np.count_nonzero(self.view("ground") == EMPTY))
+        room = min(self.colony.capacity, free + len(living))
+        if self.all.lasting:
+            room = min(room, int(np.count_nonzero(self.all.starts[self.w] == EMPTY)))
+        if n > room:
+            raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
+        more = n - len(living)
+        return self.add_some(more) if more >= 0 else self.remove_ants(self.cells[living[more:]])
 
-        New ants take free cells in the order of `World.start`; ants with the highest numbers are
-        removed. AntsError if there is too little room.
-        """
-        if self.lasting:
-            self._check_all("the number of ants at the start")
-        self._change(lambda one: one.set_ants(n))
-        if self.lasting:
-            self._changed |= n != self.ants
-            self.ants = n
-
-    def set_task(self, task: Task) -> None:
-        """Set a task that differs only in settings that kernels read as numbers."""
-        self._check_all("the task")
-        colony = self.colony
-        check_same_kernels(colony.task, task, colony.learns)
-        whole = [n for n, pheromone in enumerate(colony.pheromones) if not pheromone.dense]
-        levels = {
-            (one, number): np.maximum(one.stored(number) - one.clock(number), 0)
-            for one in self._each_of_all()
-            for number in whole
-        }
-        colony.set_task(task)
-        for (one, number), level in levels.items():
-            one.stored(number)[:] = np.where(level > 0, level + one.clock(number), 0)
-
-    def set_epsilon(self, epsilon: float) -> None:
-        """Set epsilon, which no longer decays."""
-        self._check_all("epsilon")
-        colony = self.colony
-        colony.epsilon = epsilon
-        colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
-
-    def set_learning_rate(self, learning_rate: float) -> None:
-        """Set the learning rate, which no longer decays; AntsError if no ant learns."""
-        self._check_all("the learning rate")
-        colony = self.colony
-        check_learns(colony.learns)
-        colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
-        colony.set_learning_rate(learning_rate)
-
-    def set_policy(self, q_values: np.ndarray) -> None:
-        """Set the table (n_states, 5) that ants follow; AntsError unless they follow one."""
-        colony = self.colony
-        check_follows(colony.learns or colony.is_given_actions, colony.task)
-        for one in self._each():
-            one.view("q").reshape(-1, len(q_values), ROW)[..., :N_ACTIONS] = q_values
-            note_best_actions(one.view("q"))
-
-    def state(self) -> str:
-        """Return a hash of the whole state; colonies with equal hashes behave identically."""
-        colony = self.colony
-        moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
-        streams = [self.stream(w).state for w in self.worlds]
-        rest = (self.ants, streams, colony.task.as_dict(), colony.training.as_dict())
-        arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
-        arrays |= {f"start {w}": start for w, start in enumerate(self._starts)}
-        digest = hashlib.sha256(files.to_json([*moment, *rest]).encode())
-        for name, array in sorted(arrays.items()):
-            digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
-            digest.update(np.ascontiguousarray(array).data)
-        return digest.hexdigest()
-
-    def stream(self, w: int) -> Stream:
-        """Return the random stream of the present episode of a world."""
-        episode = int(self.colony.arrays["episodes"][w])
-        if w not in self._streams or self._streams[w][0] != episode:
-            stream = Stream(self.colony.seeds[w], STREAM_INTERVENTION, max(episode, 0))
-            self._streams[w] = episode, stream
-        return self._streams[w][1]
-
-    def world(self, w: int = 0) -> World:
-        """Return the world in which later episodes of world number `w` start."""
-        first, grid, start = self._first[w], self.colony.grid, self._starts[w]
-        trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
-        foods, queens = (np.flatnonzero(start & _CONTENT == what) for what in (FOOD, QUEEN))
-        return World(
-            first.ranges,
-            grid.cells(queens[np.argsort(start[queens])]).tolist(),
-            grid.cells(foods),
-            grid.cells(np.flatnonzero((start == OBSTACLE) & grid.exists)),
-            first.trails[start[trails] != OBSTACLE],
-            first.ants[start[ants] == EMPTY],
-            food_kinds=start[foods] >> _NUMBER,
-            regions=first.regions,
-        )
-
-    def begin_episode(self) -> None:
-        """End the present episode, if any, and start the next one; see `Colony.begin_episode`."""
-        colony = self.colony
-        if colony.episode >= 0:
-            colony.end_episode()
-        colony.ants = self.ants
-        worlds = [self.world(w) for w in range(len(self._first))] if self._changed else None
-        colony.begin_episode(self.length, worlds)
-        self._changed = False
-
-    def check_start(self, start: np.ndarray) -> None:
-        """Raise AntsError if later episodes cannot begin with this ground, see `start`."""
-        if not self.lasting:
-            return
-        ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
-        if ants > room:
-            raise AntsError(
-                f"{count(ants, 'ant')} start each episode, but this change would leave "
-                f"{count(int(room), 'free cell')}; leave more cells free."
-            )
-        if self.colony.learns and not (start & _CONTENT == FOOD).any():
-            raise AntsError(
-                "this change would remove the last food item, but ants that learn need at least 1; "
-                "leave one."
-            )
-
-    def begin_with(self, w: int, start: np.ndarray) -> None:
-        """Let later episodes of a world begin with this ground, after `check_start`."""
-        if self.lasting:
-            self._starts[w], self._changed = start, True
-
-    def start(self, w: int) -> np.ndarray:
-        """Return a copy of the ground at the start of a world's later episodes, see `_start_of`."""
-        return self._starts[w].copy() if self.lasting else np.zeros(self.colony.grid.size, np.uint8)
-
-    def _check_all(self, what: str) -> None:
-        running = np.flatnonzero(self.colony.running).tolist()
-        if self.colony.episode >= 0 and not set(running) <= set(self.worlds):
-            raise AntsError(
-                f"the worlds of a colony share {what}, so it cannot change in some of them; change "
-                "all worlds, or make a colony with a single seed."
-            )
-
-    def _check_nest(self, nest: int | None) -> None:
-        if nest is not None:
-            checked_whole("nest", nest, least=0, most=self.colony.n_nests - 1)
-
-    def _change(self, change: Callable[[_World], Change]) -> None:
-        """Make a change in all worlds, after its checks in all; then their ants observe again."""
-        colony, worlds = self.colony, list(self.worlds)
-        colony.check_begun()
-        several = [change(one) for one in self._each()]
-        for one in several:
-            next(one)
-        colony.ready[worlds] = False  # also after Ctrl-C before the end
-        for one in several:
-            next(one, None)
-        colony.observe(worlds)
-        colony.ready[worlds] = True
-
-    def _each(self) -> Iterator[_World]:
-        return (_World(self, w) for w in self.worlds)
-
-    def _each_of_all(self) -> Iterator[_World]:
-        return (_World(self, w) for w in range(len(self.colony.worlds)))
-
-
-class _World:
-    """One world of a colony with interventions; its slots, cells and arrays are of this world."""
-
-    def __init__(self, interventions: Interventions, w: int) -> None:
-        self.all, self.w, self.colony = interventions, w, interventions.colony
-        self.rows = self.colony.arrays["worlds"][:, w]
+    # Parts of changes
 
     def index(self, cells: Cells) -> np.ndarray:
         """Return flat indices, or those of the cells of a region; AntsError if there is none."""
-        if not isinstance(cells, str):
-            return cells
-        return self.colony.worlds[self.w].region(cells)
+        return self.colony.worlds[self.w].region(cells) if isinstance(cells, str) else cells
 
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
@@ -406,7 +249,7 @@ class _World:
         """Return the clock of a pheromone."""
         return self.colony.trail_clock(self.w, number)
 
-    def living_slots(self, nest: int | None = None) -> np.ndarray:
+    def _living_slots(self, nest: int | None = None) -> np.ndarray:
         """Return the slots of the living ants, or those of a nest, in the order of numbers."""
         living = self.colony.living[self.w]
         if nest is not None:
@@ -414,54 +257,45 @@ class _World:
         slots = np.flatnonzero(living)
         return slots[np.argsort(self.view("number")[slots])]
 
-    def amount(self, number: int | None, share: float | None, nest: int | None = None) -> int:
+    def _amount(self, number: int | None, share: float | None, nest: int | None) -> int:
         """Return a number of ants, or the number of a share of the living ones, rounded."""
         if share is None:
             assert number is not None
             return number
-        living = self.rows[WorldRow.LIVING] if nest is None else len(self.living_slots(nest))
-        return int(share * int(living) + 0.5)
+        return int(share * len(self._living_slots(nest)) + 0.5)
 
-    def nearest_nests(self, cells: np.ndarray) -> np.ndarray:
-        """Return the nest of the queen that is nearest to each cell; of the first of several."""
-        grid = self.colony.grid
-        queens = [tuple(cell) for cell in grid.cells(self.queen_cells).tolist()]
-        return np.argmin([grid.distances(queen)[cells] for queen in queens], axis=0)
+    def _check_nest(self, nest: int | None) -> None:
+        if nest is not None:
+            checked_whole("nest", nest, least=0, most=self.colony.n_nests - 1)
 
-    def put(self, cells: np.ndarray, what: int, kind: int = 0) -> Change:
-        """Return the change that makes cells EMPTY, OBSTACLE or FOOD; see `Interventions.put`."""
-        held = self.view("ground")[cells]
-        ants, to = self._aside(cells) if what != EMPTY else (cells[:0], cells[:0])
-        at = self.cells[ants]
-        cells = cells[((held >> 4 == 0) | np.isin(cells, at)) & (held != QUEEN)]  # see `layout`
-        start = self.all.start(self.w)
-        start[cells] = what | kind << _NUMBER
-        self.all.check_start(start)
+    def _queens(self) -> list[Any]:
+        """Return the cell of each nest's queen."""
+        return [tuple(cell) for cell in self.colony.grid.cells(self.queen_cells).tolist()]
+
+    def _start_with(self, cells: Any, contents: Any) -> Change:
+        """Let later episodes begin with these contents of cells, see `_start_of`.
+
+        AntsError if they would have no room for the ants, or no food to learn from.
+        """
+        start, all_ = self.all.start_with(self.w, cells, contents), self.all
         yield
-        self.all.begin_with(self.w, start)
-        self._step_aside(ants, to)
-        self._put(cells, what, kind)
+        if all_.lasting:
+            all_.starts[self.w], all_.changed = start, True
 
     def _put(self, cells: np.ndarray, what: int, kind: int, loads: int | None = None) -> None:
-        """Make cells without ants and queens EMPTY, OBSTACLE or FOOD."""
+        """Make cells without ants and queens EMPTY, OBSTACLE or FOOD, by default with all loads."""
         self.view("ground")[cells] = what
         self.view("walls")[cells] = what == OBSTACLE
         self.colony.changed[self.w] = True
         if what == OBSTACLE:
             for number in range(len(self.colony.pheromones)):
-                self.lay(cells, 0, number)
-        if what == FOOD:
-            self._fill(cells, kind, loads)
-        self._change_food_sources(cells, what, kind)
-
-    def _fill(self, cells: np.ndarray, kind: int, loads: int | None) -> None:
-        """Set the kind of the food in cells, and its loads, by default as many as fit."""
-        colony = self.colony
-        if colony.n_kinds > 1:
+                self._lay(cells, 0, number)
+        if what == FOOD and self.colony.n_kinds > 1:
             self.view("kind_of")[cells] = kind
-        if colony.task.has_loads:
-            full = colony.arrays["food_numbers"][FoodRow.LOADS, kind]
+        if what == FOOD and self.colony.task.has_loads:
+            full = self.colony.arrays["food_numbers"][FoodRow.LOADS, kind]
             self.view("loads")[cells] = full if loads is None else loads
+        self._change_food_sources(cells, what, kind)
 
     def _aside(self, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the slots of the ants on cells that can move aside, and their new cells."""
@@ -491,68 +325,17 @@ class _World:
         ground[to] = ground[at]
         ground[at] = EMPTY
 
-    def move(self, cell: int, to: int) -> Change:
-        """Return the change that moves the content of a cell; see `Interventions.move`."""
-        what = int(self.view("ground")[cell])
-        if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
-            return iter([None])
-        if what == QUEEN:
-            return self.move_queen(to, int(np.argmax(self.queen_cells == cell)))
-        return self._move(cell, to, what)
-
-    def _move(self, cell: int, to: int, what: int) -> Change:
-        """Return the change that moves rock or food."""
-        food, task = what == FOOD, self.colony.task
-        kind = int(self.view("kind_of")[cell]) if food and self.colony.n_kinds > 1 else 0
-        loads = int(self.view("loads")[cell]) if food and task.has_loads else None
-        start = self.all.start(self.w)
-        start[cell], start[to] = EMPTY, what | kind << _NUMBER
-        self.all.check_start(start)
-        yield
-        self.all.begin_with(self.w, start)
-        self._step_aside(*self._aside(np.array([to])))
-        self._put(np.array([cell]), EMPTY, 0)
-        self._put(np.array([to]), what, kind, loads)
-
     def _can_be_free(self, cell: int) -> bool:
         """Return whether a cell is empty, except for an ant that can move aside."""
         slots, _ = self._aside(np.array([cell]))
         return bool(self.view("ground")[cell] == EMPTY) or len(slots) > 0
 
-    def move_queen(self, cell: int, nest: int) -> Change:
-        """Return the change that moves a queen; see `Interventions.move_queen`."""
-        grid, ground = self.colony.grid, self.view("ground")
-        if not self._can_be_free(cell):
-            raise AntsError(
-                f"the queen cannot move to cell {tuple(grid.cells(cell).tolist())}, because it is "
-                "not empty; choose an empty cell."
-            )
-        old = int(self.queen_cells[nest])
-        start = self.all.start(self.w)
-        start[old], start[cell] = EMPTY, QUEEN | nest << _NUMBER
-        self.all.check_start(start)
-        yield
-        self.all.begin_with(self.w, start)
-        self._step_aside(*self._aside(np.array([cell])))
-        ground[old], ground[cell] = EMPTY, QUEEN
-        self.queen_cells[nest] = cell
-        closer = World(grid.ranges, grid.cells(cell).tolist()).closer()
-        self.view("closer").reshape(self.colony.n_nests, -1)[nest] = closer
-        self.colony.changed[self.w] = True
-        self._change_food_sources(np.array([cell]), QUEEN)
-
-    def lay_in(self, cells: np.ndarray, level: int, number: int) -> Change:
-        """Return the change that sets the levels of a pheromone in cells other than rocks."""
-        yield
-        self.lay(cells[self.view("walls")[cells] == 0], level, number)
-
-    def lay(self, cells: np.ndarray, level: int, number: int = 0) -> None:
+    def _lay(self, cells: np.ndarray, level: int, number: int) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
-        stored = self.stored(number)
-        stored[cells] = level + self.clock(number) if level else 0
+        self.stored(number)[cells] = level + self.clock(number) if level else 0
 
-    def add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None = None) -> Change:
-        """Return the change that puts newborn ants of some nests on cells; see `add_ants`."""
+    def _add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None) -> Change:
+        """Put newborn ants of some nests on those of the cells that are empty."""
         colony, ground, rows = self.colony, self.view("ground"), self.rows
         free = ground[cells] == EMPTY
         cells, nests = cells[free], nests[free]
@@ -592,39 +375,7 @@ class _World:
         rows[WorldRow.NEXT_NUMBER] += n
         self._count_ants()
 
-    def add_some(self, n: int, heading: int | None = None, nest: int | None = None) -> Change:
-        """Return the change that puts newborn ants on free cells, in the order of start cells."""
-        colony, grid = self.colony, self.colony.grid
-        free = np.flatnonzero((self.view("ground") == EMPTY) & grid.exists)
-        if n > len(free):
-            raise AntsError(
-                f"{count(n, 'ant')} cannot join, because there are {count(len(free), 'free cell')};"
-                " add fewer ants."
-            )
-        words = stream_state(colony.seeds[self.w], STREAM_START_CELL, grid.number(grid.cells(free)))
-        queens = [tuple(cell) for cell in grid.cells(self.queen_cells).tolist()]
-        wanted = range(len(queens)) if nest is None else [nest]
-        near = colony.start == "nest"
-        orders = [
-            free[np.lexsort((words, grid.distances(queens[one])[free] * near))] for one in wanted
-        ]
-        nests = np.resize(wanted, n)
-        return self.add(_in_turn(orders, n), nests, heading)
-
-    def remove_some(self, n: int, nest: int | None = None) -> Change:
-        """Return the change that removes n random ants."""
-        yield
-        slots = self.living_slots(nest)
-        words = self.all.stream(self.w).bits(len(slots))
-        self.remove(slots[np.argsort(words, kind="stable")[:n]])
-
-    def remove_on(self, cells: np.ndarray, nest: int | None) -> Change:
-        """Return the change that removes the ants on cells, or those of a nest."""
-        yield
-        slots = self.living_slots(nest)
-        self.remove(slots[np.isin(self.cells[slots], cells)])
-
-    def remove(self, slots: np.ndarray) -> None:
+    def _remove(self, slots: np.ndarray) -> None:
         """Remove the ants in some slots."""
         colony = self.colony
         numbers = self.view("number")[slots]
@@ -641,68 +392,251 @@ class _World:
         self.rows[WorldRow.TOP] = np.max(np.flatnonzero(taken), initial=-1) + 1
         self.rows[WorldRow.FIRST_VACANT] = np.argmin(taken) if not taken.all() else len(taken)
 
-    def check_room(self, n: int) -> None:
-        """Raise AntsError if there is no room for n ants."""
-        free = int(np.count_nonzero(self.view("ground") == EMPTY))
-        room = min(self.colony.capacity, free + int(self.rows[WorldRow.LIVING]))
-        if self.all.lasting:
-            room = min(room, int(np.count_nonzero(self.all.start(self.w) == EMPTY)))
-        if n > room:
-            raise AntsError(f"ants is {n}, but there is room for {room}; choose fewer ants.")
-
-    def set_ants(self, n: int) -> Change:
-        """Return the change that sets the number of ants; see `Interventions.set_ants`."""
-        self.check_room(n)
-        more = n - len(self.living_slots())
-        if more >= 0:
-            return self.add_some(more)
-        return self.remove_on(self.cells[self.living_slots()[more:]], None)
-
     def _change_food_sources(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
-        """Add food sources for FOOD on cells, or remove the sources of cells with anything else.
+        """Let the food sources follow a change of cells; see `food_sources.changed`."""
+        colony, arrays, room = self.colony, self.colony.arrays, self.colony.n_food_sources
+        if colony.food_changes:
+            worlds = range(len(colony.worlds))
+            sources = [food_sources.of_world(arrays, w, room) for w in worlds]
+            offsets = colony.grid.offsets
+            now = food_sources.changed(sources[self.w], cells, what, kind, offsets)
+            sources[self.w] = now
+            colony.make_food_sources_fit(now.shape[1])
+            arrays |= food_sources.arrays(
+                sources, arrays["worlds"], colony.n_food_sources, colony.grid.size
+            )
 
-        A waiting source of a cell gets its food back. A new source joins the pile of the first
-        adjacent source, or forms a new pile. The source of the food takes its kind.
+
+def _in_each_world(change: Callable[..., Change]) -> Callable[..., None]:
+    """Return a method of `Interventions` that makes a change of `_World` in each world."""
+
+    @wraps(change)
+    def changed(self: Interventions, *arguments: Any, **named: Any) -> None:
+        self._change(lambda world: change(world, *arguments, **named))
+
+    return changed
+
+
+class Interventions:
+    """Changes of some worlds of a colony, and of the start of their later episodes.
+
+    Cells are flat indices, int (n,), without duplicates, or the name of a region, see `index`. A
+    cell on which something cannot be placed, because an ant, a rock or the queen is on it, does not
+    change. A method that raises an error changes nothing in any world.
+
+    Args:
+        worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
+            of the task, epsilon, the learning rate and the number of ants at the start, so these
+            can only change in all worlds that are still running.
+        lasting: Whether later episodes start with the changes, which requires room for the ants
+            and, if they learn, food.
+
+    Attributes:
+        ants: The number of ants at the start of later episodes.
+        length: The `length` of episodes that an intervention begins.
+
+    Raises:
+        AntsError: The colony does not have one of the worlds.
+    """
+
+    def __init__(
+        self, colony: TickingColony, worlds: Sequence[int] | None = None, lasting: bool = True
+    ) -> None:
+        self.colony, self.ants, self.lasting = colony, colony.ants, lasting
+        self.length: int | None = None
+        self.worlds = self._checked_worlds(worlds)
+        self._first = colony.worlds
+        self.starts = [_start_of(world) for world in colony.worlds] if lasting else []
+        self._streams: dict[int, tuple[int, Stream]] = {}  # by world: the episode and its stream
+        self.changed = False  # whether the next episode starts unlike the present one
+
+    def _checked_worlds(self, worlds: Sequence[int] | None) -> tuple[int, ...]:
+        n = len(self.colony.worlds)
+        several = range(n) if worlds is None else entries_of(worlds)
+        if several is None or not all(
+            isinstance(w, (int, np.integer)) and 0 <= w < n for w in several
+        ):
+            raise AntsError(
+                f"worlds is {shown(worlds)}; it must be a list of numbers from 0 to {n - 1}, or "
+                "None for all worlds."
+            )
+        return tuple(dict.fromkeys(map(int, several)))
+
+    @property
+    def living(self) -> int:
+        """The number of living ants in the first of the worlds."""
+        return int(self.colony.arrays["worlds"][WorldRow.LIVING, self.worlds[0]])
+
+    def index(self, cells: Sequence[Any] | str) -> Cells:
+        """Return the flat indices of cells (x, y, z) or flat indices, without duplicates.
+
+        The name of a region remains. AntsError if a cell or the region does not exist.
         """
-        colony, arrays = self.colony, self.colony.arrays
-        if not colony.food_changes:
-            return
-        several = [self._sources(w) for w in range(len(colony.worlds))]
-        known = several[self.w]
-        if what != FOOD:
-            known = known[:, ~np.isin(known[0], cells)]
-        at, taken, pile, kinds = known.tolist()
-        on: dict[int, list[int]] = {}
-        for source, cell in enumerate(at):
-            on.setdefault(cell, []).append(source)
-        for cell in cells.tolist() if what == FOOD else ():
-            here = on.setdefault(cell, [])
-            if not here:
-                around = [on.get(cell + step, ()) for step in colony.grid.offsets.tolist()]
-                first = min((source for there in around for source in there), default=None)
-                here.append(len(at))
-                at.append(cell)
-                taken.append(0)
-                kinds.append(kind)
-                pile.append(max(pile, default=-1) + 1 if first is None else pile[first])
-            if all(taken[source] >= 0 for source in here):
-                taken[here[0]] = -1
-            (full,) = [source for source in here if taken[source] < 0]
-            kinds[full] = kind
-        _, pile = np.unique(np.array(pile, int), return_inverse=True)  # without removed piles
-        several[self.w] = np.array([at, taken, pile, kinds], int).reshape(4, -1)
-        colony.make_food_sources_fit(len(at))
-        arrays |= food_sources.arrays(
-            several, arrays["worlds"], colony.n_food_sources, colony.grid.size
+        if not isinstance(cells, str):
+            return indices(self.colony.grid, cells)
+        for one in self._each():
+            one.index(cells)
+        return cells
+
+    def is_empty(self, cell: int) -> bool:
+        """Return whether a cell is empty and has no ant, in all of the worlds."""
+        return all(one.view("ground")[cell] == EMPTY for one in self._each())
+
+    def everywhere(self) -> np.ndarray:
+        """Return the flat indices of all cells."""
+        return np.flatnonzero(self.colony.grid.exists)
+
+    put, move = _in_each_world(_World.put), _in_each_world(_World.move)
+    move_queen = _in_each_world(_World.move_queen)
+    lay_trail = _in_each_world(_World.lay_trail)
+    add_ants, add_some = _in_each_world(_World.add_ants), _in_each_world(_World.add_some)
+    remove_ants = _in_each_world(_World.remove_ants)
+    remove_some = _in_each_world(_World.remove_some)
+
+    def set_ants(self, n: int) -> None:
+        """Set the number of ants, now and, if the changes are lasting, in later episodes.
+
+        New ants take free cells in the order of `World.start`; ants with the highest numbers are
+        removed. AntsError if there is too little room.
+        """
+        if self.lasting:
+            self._check_all("the number of ants at the start")
+        self._change(lambda world: world.set_ants(n))
+        if self.lasting:
+            self.changed |= n != self.ants
+            self.ants = n
+
+    def set_task(self, task: Task) -> None:
+        """Set a task that differs only in settings that kernels read as numbers."""
+        self._check_all("the task")
+        colony = self.colony
+        check_same_kernels(colony.task, task, colony.learns)
+        whole = [n for n, pheromone in enumerate(colony.pheromones) if not pheromone.dense]
+        levels = {
+            (one, number): np.maximum(one.stored(number) - one.clock(number), 0)
+            for one in (_World(self, w) for w in range(len(colony.worlds)))
+            for number in whole
+        }
+        colony.set_task(task)
+        for (one, number), level in levels.items():
+            one.stored(number)[:] = np.where(level > 0, level + one.clock(number), 0)
+
+    def set_epsilon(self, epsilon: float) -> None:
+        """Set epsilon, which no longer decays."""
+        self._check_all("epsilon")
+        colony = self.colony
+        colony.epsilon = epsilon
+        colony.training = replace(colony.training, epsilon_decay=1.0, min_epsilon=0.0)
+
+    def set_learning_rate(self, learning_rate: float) -> None:
+        """Set the learning rate, which no longer decays; AntsError if no ant learns."""
+        self._check_all("the learning rate")
+        colony = self.colony
+        check_learns(colony.learns)
+        colony.training = replace(colony.training, learning_rate_decay=1.0, min_learning_rate=0.0)
+        colony.set_learning_rate(learning_rate)
+
+    def set_policy(self, q_values: np.ndarray) -> None:
+        """Set the table (n_states, 5) that ants follow; AntsError unless they follow one."""
+        colony = self.colony
+        check_follows(colony.learns or colony.is_given_actions, colony.task)
+        for one in self._each():
+            one.view("q").reshape(-1, len(q_values), ROW)[..., :N_ACTIONS] = q_values
+            note_best_actions(one.view("q"))
+
+    def state(self) -> str:
+        """Return a hash of the whole state; colonies with equal hashes behave identically."""
+        colony = self.colony
+        moment = (colony.epsilon, colony.learning_rate, colony.length, colony.ticks, colony.ants)
+        streams = [self.stream(w).state for w in self.worlds]
+        rest = (self.ants, streams, colony.task.as_dict(), colony.training.as_dict())
+        arrays = {name: colony.arrays[name] for name in (*colony.stored, "walls", "closer")}
+        arrays |= {f"start {w}": start for w, start in enumerate(self.starts)}
+        digest = hashlib.sha256(files.to_json([*moment, *rest]).encode())
+        for name, array in sorted(arrays.items()):
+            digest.update(f"{name} {array.dtype.str} {array.shape}".encode())
+            digest.update(np.ascontiguousarray(array).data)
+        return digest.hexdigest()
+
+    def stream(self, w: int) -> Stream:
+        """Return the random stream of the present episode of a world."""
+        episode = int(self.colony.arrays["episodes"][w])
+        if w not in self._streams or self._streams[w][0] != episode:
+            stream = Stream(self.colony.seeds[w], STREAM_INTERVENTION, max(episode, 0))
+            self._streams[w] = episode, stream
+        return self._streams[w][1]
+
+    def world(self, w: int = 0) -> World:
+        """Return the world in which later episodes of world number `w` start."""
+        first, grid, start = self._first[w], self.colony.grid, self.starts[w]
+        trails, ants = grid.index(first.trails[:, :3]), grid.index(first.ants[:, :3])
+        foods, queens = (np.flatnonzero(start & _CONTENT == what) for what in (FOOD, QUEEN))
+        return World(
+            first.ranges,
+            grid.cells(queens[np.argsort(start[queens])]).tolist(),
+            grid.cells(foods),
+            grid.cells(np.flatnonzero((start == OBSTACLE) & grid.exists)),
+            first.trails[start[trails] != OBSTACLE],
+            first.ants[start[ants] == EMPTY],
+            food_kinds=start[foods] >> _NUMBER,
+            regions=first.regions,
         )
 
-    def _sources(self, w: int) -> np.ndarray:
-        """Return the food sources of a world as `food_sources.arrays` takes them, (4, n)."""
-        arrays, room = self.colony.arrays, self.colony.n_food_sources
-        n = arrays["worlds"][WorldRow.FOOD_SOURCES, w]
-        of = FoodSourceRow
-        rows = [of.CELL, of.TAKEN, of.PILE, of.KIND]
-        return arrays["food_sources"][rows, w * room : w * room + n]
+    def begin_episode(self) -> None:
+        """End the present episode, if any, and start the next one; see `Colony.begin_episode`."""
+        colony = self.colony
+        if colony.episode >= 0:
+            colony.end_episode()
+        colony.ants = self.ants
+        worlds = [self.world(w) for w in range(len(self._first))] if self.changed else None
+        colony.begin_episode(self.length, worlds)
+        self.changed = False
+
+    def start_with(self, w: int, cells: Any, contents: Any) -> np.ndarray:
+        """Return the start of a world's later episodes with new contents of cells, or nothing.
+
+        AntsError if they cannot begin like this; see `_start_of`.
+        """
+        if not self.lasting:
+            return np.zeros(0, np.uint8)
+        start = self.starts[w].copy()
+        start[cells] = contents
+        ants, room = max(self.ants, self.colony.ants), np.count_nonzero(start == EMPTY)
+        if ants > room:
+            raise AntsError(
+                f"{count(ants, 'ant')} start each episode, but this change would leave "
+                f"{count(int(room), 'free cell')}; leave more cells free."
+            )
+        if self.colony.learns and not (start & _CONTENT == FOOD).any():
+            raise AntsError(
+                "this change would remove the last food item, but ants that learn need at least 1; "
+                "leave one."
+            )
+        return start
+
+    def _check_all(self, what: str) -> None:
+        running = np.flatnonzero(self.colony.running).tolist()
+        if self.colony.episode >= 0 and not set(running) <= set(self.worlds):
+            raise AntsError(
+                f"the worlds of a colony share {what}, so it cannot change in some of them; change "
+                "all worlds, or make a colony with a single seed."
+            )
+
+    def _change(self, change: Callable[[_World], Change]) -> None:
+        """Make a change in all worlds, after its checks in all; then their ants observe again."""
+        colony, worlds = self.colony, list(self.worlds)
+        colony.check_begun()
+        several = [change(one) for one in self._each()]
+        for one in several:
+            next(one)
+        colony.ready[worlds] = False  # also after Ctrl-C before the end
+        for one in several:
+            next(one, None)
+        colony.observe(worlds)
+        colony.ready[worlds] = True
+
+    def _each(self) -> Iterator[_World]:
+        return (_World(self, w) for w in self.worlds)
 
 
 def _start_of(world: World) -> np.ndarray:

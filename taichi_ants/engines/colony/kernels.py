@@ -116,7 +116,7 @@ class Variant:
         self.pheromones = tuple(zip(features.dense, features.views, strict=True))
         pairs = features.cues or ((features.outbound, features.homing),)
         self.cues = tuple(cues_of(features, *pair) for pair in pairs)
-        cues = {number for one in self.cues for number in (one.outbound, one.followed)}
+        cues = {number for cue in self.cues for number in (cue.outbound, cue.followed)}
         self.reads = features.reads
         self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
@@ -127,29 +127,29 @@ class Variant:
         self.n_groups = self.n_nests * max(1, self.n_castes)  # in a world: nests by castes
         self.has_foods, self.has_loads = features.has_foods, features.has_loads
         # Whether deliveries are counted by nest and kind.
-        self.counts_apart = self.n_nests > 1 or self.n_kinds > 1
+        self.counts_by_nest_and_kind = self.n_nests > 1 or self.n_kinds > 1
         # Only then can slots before the last ant be vacant; see `ColonyState.slots_matter`.
         self.slots_matter = features.ants_change or features.own_tables or features.is_given_actions
         self.ants_change, self.food_changes = features.ants_change, features.food_changes
         self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
-        own, none = partial(own_rule, features.rules), ("",) * len(features.dense)
-        self.own_choice = own_inputs.choice(own(features.choice))
-        self.own_reward = own_inputs.reward(own(features.reward))
+        named, none = partial(own_rule, features.rules), ("",) * len(features.dense)
+        self.own_choice = own_inputs.choice(named(features.choice))
+        self.own_reward = own_inputs.reward(named(features.reward))
         self.has_own_choice = self.own_choice is not None
         self.has_own_reward = self.own_reward is not None
-        self.own_deposits = tuple(own_inputs.deposit(own(one)) for one in features.deposits or none)
-        self.own_evaporations = tuple(map(own, features.evaporations or none))
+        self.own_deposits = tuple(map(own_inputs.deposit, map(named, features.deposits or none)))
+        self.own_evaporations = tuple(map(named, features.evaporations or none))
         self.field_numbers = {name: number for number, name in enumerate(features.fields)}
         # Whether pheromones are laid one after the other, because rules of deposits read others.
         lay = [rule for rule in features.rules if rule.kind == "deposit"]
-        self.lays_apart = any(rule.fields for rule in lay)
+        self.lays_in_turn = any(rule.fields for rule in lay)
         self.reads_stimulus = any("stimulus" in rule.inputs for rule in features.rules)
         self.learner = learner
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
-        self.alone = learner is not None and self.own_tables
+        self.independent = learner is not None and self.own_tables
         self.together = learner is not None and not self.own_tables
-        self.begins = self.alone and learner.begin is not None
+        self.begins = self.independent and learner.begin is not None
         self.plans_together = self.together and learner.plans
         if learner is not None:
             self.read_rates = read_rates(learner.hyperparameters)
@@ -194,7 +194,7 @@ def tick_phases(v: Variant) -> Iterator[Phase]:
     if v.traffic.shared:
         yield Phase(ANTS, steps.resolve)
     yield Phase(ANTS, steps.act)
-    if v.lays_apart:
+    if v.lays_in_turn:
         for number in range(len(v.pheromones)):
             yield Phase(ANTS, steps.lays_field(number))
     if v.dense:
@@ -224,7 +224,7 @@ def planning_phases(v: Variant) -> Iterator[Phase]:
 def last_phases(v: Variant) -> Iterator[Phase]:
     """Yield the phases at the end of a tick."""
     if v.ants_change:
-        yield Phase(ANTS, life.retire)
+        yield Phase(ANTS, life.update_slots)
     yield Phase(WORLD, life.end_tick)
 
 
@@ -243,8 +243,8 @@ def do(phase: ti.template(), c: ti.template(), v: ti.template(), chunk):
                 phase.do(c, v, w, chunk, ant, tick)
     elif ti.static(phase.of == CELLS):
         first, last = share_of(c, chunk, c.size)
-        for place in range(w * c.size + first, w * c.size + last * running):
-            phase.do(c, v, place, tick)
+        for index in range(w * c.size + first, w * c.size + last * running):
+            phase.do(c, v, index, tick)
     elif running == 1:
         phase.do(c, v, w, tick)
 
@@ -340,9 +340,9 @@ def read_ahead(c: ti.template()):
 
 
 @ti.func
-def world_of(i, parts, lanes):
+def world_of(i, parts, threads):
     """Return the world of part i: threads that take successive parts get distant worlds."""
-    return (i % lanes) * (parts // lanes) + i // lanes
+    return (i % threads) * (parts // threads) + i // threads
 
 
 @cache
@@ -391,8 +391,8 @@ def ticks(v: Variant, waits: bool, arguments: Any) -> Callable[..., None]:
             if ti.static(waits):
                 part = ti.cast(ti.atomic_add(c.barrier[Barrier.STARTED], 1), ti.i32)
             else:
-                part = world_of(i, parts, c.orders[Order.LANES])
-                n = ti.select(part < c.n_worlds, n, 0)  # the last lane can have fewer worlds
+                part = world_of(i, parts, c.orders[Order.THREADS])
+                n = ti.select(part < c.n_worlds, n, 0)  # the last thread can have fewer worlds
             for _ in range(n):
                 for group in ti.static(groups):
                     at = share(group, c, part, parts, at)

@@ -83,22 +83,22 @@ def stays_idle(c: ti.template(), v: ti.template(), w, ant, random_state):
 @ti.func
 def stops(c: ti.template(), v: ti.template(), w, ant):
     """Return whether a forager that has acted becomes idle, by a draw if it can."""
-    chance, found = of_caste(c, ant, CasteRow.QUIT), False
+    chance, stops = of_caste(c, ant, CasteRow.STOP_PROBABILITY), False
     if chance > 0.0 and trait(c.carries, ant) == 0:
         if is_at_nest(c, v, w, ant):
             c.streams[ant] = advance(c.streams[ant])
             word = high_word(bits_of(c.streams[ant]))
-            found = word < ti.cast(chance * 4294967296.0, ti.u64)
-    return found
+            stops = word < ti.cast(chance * 4294967296.0, ti.u64)
+    return stops
 
 
 @ti.func
 def is_at_nest(c: ti.template(), v: ti.template(), w, ant):
     """Return whether the queen of an ant is on a neighbour of its cell."""
-    queen, found = c.nests[NestRow.QUEEN_CELL, w * v.n_nests + nest_of(c, v, ant)], False
+    queen, sees_queen = c.nests[NestRow.QUEEN_CELL, w * v.n_nests + nest_of(c, v, ant)], False
     for heading in ti.static(range(N_HEADINGS)):
-        found = found | (c.cell[ant] + c.compass[heading + 1] == queen)
-    return found
+        sees_queen = sees_queen | (c.cell[ant] + c.compass[heading + 1] == queen)
+    return sees_queen
 
 
 @ti.func

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from enum import IntEnum, auto
 
+import numpy as np
+
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, OBSTACLE
 
 # Columns are arrays with one entry for each slot. Small values that each tick uses take one byte,
 # which is a quarter of the memory traffic.
-INTEGER_COLUMNS = (
+_INTEGERS = (
     "cell",
     "carried",  # ticks since the pick-up of its food, or, if a field needs it, without food
     "number",  # -1 in a slot that was never used in this episode
@@ -17,7 +19,7 @@ INTEGER_COLUMNS = (
     "age",  # in ticks, if ants are born or die
     "reward",  # of the last action, if rewards are by your own rule
 )
-BYTE_COLUMNS = (
+_BYTES = (
     "heading",
     "carries",
     "stage",  # a `Stage`
@@ -31,7 +33,9 @@ BYTE_COLUMNS = (
     "caste",  # the number of its caste, with castes
     "idle",  # 1 if it does not forage, with `Labour`
 )
-FLOAT_COLUMNS = ("threshold",)  # the response threshold of its ant, with `Labour`
+_FLOATS = ("threshold",)  # the response threshold of its ant, with `Labour`
+COLUMNS: dict[type, tuple[str, ...]] = {np.int32: _INTEGERS, np.int8: _BYTES, np.float32: _FLOATS}
+ALL_COLUMNS = (*_INTEGERS, *_BYTES, *_FLOATS)
 
 
 class Stage(IntEnum):
@@ -95,7 +99,7 @@ class Order(IntEnum):
 
     TICKS = 0  # the number of ticks
     PARTS = auto()  # the number of parts of the work
-    LANES = auto()  # the number of threads among which independent worlds are dealt, see `ticks`
+    THREADS = auto()  # the number of threads among which independent worlds are dealt, see `ticks`
     FIRST = auto()  # the first group of phases that is not done yet
     SPINS = auto()  # the number of checks for the other parts before the first part gives up
     PASSED = auto()  # not a parameter: the ticks since `ColonyState.ticks` was 0, which it counts
@@ -126,7 +130,7 @@ class CasteRow(IntEnum):
     LAYS = auto()  # a bit for each pheromone
     CUES = auto()  # the number of its cues in `Task.all_cues`
     LIFESPAN = auto()  # -1 if it does not die
-    QUIT = auto()  # 0 without a threshold
+    STOP_PROBABILITY = auto()  # 0 without a threshold
     DISTRIBUTION = auto()  # of thresholds, a number in `DISTRIBUTIONS`
     VALUE = auto()
     SPREAD = auto()

@@ -56,8 +56,8 @@ def see_interventions(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Let an ant observe after interventions; an ant that was just added becomes living."""
     if columns.trait(c.stage, ant) == Stage.NEWBORN:
         columns.put(c.stage, ant, Stage.LIVING)
-        if ti.static(v.alone):
-            forget(c, v, ant)
+        if ti.static(v.independent):
+            reset_slot(c, v, ant)
         if ti.static(v.has_labour):
             labour.begin(c, v, w, ant)
     see_anew(c, v, w, ant, tick)
@@ -88,7 +88,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
                 next_action = steps.draw_action(
                     c, v, w, ant, state, paper_state, tick + 1, c.streams[ant]
                 )
-        if ti.static(v.alone):
+        if ti.static(v.independent):
             learn_alone(c, v, ant, state, next_action, tick, stops)
         elif ti.static(v.together):
             share_error(c, v, w, chunk, ant, state, next_action)
@@ -97,7 +97,7 @@ def observe_and_learn(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     note_seen(c, v, ant, paper_state, state)
     if ti.static(v.has_labour):
         next_action = ti.select(stops, -1, next_action)
-        rest(c, v, ant, acts, stops)
+        make_idle(c, v, ant, acts, stops)
     if ti.static(v.draws_next_action):
         columns.put(c.next_action, ant, next_action)
 
@@ -112,7 +112,7 @@ def learns(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def rest(c: ti.template(), v: ti.template(), ant, acts, stops):
+def make_idle(c: ti.template(), v: ti.template(), ant, acts, stops):
     """Make a forager idle if it `stops`; an ant without an action has the last action -1."""
     if not acts:
         columns.put(c.action, ant, -1)
@@ -141,10 +141,10 @@ def rates_of(c: ti.template(), v: ti.template(), caste):
 
 
 @ti.func
-def own_number(c: ti.template(), caste, row: ti.template(), usual):
+def own_number(c: ti.template(), caste, row: ti.template(), default):
     """Return a number of a caste as f32, or `usual` if it has none."""
-    own = c.castes[row, caste]
-    return ti.select(own >= 0.0, ti.cast(own, ti.f32), usual)
+    value = c.castes[row, caste]
+    return ti.select(value >= 0.0, ti.cast(value, ti.f32), default)
 
 
 @ti.func
@@ -165,7 +165,7 @@ def begin_to_learn(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def forget(c: ti.template(), v: ti.template(), ant):
+def reset_slot(c: ti.template(), v: ti.template(), ant):
     """Reset the tables and the memory of a slot for a newborn ant."""
     at = memory_of(c, v, ant)
     for i in range(at.table, steps.table_of(c, v, ant + 1)):
@@ -271,27 +271,27 @@ def list_of(v: ti.template(), chunk):
 @ti.func
 def add_to_sums(c: ti.template(), v: ti.template(), chunk, pair, error, total, count):
     """Add `count` updates of a pair to a chunk's sums, the last of them with this error."""
-    place, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
-    known, n = c.sums_of[SumRow.COUNT, place], c.touched[listed]
-    summed = c.sums[place]
+    entry, listed = v.n_pairs * chunk + pair, list_of(v, chunk)
+    known, n = c.sums_of[SumRow.COUNT, entry], c.touched[listed]
+    summed = c.sums[entry]
     # Without a branch: a new pair stays in the list, others leave their place to the next one.
     # There is room, because a table has pairs that do not exist, see `ROW`.
     c.touched[listed + 1 + n] = pair
     c.touched[listed] = n + ti.cast(known == 0, ti.i32)
     if ti.static(v.learner.plans):
         if known == 0:
-            c.sums_of[SumRow.LATEST, place] = -1
-    c.sums_of[SumRow.COUNT, place] = known + count
-    c.sums[place] = summed + total
-    c.errors[place] = error
+            c.sums_of[SumRow.LATEST, entry] = -1
+    c.sums_of[SumRow.COUNT, entry] = known + count
+    c.sums[entry] = summed + total
+    c.errors[entry] = error
 
 
 @ti.func
-def note_transition(c: ti.template(), place, number, transition):
+def note_transition(c: ti.template(), entry, number, transition):
     """Store the transition of a pair for the model if its ant has the highest number so far."""
-    if number > c.sums_of[SumRow.LATEST, place]:
-        c.sums_of[SumRow.LATEST, place] = number
-        c.sums_of[SumRow.TRANSITION, place] = transition
+    if number > c.sums_of[SumRow.LATEST, entry]:
+        c.sums_of[SumRow.LATEST, entry] = number
+        c.sums_of[SumRow.TRANSITION, entry] = transition
 
 
 @ti.func
@@ -311,16 +311,16 @@ def join_sums(c: ti.template(), v: ti.template(), w):
         listed = list_of(v, chunk)
         for i in range(c.touched[listed]):
             pair = c.touched[listed + 1 + i]
-            place = v.n_pairs * chunk + pair
-            count = c.sums_of[SumRow.COUNT, place]
-            add_to_sums(c, v, first, pair, c.errors[place], c.sums[place], count)
+            entry = v.n_pairs * chunk + pair
+            count = c.sums_of[SumRow.COUNT, entry]
+            add_to_sums(c, v, first, pair, c.errors[entry], c.sums[entry], count)
             if ti.static(v.learner.plans):
                 latest, transition = (
-                    c.sums_of[SumRow.LATEST, place],
-                    c.sums_of[SumRow.TRANSITION, place],
+                    c.sums_of[SumRow.LATEST, entry],
+                    c.sums_of[SumRow.TRANSITION, entry],
                 )
                 note_transition(c, v.n_pairs * first + pair, latest, transition)
-            c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
+            c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
         c.touched[listed] = 0
 
 
@@ -353,22 +353,22 @@ def apply_sums(c: ti.template(), v: ti.template(), w):
     listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
         pair = c.touched[listed + 1 + i]
-        place = v.n_pairs * chunk + pair
-        count = c.sums_of[SumRow.COUNT, place]
-        error, value = c.errors[place], place_in_tables(c, v, w, pair)
+        entry = v.n_pairs * chunk + pair
+        count = c.sums_of[SumRow.COUNT, entry]
+        error, value = c.errors[entry], place_in_tables(c, v, w, pair)
         rate = weight_of(c, v, pair, count)
-        mean = ti.cast(c.sums[place], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
+        mean = ti.cast(c.sums[entry], ti.f64) / (ti.cast(count, ti.f64) * _ONE)
         error = ti.select(count > 1, ti.cast(mean, ti.f32), error)
         c.q[value] = c.q[value] + rate * error
         note_best_actions(c, value)
-        c.sums_of[SumRow.COUNT, place], c.sums[place] = 0, 0
+        c.sums_of[SumRow.COUNT, entry], c.sums[entry] = 0, 0
     c.touched[listed] = 0
 
 
 @ti.func
-def note_best_actions(c: ti.template(), place):
+def note_best_actions(c: ti.template(), entry):
     """Store the best actions of a state, of which one value is at a place in `q`."""
-    row = place & -ROW
+    row = entry & -ROW
     c.q[row + BEST_AT] = ti.cast(best_actions(values_of(c.q, row, 0)), ti.f32)
 
 
@@ -407,10 +407,10 @@ def plan_together(c: ti.template(), v: ti.template(), w, tick):
     listed = list_of(v, chunk)
     for i in range(c.touched[listed]):
         pair = c.touched[listed + 1 + i]
-        place = v.n_pairs * chunk + pair
-        seen = c.sums_of[SumRow.TRANSITION, place]
+        entry = v.n_pairs * chunk + pair
+        seen = c.sums_of[SumRow.TRANSITION, entry]
         reward, terminated = model.reward_of(seen), model.terminated_of(seen)
         error = error_of(c, v, w, pair, reward, terminated, model.next_state_of(seen), -1)
-        c.errors[place] = error
-        c.sums[place] = fixed(error) * c.sums_of[SumRow.COUNT, place]
+        c.errors[entry] = error
+        c.sums[entry] = fixed(error) * c.sums_of[SumRow.COUNT, entry]
     apply_sums(c, v, w)

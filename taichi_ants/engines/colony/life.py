@@ -1,7 +1,7 @@
 """Births, deaths, regrowth of food, and wandering food in a colony.
 
-`grow_old` and `retire` are phases of single ants, in parallel. The others process one whole world
-serially, because they have little to do in a tick.
+`grow_old` and `update_slots` are phases of single ants, in parallel. The others process a whole
+world serially, because they have little to do in a tick.
 """
 
 import taichi as ti
@@ -23,7 +23,7 @@ from taichi_ants.engines.colony.layout import (
     Tally,
     WorldRow,
 )
-from taichi_ants.engines.colony.learning import forget
+from taichi_ants.engines.colony.learning import reset_slot
 from taichi_ants.engines.colony.steps import tally
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_BORN
 from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, OBSTACLE, QUEEN
@@ -49,7 +49,7 @@ def count(c: ti.template(), v: ti.template(), w, tick):
         for row in ti.static(range(len(Tally))):
             c.tallies[first + row] = 0
     c.worlds[WorldRow.DELIVERIES, w] = c.worlds[WorldRow.DELIVERIES, w] + gives
-    if ti.static(v.counts_apart):
+    if ti.static(v.counts_by_nest_and_kind):
         count_by_nest(c, v, w)
     else:
         c.nests[NestRow.STORE, w] = c.nests[NestRow.STORE, w] + gives * c.births
@@ -125,8 +125,8 @@ def give_birth_in(c: ti.template(), v: ti.template(), w, nest):
         if ti.static(v.n_castes > 0):
             put(c.caste, w * c.n_slots + slot, draw_caste(c, v, w, nest))
         place_newborn(c, v, w, nest, w * c.n_slots + slot, queen + c.compass[heading + 1], heading)
-        if ti.static(v.alone):
-            forget(c, v, w * c.n_slots + slot)
+        if ti.static(v.independent):
+            reset_slot(c, v, w * c.n_slots + slot)
         c.nests[NestRow.STORE, column] -= 1
         free = free_around(c, base, queen)
 
@@ -185,13 +185,13 @@ def grow_old(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
             put(c.stage, ant, Stage.DYING)
             tally(c, Tally.DEATHS, chunk, 1)
             left_behind = ti.select(trait(c.carries, ant) == 1, FOOD, EMPTY)
-            place = w * c.size + c.cell[ant]
-            c.ground[place] = ti.cast(left_behind, ti.u8)
+            index = w * c.size + c.cell[ant]
+            c.ground[index] = ti.cast(left_behind, ti.u8)
             if left_behind == FOOD:
                 if ti.static(v.n_kinds > 1):
-                    c.kind_of[place] = ti.cast(trait(c.kind, ant), ti.u8)
+                    c.kind_of[index] = ti.cast(trait(c.kind, ant), ti.u8)
                 if ti.static(v.has_loads):
-                    c.loads[place] = 1
+                    c.loads[index] = 1
 
 
 @ti.func
@@ -208,16 +208,16 @@ def regrow(c: ti.template(), v: ti.template(), w, tick):
         if ti.static(v.has_foods):
             waits = c.food_numbers[FoodRow.REGROWTH, kind]
         if waits >= 0 and taken >= 0 and tick >= taken + waits:
-            place = base + c.food_sources[FoodSourceRow.CELL, source]
-            if c.ground[place] == EMPTY:
-                c.ground[place] = FOOD
+            index = base + c.food_sources[FoodSourceRow.CELL, source]
+            if c.ground[index] == EMPTY:
+                c.ground[index] = FOOD
                 grown = 1
                 if ti.static(v.n_kinds > 1):
-                    c.kind_of[place] = ti.cast(kind, ti.u8)
+                    c.kind_of[index] = ti.cast(kind, ti.u8)
                 if ti.static(v.has_loads):
                     grown = c.food_numbers[FoodRow.LOADS, kind]
-                    c.loads[place] = grown
-                c.source_of[place] = source
+                    c.loads[index] = grown
+                c.source_of[index] = source
                 c.food_sources[FoodSourceRow.TAKEN, source] = -1
                 c.worlds[WorldRow.REGROWN, w] += grown
 
@@ -249,17 +249,17 @@ def move_pile(c: ti.template(), w, pile):
             c.food_sources[FoodSourceRow.MOVES, source] == 1
             and c.food_sources[FoodSourceRow.TAKEN, source] < 0
         ):
-            place = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
-            c.ground[place] = EMPTY
-            c.source_of[place] = -1
+            index = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
+            c.ground[index] = EMPTY
+            c.source_of[index] = -1
     for i in range(c.piles[begins], c.piles[begins + 1]):
         source = listed_source(c, w, i)
         if c.food_sources[FoodSourceRow.MOVES, source] == 1:
             c.food_sources[FoodSourceRow.CELL, source] += step
             if c.food_sources[FoodSourceRow.TAKEN, source] < 0:
-                place = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
-                c.ground[place] = FOOD
-                c.source_of[place] = source
+                index = w * c.size + c.food_sources[FoodSourceRow.CELL, source]
+                c.ground[index] = FOOD
+                c.source_of[index] = source
 
 
 @ti.func
@@ -294,7 +294,7 @@ def can_move(c: ti.template(), w, source, step):
 
 
 @ti.func
-def retire(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
+def update_slots(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     """Free the slot of a dying ant, and let a newborn ant live, at the end of the tick."""
     if trait(c.stage, ant) == Stage.NEWBORN:
         put(c.stage, ant, Stage.LIVING)

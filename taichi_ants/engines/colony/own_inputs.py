@@ -2,7 +2,7 @@
 
 A rule of choice reads what the ant sees before its action. A rule of deposits that reads other
 pheromones reads those that ants lay before it with the deposits of this tick, see
-`Variant.lays_apart`. A rule of rewards runs when the ant observes at the end of a tick, before it
+`Variant.lays_in_turn`. A rule of rewards runs when the ant observes at the end of a tick, before it
 learns, so it reads levels after the tick.
 """
 
@@ -78,7 +78,7 @@ def deposit(rule: OwnRule | None) -> Callable[..., Any] | None:
         return None
 
     def lay(
-        c: Any, v: Any, w: Any, ant: Any, level: Any, place: Any, carried: Any, carries: Any,
+        c: Any, v: Any, w: Any, ant: Any, level: Any, index: Any, carried: Any, carries: Any,
         event: Any, paper_state: Any, tick: Any,
     ) -> Any:  # fmt: skip
         make = {
@@ -90,7 +90,7 @@ def deposit(rule: OwnRule | None) -> Callable[..., Any] | None:
             **_of_ants(c, v, w, ant, tick),
         }
         inputs = {
-            name: make[name]() if name in make else _level(c, v, name, place, tick)
+            name: make[name]() if name in make else _level(c, v, name, index, tick)
             for name in rule.inputs
         }
         return rule.bound(c)(**inputs)
@@ -156,9 +156,9 @@ def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> dict[str, Callable[
     }
 
 
-def _level(c: Any, v: Any, name: str, place: Any, tick: Any) -> Any:
+def _level(c: Any, v: Any, name: str, index: Any, tick: Any) -> Any:
     """Return the level of a cell in the pheromone that an input names."""
-    return level_of(v.field(c, v.field_numbers[field_of(name)]), place, tick)
+    return level_of(v.field(c, v.field_numbers[field_of(name)]), index, tick)
 
 
 @ti.func
@@ -197,16 +197,16 @@ def _ahead(
     which: ti.template()
 ):  # fmt: skip
     """Return one of the results of `cell_ahead` for the cells ahead, i32 (3,)."""
-    found = ti.Vector([0, 0, 0])
+    values = ti.Vector([0, 0, 0])
     for i in ti.static(range(AHEAD)):
         code, _, opens, nears = cell_ahead(c, v, cues, w, ant, seen, paper_state, i)
         if ti.static(which == _CODE):
-            found[i] = code
+            values[i] = code
         elif ti.static(which == _IS_OPEN):
-            found[i] = opens
+            values[i] = opens
         else:
-            found[i] = nears
-    return found
+            values[i] = nears
+    return values
 
 
 @ti.func
@@ -218,16 +218,16 @@ def _levels(
 
     Cells on which no ant can be have level 0, and so do cells that the ant misreads.
     """
-    found = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
+    levels = ti.Vector([ti.f64(0.0), ti.f64(0.0), ti.f64(0.0)])
     carries, heading = trait(c.carries, ant), trait(c.heading, ant)
     for i in ti.static(range(AHEAD)):
-        place = _place(c, w, ant) + step_towards(c.compass, heading, i)
-        shows = (c.ground[place] & 15 == EMPTY) | (c.ground[place] >> 4 != 0)
+        index = _place(c, w, ant) + step_towards(c.compass, heading, i)
+        shows = (c.ground[index] & 15 == EMPTY) | (c.ground[index] >> 4 != 0)
         shows = shows & (code_in_view(seen, i) == code_in_view(paper_state, i))
         level = ti.f64(0.0)
         if ti.static(number < 0):
-            level = ti.cast(cue_level(c, v, cues, carries, place, tick), ti.f64)
+            level = ti.cast(cue_level(c, v, cues, carries, index, tick), ti.f64)
         else:
-            level = ti.cast(level_of(ti.static(v.field(c, number)), place, tick), ti.f64)
-        found[i] = ti.select(shows, level, ti.f64(0.0))
-    return found
+            level = ti.cast(level_of(ti.static(v.field(c, number)), index, tick), ti.f64)
+        levels[i] = ti.select(shows, level, ti.f64(0.0))
+    return levels

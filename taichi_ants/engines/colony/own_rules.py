@@ -12,15 +12,15 @@ from taichi_ants.rules import Rule
 class OwnRule:
     """A rule in kernels: its function, and the place of its parameters in `rule_numbers`."""
 
-    def __init__(self, rule: Rule, place: int) -> None:
+    def __init__(self, rule: Rule, column: int) -> None:
         self.inputs, self.function = tuple(rule.inputs), bounded_function(rule)
-        self.places = range(place, place + len(rule.parameters))
+        self.places = range(column, column + len(rule.parameters))
 
     def bound(self, c: Any) -> Callable[..., Any]:
         """Return a function of inputs by name, for kernels; it ignores inputs that are not read."""
 
         def call(**inputs: Any) -> Any:
-            numbers = [_number(c, place) for place in self.places]
+            numbers = [_number(c, column) for column in self.places]
             return self.function(*(inputs[name] for name in self.inputs), *numbers)
 
         return for_kernels(call)
@@ -28,15 +28,15 @@ class OwnRule:
 
 def own_rule(rules: Sequence[Rule], name: str) -> OwnRule | None:
     """Return the rule of this name; None if there is none. `rules` are all rules of a task."""
-    place = 0
+    column = 0
     for rule in rules:
         if rule.name == name:
-            return OwnRule(rule, place)
-        place += len(rule.parameters)
+            return OwnRule(rule, column)
+        column += len(rule.parameters)
     return None
 
 
 @ti.func
-def _number(c: ti.template(), place: ti.template()):
+def _number(c: ti.template(), column: ti.template()):
     """Return a parameter of a rule."""
-    return c.rule_numbers[place]
+    return c.rule_numbers[column]

@@ -15,10 +15,9 @@ from taichi_ants import arguments, files, learners, runtime
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import (
+    ALL_COLUMNS,
     ANT_GROUND,
-    BYTE_COLUMNS,
-    FLOAT_COLUMNS,
-    INTEGER_COLUMNS,
+    COLUMNS,
     NESTS_BY_KINDS,
     TALLY_WIDTH,
     TOTALS,
@@ -34,7 +33,6 @@ from taichi_ants.engines.colony.layout import (
     usual_schedule,
 )
 from taichi_ants.engines.layout import compass_of, note_best_actions, padded
-from taichi_ants.engines.records import Snapshot, same
 from taichi_ants.errors import (
     AntsError,
     as_array,
@@ -52,6 +50,7 @@ from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
 from taichi_ants.learners.policies import check_finite, checked_values, frozen_policy
+from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.caste import chances_in, numbers_in
 from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, N_ACTIONS, OBSTACLE, ROW
@@ -86,6 +85,16 @@ def column(name: str) -> property:
         return state.arrays[name].reshape(len(state.seeds), state.capacity)
 
     return property(view)
+
+
+def column_or_zeros(name: str, dtype: Any) -> property:
+    """Return a property: a copy of a column, or zeros if this colony does not need the column."""
+
+    def copied(state: ColonyState) -> np.ndarray:
+        shape = len(state.seeds), state.capacity
+        return state.arrays.get(name, np.zeros(shape, dtype)).reshape(shape).astype(dtype)
+
+    return property(copied)
 
 
 class ColonyState:
@@ -265,6 +274,12 @@ class ColonyState:
     paper_states, actions, events = column("paper_state"), column("action"), column("event")
     next_actions, streams = column("next_action"), column("streams")
     _stages, _loads, _states = column("stage"), column("carries"), column("state")
+    _executed, _carried, _kinds = column("executed"), column("carried"), column("kind")
+    # Copies (W, capacity) of what the last ant in each slot is: the numbers of its nest and caste,
+    # int32; whether it is idle, see `Labour`, bool; its response threshold, float32.
+    nests, castes = column_or_zeros("nest", np.int32), column_or_zeros("caste", np.int32)
+    idle = column_or_zeros("idle", bool)
+    thresholds = column_or_zeros("threshold", np.float32)
 
     @property
     def living(self) -> np.ndarray:
@@ -284,9 +299,7 @@ class ColonyState:
     @property
     def executed(self) -> np.ndarray:
         """The last actions as executed, int8 (W, capacity); unless actions slip, `actions`."""
-        if "executed" not in self.arrays:
-            return self.actions
-        return self.arrays["executed"].reshape(len(self.seeds), self.capacity)
+        return self._executed if "executed" in self.arrays else self.actions
 
     @property
     def draws_ahead(self) -> bool:
@@ -353,18 +366,6 @@ class ColonyState:
         return self.capacity if self.one_a_slot else self.n_groups
 
     @property
-    def nests(self) -> np.ndarray:
-        """The nest of the last ant in each slot, int32 (W, capacity)."""
-        if self.n_nests == 1:
-            return np.zeros((len(self.seeds), self.capacity), np.int32)
-        return self.arrays["nest"].reshape(len(self.seeds), -1).astype(np.int32)
-
-    @property
-    def castes(self) -> np.ndarray:
-        """The caste of the last ant in each slot, int32 (W, capacity); 0 without castes."""
-        return self._column_or_zeros("caste", np.int32)
-
-    @property
     def tables_of_ants(self) -> np.ndarray:
         """The table of `owners` by which the last ant in each slot acts, int32 (W, capacity)."""
         if self.one_a_slot:
@@ -372,27 +373,10 @@ class ColonyState:
         return self.nests * np.int32(self.n_groups // self.n_nests) + self.castes
 
     @property
-    def idle(self) -> np.ndarray:
-        """Whether the last ant in each slot is idle, see `Labour`, bool (W, capacity)."""
-        return self._column_or_zeros("idle", bool)
-
-    @property
-    def thresholds(self) -> np.ndarray:
-        """The response threshold of the last ant in each slot, float32 (W, capacity); or 0."""
-        return self._column_or_zeros("threshold", np.float32)
-
-    @property
     def stimuli(self) -> np.ndarray:
         """The present stimulus of each nest, float64 (W, nests); 0 unless labour is divided."""
         stimuli = self.arrays.get("stimulus", np.zeros(len(self.seeds) * self.n_nests))
         return stimuli.reshape(len(self.seeds), -1).copy()
-
-    def _column_or_zeros(self, name: str, dtype: Any) -> np.ndarray:
-        """Return a copy of a column (W, capacity), of zeros if this colony does not need it."""
-        shape = len(self.seeds), self.capacity
-        if name not in self.arrays:
-            return np.zeros(shape, dtype)
-        return self.arrays[name].reshape(shape).astype(dtype)
 
     @property
     def rewards(self) -> np.ndarray:
@@ -401,7 +385,7 @@ class ColonyState:
             return self.arrays["reward"].reshape(self.events.shape).copy()
         rewards = self.task.rewards.by_event()[self.events]
         if self.task.foods:
-            kinds = self.arrays["kind"].reshape(rewards.shape) if self.n_kinds > 1 else 0
+            kinds = self._kinds if self.n_kinds > 1 else 0
             picked_up, delivered = self.arrays["food_numbers"][:2, kinds]
             rewards = np.where(self.events == Event.PICKED_UP, picked_up, rewards)
             rewards = np.where(self.events == Event.DELIVERED, delivered, rewards)
@@ -444,21 +428,17 @@ class ColonyState:
         ground = self.arrays["ground"][cells].copy()
         ground[ant_cells] = EMPTY
         carries = self.carrying[world, living]
-        carried = self.arrays["carried"].reshape(self.cells.shape)[world, living]
         fields = {name: self._levels(world, name) for name in (TRAIL, *self.fields)}
         of_ants, of_cells = np.zeros(len(ant_cells), np.int32), np.zeros(self.grid.size, np.uint8)
         if self.n_kinds > 1:
-            of_ants = self.arrays["kind"].reshape(self.cells.shape)[world, living].astype(np.int32)
+            of_ants = self._kinds[world, living].astype(np.int32)
             of_cells = np.where(ground == FOOD, self.arrays["kind_of"][cells], np.uint8(0))
         queens = self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)[world]
         counts: dict[str, Any] = {n: int(array[world]) for n, array in self._counts().items()}
         apart = self._deliveries_apart()
-        counts["nest_deliveries"] = apart["deliveries_by_nest_and_kind"][world].sum(
-            axis=1, dtype=np.int32
-        )
-        counts["food_deliveries"] = apart["deliveries_by_nest_and_kind"][world].sum(
-            axis=0, dtype=np.int32
-        )
+        by_nest_and_kind = apart["deliveries_by_nest_and_kind"][world]
+        counts["nest_deliveries"] = by_nest_and_kind.sum(axis=1, dtype=np.int32)
+        counts["food_deliveries"] = by_nest_and_kind.sum(axis=0, dtype=np.int32)
         counts["caste_deliveries"] = apart["caste_deliveries"][world].copy()
         return Snapshot(
             self.grid,
@@ -467,7 +447,7 @@ class ColonyState:
             ant_cells,
             self.headings[world, living].astype(np.int32),
             carries,
-            ant_carried=np.where(carries, carried, np.int32(0)),
+            ant_carried=np.where(carries, self._carried[world, living], np.int32(0)),
             ant_numbers=self.numbers[world, living],
             ant_actions=self.actions[world, living].astype(np.int32),
             ant_events=self.events[world, living].astype(np.int32),
@@ -650,8 +630,7 @@ class ColonyState:
 
     def columns(self) -> tuple[str, ...]:
         """Return the names of the arrays with one entry for each slot."""
-        of_ants = (*INTEGER_COLUMNS, *BYTE_COLUMNS, *FLOAT_COLUMNS)
-        return (*(name for name in of_ants if name in self.arrays), "streams")
+        return (*(name for name in ALL_COLUMNS if name in self.arrays), "streams")
 
     # Arrays
 
@@ -676,6 +655,7 @@ class ColonyState:
         of_nests = np.zeros((len(NestRow), len(worlds) * self.n_nests), np.int32)
         queens = self._of_each(lambda world: world.grid.index(world.queens))
         of_nests[NestRow.QUEEN_CELL] = queens.reshape(-1)
+        by_caste = np.zeros(len(worlds) * len(self.task.castes), np.int32)
         foods = [food_sources.at_start(world) for world in worlds] if self.n_food_sources else []
         return {
             # The start cells and headings of ants, by world and number.
@@ -688,19 +668,22 @@ class ColonyState:
             # The clock at which a cell's trail has evaporated; if dense, its level.
             array_of(0, self.pheromone.dense): levels.reshape(-1),
             # The same for each further field, which is empty at the start.
-            **{
-                array_of(number, field.dense): np.zeros(
-                    len(worlds), np.float32 if field.dense else np.int32
-                )
-                for number, field in enumerate(self.fields.values(), start=1)
-            },
+            **self._further_fields(len(worlds)),
             "worlds": rows,
             "nests": of_nests,
             **self._foods_at_start(ground),
-            **self._groups_at_start(),
+            **({"caste_deliveries": by_caste} if len(by_caste) else {}),
+            **({"stimulus": np.zeros(of_nests.shape[1])} if self.task.labour.divides else {}),
             # Sums over all ants in this episode, see `Tally`.
             "totals": np.zeros((len(TOTALS), len(worlds)), np.int64),
             **food_sources.arrays(foods, rows, self.n_food_sources, self.grid.size),
+        }
+
+    def _further_fields(self, n: int) -> Arrays:
+        """Return empty arrays (n,) of the pheromones except the trail."""
+        return {
+            array_of(number, field.dense): np.zeros(n, np.float32 if field.dense else np.int32)
+            for number, field in enumerate(self.fields.values(), start=1)
         }
 
     def _foods_at_start(self, ground: np.ndarray) -> Arrays:
@@ -729,56 +712,33 @@ class ColonyState:
             castes[w, ours] = np.repeat(np.arange(len(numbers)), numbers)
         return castes
 
-    def _groups_at_start(self) -> Arrays:
-        """Return the deliveries by caste and the stimulus of each nest, if the task needs them."""
-        n_worlds = len(self.worlds)
-        arrays: Arrays = {}
-        if self.task.castes:
-            arrays["caste_deliveries"] = np.zeros(n_worlds * len(self.task.castes), np.int32)
-        if self.task.labour.divides:
-            arrays["stimulus"] = np.zeros(n_worlds * self.n_nests)
-        return arrays
-
     def _of_episode(self) -> Arrays:
         """Return the arrays that change in an episode, at its start."""
         n_worlds, dense = len(self.worlds), self.pheromone.dense
         slots, cells = n_worlds * self.capacity, n_worlds * self.grid.size
-        noise = self.task.noise
-        unused = set() if noise.slip else {"executed"}
-        if self.task.sees.name == "paper" and not noise.misread:
-            unused.add("state")  # the paper's state is the state
-        if not self.ants_change:
-            unused.add("age")
-        if not self.draws_ahead:
-            unused.add("next_action")
-        if self.n_nests == 1:
-            unused.add("nest")
-        if self.n_kinds == 1:
-            unused.add("kind")
-        if not self.task.castes:
-            unused.add("caste")
-        if not self.task.labour.divides:
-            unused |= {"idle", "threshold"}
-        if self.task.reward == "by_event":
-            unused.add("reward")
+        task, divides = self.task, self.task.labour.divides
+        used = {
+            "executed": task.noise.slip > 0,
+            "state": task.sees.name != "paper" or task.noise.misread > 0,  # else the paper's state
+            "age": self.ants_change,
+            "next_action": self.draws_ahead,
+            "nest": self.n_nests > 1,
+            "kind": self.n_kinds > 1,
+            "caste": bool(task.castes),
+            "idle": divides,
+            "threshold": divides,
+            "reward": task.reward != "by_event",
+        }
         made = {
             **{name: array.copy() for name, array in self._at_start().items()},
             "trail": np.zeros(1 if dense else cells, np.int32),
             "level": np.zeros(cells if dense else 1, np.float32),
-            **{
-                array_of(number, field.dense): np.zeros(
-                    cells, np.float32 if field.dense else np.int32
-                )
-                for number, field in enumerate(self.fields.values(), start=1)
-            },
+            **self._further_fields(cells),
         }
-        kinds: tuple[tuple[tuple[str, ...], type], ...] = (
-            *((INTEGER_COLUMNS, np.int32), (BYTE_COLUMNS, np.int8), (FLOAT_COLUMNS, np.float32)),
-        )
-        for names, dtype in kinds:
-            used = [name for name in names if name not in unused]
+        for dtype, names in COLUMNS.items():
+            needed = [name for name in names if used.get(name, True)]
             # One allocation, because columns at equal offsets in pages slow each other down.
-            made |= zip(used, np.zeros((len(used), slots), dtype), strict=True)
+            made |= zip(needed, np.zeros((len(needed), slots), dtype), strict=True)
         self._set_to_start(made)
         return made
 
@@ -790,20 +750,12 @@ class ColonyState:
         """Reset the arrays that change in an episode, for these worlds."""
         self._copy_worlds(arrays, self._at_start(), which)
         shape = len(self.worlds), self.capacity
-        column = {
-            name: arrays[name].reshape(shape)
-            for name in (*INTEGER_COLUMNS, *BYTE_COLUMNS, *FLOAT_COLUMNS)
-            if name in arrays
-        }
+        column = {name: arrays[name].reshape(shape) for name in ALL_COLUMNS if name in arrays}
         for name, array in column.items():
             array[which] = -1 if name in _UNKNOWN else 0
         n = self.at_start["start_cells"].shape[1]
-        column["cell"][which, :n] = self.at_start["start_cells"][which]
-        column["heading"][which, :n] = self.at_start["start_headings"][which]
-        if "nest" in column:
-            column["nest"][which, :n] = self.at_start["start_nests"][which]
-        if "caste" in column:
-            column["caste"][which, :n] = self.at_start["start_castes"][which]
+        for name in column.keys() & {"cell", "heading", "nest", "caste"}:
+            column[name][which, :n] = self.at_start[f"start_{name}s"][which]
         column["number"][which, :n] = np.arange(n)
         column["stage"][which, :n] = Stage.LIVING
 

@@ -33,21 +33,21 @@ class ThreadChoice:
 
     def __init__(self) -> None:
         self._launches = 0
-        self._paces: dict[int, float] = {}  # seconds per tick, by number of threads
+        self._seconds_per_tick: dict[int, float] = {}  # by number of threads
 
     def plan(self, ticks: int, most: int) -> tuple[int, int]:
         """Return the number of ticks for the next launch, and of threads, up to `most`."""
         if most == 1:
             return ticks, 1
         self._launches += 1
-        best, other = sorted((most, 1), key=lambda n: self._paces.get(n, math.inf))
+        best, other = sorted((most, 1), key=lambda n: self._seconds_per_tick.get(n, math.inf))
         if self._launches % _LAUNCHES_BETWEEN_PROBES == 2:
             return max(1, ticks // _LAUNCHES_BETWEEN_PROBES), other
         return ticks, best
 
-    def took(self, threads: int, seconds: float) -> None:
+    def record(self, threads: int, seconds: float) -> None:
         """Record the seconds per tick on a number of threads."""
-        self._paces[threads] = seconds
+        self._seconds_per_tick[threads] = seconds
 
 
 class Stepper:
@@ -75,11 +75,11 @@ class Stepper:
         end = state.ticks + n
         if state.schedule == "by_world":
             n_worlds = len(state.seeds)
-            lanes = lanes_for(n_worlds)
-            self._launch_ticks(state, n, parts=lanes * -(-n_worlds // lanes), lanes=lanes)
+            threads = threads_for(n_worlds)
+            self._launch_ticks(state, n, parts=threads * -(-n_worlds // threads), threads=threads)
             return
-        usual = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
-        interval = max(_FEWEST_TICKS, min(_MOST_TICKS, usual))
+        interval = _STEPS_BETWEEN_SORTS // (len(state.seeds) * state.capacity)
+        interval = max(_FEWEST_TICKS, min(_MOST_TICKS, interval))
         while state.ticks < end:
             if state.ticks % interval == 0:
                 state.sort_ants()
@@ -95,17 +95,17 @@ class Stepper:
 
     def _share_ticks(self, state: ColonyState, n: int) -> None:
         """Advance by up to n ticks, which threads share."""
-        most = min(runtime.start().threads, runtime.available_threads(), state.chunks)
-        n, threads = self.threads.plan(n, most)
+        n_threads = min(runtime.start().threads, runtime.available_threads(), state.chunks)
+        n, threads = self.threads.plan(n, n_threads)
         compiled, began = "ticks" in self._launches, time.perf_counter()
         self._launch_ticks(state, n, threads)
         if compiled:
-            self.threads.took(threads, (time.perf_counter() - began) / n)
+            self.threads.record(threads, (time.perf_counter() - began) / n)
 
-    def _launch_ticks(self, state: ColonyState, n: int, parts: int, lanes: int = 1) -> None:
+    def _launch_ticks(self, state: ColonyState, n: int, parts: int, threads: int = 1) -> None:
         """Advance by n ticks in one launch, and a second one if the first gave up at a barrier."""
         orders, barrier = state.arrays["orders"], state.arrays["barrier"]
-        orders[: Order.PASSED], barrier[:] = (n, parts, lanes, 0, _SPINS), 0
+        orders[: Order.PASSED], barrier[:] = (n, parts, threads, 0, _SPINS), 0
         try:
             self.launch(state, "ticks")
         finally:  # Ctrl-C during a launch raises an error after it
@@ -139,15 +139,15 @@ def features_of(state: ColonyState) -> Features:
     )
 
 
-def lanes_for(n_worlds: int) -> int:
-    """Return the number of threads among which independent worlds are dealt, see `Order.LANES`."""
+def threads_for(n_worlds: int) -> int:
+    """Return the number of threads among which worlds are dealt, see `Order.THREADS`."""
     return min(runtime.start().threads, n_worlds)
 
 
 def _field_numbers(state: ColonyState) -> dict[str, Any]:
     """Return the numbers of further fields, empty without fields."""
     fields = state.fields.values()
-    counts = {"counts_without_food": int(any(one.counts_without_food for one in fields))}
+    counts = {"counts_without_food": int(any(field.counts_without_food for field in fields))}
     return (counts if fields else {}) | {
         f"{name}_{number}": value
         for number, field in enumerate(fields, start=1)

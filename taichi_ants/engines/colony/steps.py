@@ -194,15 +194,15 @@ def strongest_of(c: ti.template(), field: ti.template(), left, forward, right, t
 
 
 @ti.func
-def cue_level(c: ti.template(), v: ti.template(), cues: ti.template(), carries, place, tick):
+def cue_level(c: ti.template(), v: ti.template(), cues: ti.template(), carries, index, tick):
     """Return the level of a cell in the pheromone that an ant with this load follows.
 
     If ants have a compass, this is the outbound cue for all ants, or `Choice.carriers_follow`.
     """
-    level = ti.cast(level_of(ti.static(v.field(c, cues.outbound)), place, tick), v.level_type)
+    level = ti.cast(level_of(ti.static(v.field(c, cues.outbound)), index, tick), v.level_type)
     if ti.static(cues.followed != cues.outbound):
         followed = ti.static(v.field(c, cues.followed))
-        homing = ti.cast(level_of(followed, place, tick), v.level_type)
+        homing = ti.cast(level_of(followed, index, tick), v.level_type)
         level = ti.select(carries == 1, homing, level)
     return level
 
@@ -233,10 +233,10 @@ def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant,
     view = v.view_type(carries=carries, own_level=cue_level(c, v, cues, carries, here, tick))
     cells = ti.static(v.observation.cells)
     for k in ti.static(range(len(cells))):
-        place = here + step_around(c.compass, heading, cells[k])
-        held = ti.cast(c.ground[place] >> 4, ti.i32)  # 0 without an ant
-        standable = (c.ground[place] & 15 == EMPTY) | (held != 0)
-        view.levels[k] = ti.select(standable, cue_level(c, v, cues, carries, place, tick), 0)
+        index = here + step_around(c.compass, heading, cells[k])
+        held = ti.cast(c.ground[index] >> 4, ti.i32)  # 0 without an ant
+        standable = (c.ground[index] & 15 == EMPTY) | (held != 0)
+        view.levels[k] = ti.select(standable, cue_level(c, v, cues, carries, index, tick), 0)
         # 0 without an ant, 1 with a forager, 2 with a carrier.
         view.ants[k] = (held + 1) >> 3
         if ti.static(v.n_nests > 1):
@@ -247,8 +247,8 @@ def view_around(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant,
             view.nearer[k] = nearer >> (cells[k] % N_HEADINGS) & 1
         else:
             view.nearer[k] = ti.cast(view.levels[k] > view.own_level, ti.i32)
-        view.codes[k] = looks_of(c, v, place, queen)
-        read_fields(c, v, view, k, place, standable, tick)
+        view.codes[k] = looks_of(c, v, index, queen)
+        read_fields(c, v, view, k, index, standable, tick)
     read_own_levels(c, v, view, here, tick)
     view.strongest = strongest_cue(c, v, cues, carries, here, heading, tick)
     fill_codes(cues.half, cues.homing_view, view, v.observation)
@@ -265,10 +265,10 @@ set_entry._is_taichi_function = False  # type: ignore[attr-defined]
 
 
 @ti.func
-def read_fields(c: ti.template(), v: ti.template(), view: ti.template(), k, place, standable, tick):
+def read_fields(c: ti.template(), v: ti.template(), view: ti.template(), k, index, standable, tick):
     """Set the levels of cell number k of a view in the pheromones that the observation reads."""
     for i in ti.static(range(len(v.reads))):
-        level = level_of(ti.static(v.field(c, v.reads[i])), place, tick)
+        level = level_of(ti.static(v.field(c, v.reads[i])), index, tick)
         noise.entry_of(view, v.observation.reads[i])[k] = ti.select(standable, level, 0)
 
 
@@ -281,21 +281,21 @@ def read_own_levels(c: ti.template(), v: ti.template(), view: ti.template(), her
 
 
 @ti.func
-def looks_of(c: ti.template(), v: ti.template(), place, queen):
+def looks_of(c: ti.template(), v: ti.template(), index, queen):
     """Return the ground of a cell, i32, as an ant sees it whose queen is on the cell `queen`.
 
     Ants, and the queens of other nests, look like obstacles.
     """
-    ground = ti.cast(c.ground[place] & 15, ti.i32)
+    ground = ti.cast(c.ground[index] & 15, ti.i32)
     if ti.static(v.n_nests > 1):
-        ground = ti.select((ground == QUEEN) & (place != queen), OBSTACLE, ground)
+        ground = ti.select((ground == QUEEN) & (index != queen), OBSTACLE, ground)
     return ground
 
 
 @ti.func
-def holds_nestmate(c: ti.template(), v: ti.template(), ant, place):
+def holds_nestmate(c: ti.template(), v: ti.template(), ant, index):
     """Return whether an ant of the same nest is on a cell; others are obstacles."""
-    held = ti.cast(c.ground[place] >> 4, ti.i32)
+    held = ti.cast(c.ground[index] >> 4, ti.i32)
     holds = held != 0
     if ti.static(v.n_nests > 1):
         holds = held & ANT_STANDS == ANT_STANDS - nest_of(c, v, ant)
@@ -360,7 +360,7 @@ def draw_action(c: ti.template(), v: ti.template(), w, ant, state, paper_state, 
 def best_actions_of(c: ti.template(), v: ti.template(), table, state):
     """Return the `best_actions` of a state; they are stored unless ants have their own tables."""
     best = 0
-    if ti.static(v.alone):
+    if ti.static(v.independent):
         best = best_actions(values_of(c.q, table, state))
     else:
         best = ti.cast(c.q[table + state * ROW + BEST_AT], ti.i32)
@@ -411,12 +411,12 @@ def cell_ahead(
     is_true = code == vision.code_in_view(paper_state, i)
     opens = ti.cast(is_open(code), ti.i32)
     nears = ti.cast(code == SEES_CUE, ti.i32) & ti.static(int(cues.has_compass))
-    place = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
-    if is_true & (c.ground[place] >> 4 != 0):  # an ant stands there
+    index = w * c.size + c.cell[ant] + step_towards(c.compass, heading, i)
+    if is_true & (c.ground[index] >> 4 != 0):  # an ant stands there
         nearer = vision.nearer_from(c.closer[own_map(c, v, w, ant)], heading)
         nears = nearer >> ti.static((i - 1) % N_HEADINGS) & ti.static(int(cues.has_compass))
         if ti.static(v.traffic.shared):
-            if holds_nestmate(c, v, ant, place):
+            if holds_nestmate(c, v, ant, index):
                 opens = 1 if ti.static(v.traffic.follow) else carries
     return code, ti.cast(is_true, ti.i32), opens, nears
 
@@ -426,12 +426,12 @@ def explore_below_of(c: ti.template(), v: ti.template(), w, ant):
     """Return the bound of a random 32-bit word below which an ant explores, u64."""
     bound = c.explore_below
     if ti.static(v.n_castes > 0):
-        own = of_caste(c, ant, CasteRow.EPSILON)
-        if own >= 0.0:
+        of_own_caste = of_caste(c, ant, CasteRow.EPSILON)
+        if of_own_caste >= 0.0:
             if ti.static(v.epsilon_varies):
                 spread = of_caste(c, ant, CasteRow.EPSILON_SPREAD)
-                own += spread * (2.0 * individual(c, w, ant) - 1.0)
-            bound = ti.cast(own * 4294967296.0, ti.u64)
+                of_own_caste += spread * (2.0 * individual(c, w, ant) - 1.0)
+            bound = ti.cast(of_own_caste * 4294967296.0, ti.u64)
     return bound
 
 
@@ -466,8 +466,8 @@ def draw_cell(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, s
         codes[i], is_true, opens[i], nears[i] = cell_ahead(
             c, v, cues, w, ant, state, paper_state, i
         )
-        place = here + step_towards(c.compass, heading, i)
-        level = cue_level(c, v, cues, carries, place, tick)
+        index = here + step_towards(c.compass, heading, i)
+        level = cue_level(c, v, cues, carries, index, tick)
         weights[i] = attraction(ti.select(is_true == 1, level, 0), k, exponent)
     return choose_cell(carries, codes, opens, nears, weights, bits)
 
@@ -550,7 +550,7 @@ def resolve(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if ti.static(v.traffic.reward_pushed):  # then a pushed ant may need the event, too
         put(c.event, ant, event_of(c, v, w, ant, tick))
     if wanted != cell:
-        if conflicts.prevails(c, v.traffic, base, cell, wanted, tick):
+        if conflicts.wins_cell(c, v.traffic, base, cell, wanted, tick):
             if ti.static(not v.traffic.reward_pushed):
                 put(c.event, ant, event_of(c, v, w, ant, tick))
             c.wants[base + cell] = c.wants[base + cell] | ti.u8(conflicts.WINS)
@@ -599,9 +599,9 @@ def is_better(
 
 
 @ti.func
-def is_stronger(field: ti.template(), place, other, tick):
+def is_stronger(field: ti.template(), index, from_index, tick):
     """Return whether the level of a cell is higher than that of another one."""
-    return level_of(field, place, tick) > level_of(field, other, tick)
+    return level_of(field, index, tick) > level_of(field, from_index, tick)
 
 
 @ti.func
@@ -623,7 +623,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         enters = ti.cast(entered, ti.i32)
         takes = (moves == 0) & (wanted != cell)
     else:
-        won = conflicts.prevails(c, v.traffic, base, cell, wanted, tick)
+        won = conflicts.wins_cell(c, v.traffic, base, cell, wanted, tick)
         # Arithmetic, because the compiler would make branches, which nothing can predict here.
         enters, takes = ti.cast(won, ti.i32) & moves, won & (moves == 0)
         goes = cell + enters * (wanted - cell)
@@ -635,10 +635,10 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
     if carries == 1:
         carried = age
         if goes != cell:
-            if ti.static(not v.lays_apart):
+            if ti.static(not v.lays_in_turn):
                 if lays(c, v, ant, 0):
-                    place = base + goes
-                    deposit(c, v, trail, w, ant, place, tick, carried, carries, event, paper_state)
+                    index = base + goes
+                    deposit(c, v, trail, w, ant, index, tick, carried, carries, event, paper_state)
         elif can_give(action, paper_state):
             tally(c, Tally.CARRIED, chunk, carried)
             event, carries, carried = ti.cast(Event.DELIVERED, ti.i32), 0, -1
@@ -652,7 +652,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         put(c.carries, ant, 1)
         c.carried[ant] = 1
         take_load(c, v, ant, base + wanted, tick)
-        if ti.static(not v.lays_apart):
+        if ti.static(not v.lays_in_turn):
             if lays(c, v, ant, 0):
                 deposit(c, v, trail, w, ant, base + wanted, tick, 0, carries, event, paper_state)
                 deposit(c, v, trail, w, ant, base + cell, tick, 0, carries, event, paper_state)
@@ -662,7 +662,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
         occasions = occasions_of(had_food, paper_state, action, event, goes != cell)
         if ti.static(v.has_labour):
             occasions *= 1 - trait(c.idle, ant)
-        fields = ti.static([] if v.lays_apart else v.further_fields(c))
+        fields = ti.static([] if v.lays_in_turn else v.further_fields(c))
         for i in ti.static(range(len(fields))):
             if lays(c, v, ant, i + 1):
                 field = ti.static(fields[i])
@@ -689,7 +689,7 @@ def act(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
 
 @cache
 def lays_field(number: int) -> Callable[..., None]:
-    """Return the `do` of a phase after `act` in which ants lay a pheromone, see `lays_apart`."""
+    """Return the `do` of a phase after `act` in which ants lay a pheromone, see `lays_in_turn`."""
 
     @ti.func
     def lay_apart(c: ti.template(), v: ti.template(), w, chunk, ant, tick):
@@ -735,14 +735,14 @@ def tally(c: ti.template(), state, chunk, n):
 @ti.func
 def count_apart(c: ti.template(), v: ti.template(), ant, chunk):
     """Count a delivery by nest and kind of food, if there are several, and by caste."""
-    if ti.static(v.counts_apart):
-        place = chunk * NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
+    if ti.static(v.counts_by_nest_and_kind):
+        column = chunk * NESTS_BY_KINDS + nest_of(c, v, ant) * v.n_kinds
         if ti.static(v.n_kinds > 1):
-            place += trait(c.kind, ant)
-        c.delivered[place] = c.delivered[place] + 1
+            column += trait(c.kind, ant)
+        c.delivered[column] = c.delivered[column] + 1
     if ti.static(v.n_castes > 0):
-        own = chunk * MAX_CASTES + trait(c.caste, ant)
-        c.delivered_by_caste[own] = c.delivered_by_caste[own] + 1
+        column = chunk * MAX_CASTES + trait(c.caste, ant)
+        c.delivered_by_caste[column] = c.delivered_by_caste[column] + 1
 
 
 @ti.func
@@ -773,24 +773,24 @@ def event_reward(c: ti.template(), v: ti.template(), ant):
 
 
 @ti.func
-def take_load(c: ti.template(), v: ti.template(), ant, place, tick):
+def take_load(c: ti.template(), v: ti.template(), ant, index, tick):
     """Take a load of food from a cell, which becomes empty with its last load."""
-    left = 0
+    loads_left = 0
     if ti.static(v.n_kinds > 1):
-        put(c.kind, ant, ti.cast(c.kind_of[place], ti.i32))
+        put(c.kind, ant, ti.cast(c.kind_of[index], ti.i32))
     if ti.static(v.has_loads):
-        left = c.loads[place] - 1
-        c.loads[place] = left
-    if left == 0:
-        c.ground[place] = EMPTY
-        take_from_source(c, place, tick)
+        loads_left = c.loads[index] - 1
+        c.loads[index] = loads_left
+    if loads_left == 0:
+        c.ground[index] = EMPTY
+        take_from_source(c, index, tick)
 
 
 @ti.func
-def take_from_source(c: ti.template(), place, tick):
+def take_from_source(c: ti.template(), index, tick):
     """Let the food source whose food was taken from a cell, if any, wait from now on."""
     if c.n_food_sources > 0:
-        source = c.source_of[place]
+        source = c.source_of[index]
         if source >= 0:
             c.food_sources[FoodSourceRow.TAKEN, source] = tick
-            c.source_of[place] = -1
+            c.source_of[index] = -1

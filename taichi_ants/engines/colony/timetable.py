@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_ants import measures
 from taichi_ants.engines.colony.interventions import Interventions
+from taichi_ants.engines.colony.stepping import Stepper
+from taichi_ants.engines.colony.ticking import TickingColony
 from taichi_ants.errors import AntsError
 from taichi_ants.interventions import SetPolicy
 from taichi_ants.protocol import ProtocolEvent, When, check_room, checked_protocol
-
-if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony
-    from taichi_ants.engines.colony.stepping import Stepper
 
 
 class Timetable:
@@ -28,7 +26,7 @@ class Timetable:
         AntsError: An event cannot happen in an episode of `length` ticks, or in this colony.
     """
 
-    def __init__(self, colony: Colony, protocol: Any, length: int) -> None:
+    def __init__(self, colony: TickingColony, protocol: Any, length: int) -> None:
         self._colony, self._events, self._length = colony, checked_protocol(protocol), length
         self._at: dict[int, list[tuple[int, ProtocolEvent]]] = {}  # by tick: indices and events
         for number, event in enumerate(self._events):
@@ -36,7 +34,9 @@ class Timetable:
                 self._at.setdefault(tick, []).append((number, event))
         self._stops = sorted(self._at)
         self._measures = {
-            one.measure: measures.get(one.measure) for one in self._events if isinstance(one, When)
+            event.measure: measures.get(event.measure)
+            for event in self._events
+            if isinstance(event, When)
         }
         if self._events:
             self._check_colony()
@@ -47,14 +47,15 @@ class Timetable:
         for event in self._events:
             length = None if colony.ends_at_delivery else self._length
             check_room(event, self._events, colony.task, colony.ants, colony.capacity, length)
-            for one in event.interventions:
-                if isinstance(event, When) and one.in_all_worlds and len(colony.worlds) > 1:
+            for intervention in event.interventions:
+                everywhere = isinstance(event, When) and intervention.in_all_worlds
+                if everywhere and len(colony.worlds) > 1:
                     raise AntsError(
-                        f"`when.{one.path}` would change all {len(colony.worlds)} worlds of the "
-                        "colony, which share it; make a colony with a single seed."
+                        f"`when.{intervention.path}` would change all {len(colony.worlds)} worlds "
+                        "of the colony, which share it; make a colony with a single seed."
                     )
                 learns = colony.learns or colony.is_given_actions
-                one.check_in(colony.worlds[0], colony.task, learns)
+                intervention.check_in(colony.worlds[0], colony.task, learns)
 
     def __enter__(self) -> None:
         if not self._events:
@@ -63,7 +64,9 @@ class Timetable:
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
         self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
-        replaces = any(isinstance(x, SetPolicy) for one in self._events for x in one.interventions)
+        replaces = any(
+            isinstance(x, SetPolicy) for event in self._events for x in event.interventions
+        )
         self._q = colony.arrays["q"].copy() if replaces else None
 
     def __exit__(self, *_: object) -> None:
@@ -102,7 +105,7 @@ class Timetable:
             return
         self._interventions.worlds = tuple(np.flatnonzero(worlds).tolist())
         try:
-            for one in event.interventions:
-                one.apply(self._interventions)
+            for intervention in event.interventions:
+                intervention.apply(self._interventions)
         except AntsError as error:
             raise AntsError(f"after {colony.ticks} ticks, {error}") from error

@@ -79,34 +79,34 @@ def pheromone_of(
 
 
 @ti.func
-def level_of(field: ti.template(), place, tick):
+def level_of(field: ti.template(), index, tick):
     """Return the level of a cell in a tick: i32, or f32 if dense."""
-    level = field.levels[place]
+    level = field.levels[index]
     if ti.static(not field.dense):
         level = pheromone.level_left(level, tick * field.evaporates)
     return level
 
 
 @ti.func
-def level_in_view(c: ti.template(), field: ti.template(), place, tick):
+def level_in_view(c: ti.template(), field: ti.template(), index, tick):
     """Return the level that an ant sees in a cell: 0 unless the cell is empty."""
     # Read without a branch, because the processor cannot predict which cells are empty.
-    return ti.select(c.ground[place] & 15 == EMPTY, level_of(field, place, tick), 0)
+    return ti.select(c.ground[index] & 15 == EMPTY, level_of(field, index, tick), 0)
 
 
 @ti.func
-def level_that_counts(c: ti.template(), field: ti.template(), place, tick):
+def level_that_counts(c: ti.template(), field: ti.template(), index, tick):
     """Return the level of a cell as it counts for the strongest one, 0 if it does not count."""
-    level = level_in_view(c, field, place, tick)
+    level = level_in_view(c, field, index, tick)
     if ti.static(field.under_carriers):
-        carrier = c.ground[place] >> 7 == 1  # of any nest
-        level = ti.select(carrier, level_of(field, place, tick), level)
+        carrier = c.ground[index] >> 7 == 1  # of any nest
+        level = ti.select(carrier, level_of(field, index, tick), level)
     return level
 
 
 @ti.func
 def deposit(
-    c: ti.template(), v: ti.template(), field: ti.template(), w, ant, place, tick, carried, carries,
+    c: ti.template(), v: ti.template(), field: ti.template(), w, ant, index, tick, carried, carries,
     event, paper_state
 ):  # fmt: skip
     """Deposit, by the rule of a pheromone, what an ant lays after some ticks with its load.
@@ -114,38 +114,38 @@ def deposit(
     `carries` and `event` are those after the ant's action, `paper_state` is that before it.
     """
     if ti.static(field.has_own_deposit):
-        level = level_of(field, place, tick)
+        level = level_of(field, index, tick)
         laid = field.own_deposit(
-            c, v, w, ant, level, place, carried, carries, event, paper_state, tick
+            c, v, w, ant, level, index, carried, carries, event, paper_state, tick
         )
         if ti.static(field.dense):
-            field.levels[place] = ti.cast(laid, ti.f32)
+            field.levels[index] = ti.cast(laid, ti.f32)
         else:
-            field.levels[place] = ti.cast(ti.floor(laid), ti.i32) + tick * field.evaporates
+            field.levels[index] = ti.cast(ti.floor(laid), ti.i32) + tick * field.evaporates
     elif field.deposits != pheromone.NONE:
-        level = level_of(field, place, tick)
+        level = level_of(field, index, tick)
         laid = pheromone.level_after_deposit(field, field.deposits, level, carried)
         if ti.static(not field.dense):
             laid += tick * field.evaporates
-        field.levels[place] = laid
+        field.levels[index] = laid
 
 
 @ti.func
 def occasions_of(had_food, paper_state, action, event, has_moved):
     """Return the occasions of an ant in a tick, by its load and paper state before it acted."""
-    found = 0
+    occasions = 0
     if has_moved:
-        found = ti.select(had_food == 1, Occasion.MOVED_WITH_FOOD, Occasion.MOVED_WITHOUT_FOOD)
+        occasions = ti.select(had_food == 1, Occasion.MOVED_WITH_FOOD, Occasion.MOVED_WITHOUT_FOOD)
     if event == Event.PICKED_UP:
-        found |= Occasion.PICKED_UP
+        occasions |= Occasion.PICKED_UP
     if event == Event.DELIVERED:
-        found |= Occasion.DELIVERED
+        occasions |= Occasion.DELIVERED
     if had_food == 0:
         if paper_state == vision.DEAD_END:
-            found |= Occasion.DEAD_END
+            occasions |= Occasion.DEAD_END
         if (action == PICK_UP) & (event == Event.FAILED):
-            found |= Occasion.FAILED_PICK_UP
-    return found
+            occasions |= Occasion.FAILED_PICK_UP
+    return occasions
 
 
 @ti.func
@@ -156,38 +156,38 @@ def lay(
     """Deposit on the cell that an ant leaves or enters, or on its food's, on an occasion `laid`."""
     base = w * c.size
     if laid != 0:
-        place = base + ti.select(laid == Occasion.DEAD_END, cell, goes)
-        deposit(c, v, field, w, ant, place, tick, carried, carries, event, paper_state)
+        index = base + ti.select(laid == Occasion.DEAD_END, cell, goes)
+        deposit(c, v, field, w, ant, index, tick, carried, carries, event, paper_state)
         if laid == Occasion.PICKED_UP:
             food_place = base + food
             deposit(c, v, field, w, ant, food_place, tick, carried, carries, event, paper_state)
 
 
 @ti.func
-def evaporate(c: ti.template(), v: ti.template(), place, tick):
+def evaporate(c: ti.template(), v: ti.template(), index, tick):
     """Evaporate the dense pheromones of a cell for one tick."""
     for field in ti.static(v.dense_fields(c)):
         if ti.static(field.has_own_evaporation):
-            if c.ground[place] != OBSTACLE:  # rocks and the outside hold no trail
-                left = field.own_evaporation(level=field.levels[place], tick=tick)
-                field.levels[place] = ti.cast(left, ti.f32)
+            if c.ground[index] != OBSTACLE:  # rocks and the outside hold no trail
+                level = field.own_evaporation(level=field.levels[index], tick=tick)
+                field.levels[index] = ti.cast(level, ti.f32)
         else:
-            field.levels[place] = pheromone.evaporated(field.levels[place], field.decay)
+            field.levels[index] = pheromone.evaporated(field.levels[index], field.decay)
 
 
 @ti.func
-def diffuse(c: ti.template(), v: ti.template(), place, tick):
+def diffuse(c: ti.template(), v: ti.template(), index, tick):
     """Compute the levels of a cell after one tick of diffusion."""
     for field in ti.static(v.dense_fields(c)):
         if field.share > 0.0:
-            field.spare[place] = pheromone.diffused(
-                field.levels, c.walls, c.compass, place, field.share
+            field.spare[index] = pheromone.diffused(
+                field.levels, c.walls, c.compass, index, field.share
             )
 
 
 @ti.func
-def apply_diffusion(c: ti.template(), v: ti.template(), place, tick):
+def apply_diffusion(c: ti.template(), v: ti.template(), index, tick):
     """Set the levels of a cell to the results of `diffuse`."""
     for field in ti.static(v.dense_fields(c)):
         if field.share > 0.0:
-            field.levels[place] = field.spare[place]
+            field.levels[index] = field.spare[index]

@@ -10,23 +10,21 @@ import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.engines.layout import Command, unpack_cells
-from taichi_ants.engines.records import Snapshot
 from taichi_ants.engines.runs.engine import laid_out
 from taichi_ants.grid.constants import STREAM_ANT
 from taichi_ants.grid.randomness import stream_state, words_of
+from taichi_ants.records import Snapshot
 from taichi_ants.task import Task
 from taichi_ants.worlds.world import World
 
-_PER_CHUNK = 256  # ants that one thread steps in a row
 _STEPS_OF_LAUNCH = 1 << 23  # of all ants in a rollout; a launch cannot be interrupted
-_NO_POLICY = np.zeros(1, np.int64), np.zeros(1, np.uint64), 0.0
 # The arrays with one value per ant.
 _OF_ANTS: dict[type, tuple[str, ...]] = {
     np.int32: ("start_cells", "start_headings", "ant_cells", "carried", "steps", "states")
     + ("final_states", "deliveries", "final_deliveries"),
-    np.uint8: ("commands", "actions", "executed", "headings", "carries", "changed", "paper_states")
-    + ("events",)
-    + ("terminations", "truncations", "reasons", "final_paper_states"),
+    np.uint8: ("commands", "headings", "carries", "changed", "paper_states", "final_paper_states")
+    + ("results", "reasons"),
+    np.int64: ("taken",),
     np.uint64: ("random_states",),
     np.float64: ("rewards_of",),
 }
@@ -41,12 +39,11 @@ class BatchedEnvironments:
     once. Trails evaporate if `falls`.
 
     Attributes:
-        arrays: Arrays by name, with one row per ant. States: paper states uint8, states int32.
-            Results
-            of the last action: rewards_of float64, terminations and truncations uint8, events uint8
-            (`Event`), reasons uint8 (`Reason`), executed uint8 if actions slip. Last states of an
-            episode that `step` has restarted: final_states int32, final_paper_states uint8.
-            Deliveries of the episode, and of one that `step` has restarted: deliveries,
+        arrays: Arrays by name, with one row per ant. States: paper_states uint8, states int32.
+            Results of the last step: rewards_of float64, reasons uint8 (`Reason`), and results
+            uint8, see `layout.TERMINATED`; of a rollout, only whether the episode has ended. Last
+            states of an episode that a step has restarted: final_states int32, final_paper_states
+            uint8. Deliveries of the episode, and of one that a step has restarted: deliveries,
             final_deliveries.
     """
 
@@ -54,10 +51,8 @@ class BatchedEnvironments:
         self, worlds: Sequence[World], task: Task, n: int, max_steps: int, ends: str, falls: bool
     ) -> None:
         self.worlds, self.task, self.n = tuple(worlds), task, n
-        self._launch: Any = None
-        self._rollouts: dict[
-            tuple[bool, int], Callable[[Mapping[str, Any]], None]
-        ] = {}  # launches of rollouts
+        self._launches: dict[tuple[bool, int], Any] = {}
+        self._codes: np.ndarray | None = None  # workspace of rollouts
         common = laid_out(self.worlds, task, falls)
         size = common["size"]
         number = np.arange(n, dtype=np.int32) % len(self.worlds)
@@ -67,12 +62,12 @@ class BatchedEnvironments:
         self.arrays: dict[str, Any] = {
             **common,
             "n": n,
-            "per_chunk": _PER_CHUNK,
+            "n_steps": 1,
             "max_steps": max_steps,
             "regrows": int(ends == "continues"),
             "delivery_terminates": int(ends == "terminates"),
             "delivery_truncates": int(ends == "truncates"),
-            "same_step": 0,
+            "after_end": 0,
             # The cells of all worlds, then the cells of each ant.
             "shared_cells": common["world"].size,
             "cells": np.concatenate([common["world"], own.reshape(-1)]),
@@ -92,14 +87,22 @@ class BatchedEnvironments:
 
     def begin(self, which: np.ndarray) -> None:
         """Start an episode for the ants for which `which`, bool (n,), is True."""
-        self._go(np.where(which, Command.BEGIN, Command.WAIT), same_step=False)
+        self._go(np.where(which, Command.BEGIN, Command.WAIT))
 
     def step(
         self, actions: np.ndarray, begins: np.ndarray | int = 0, same_step: bool = False
     ) -> None:
         """Let all ants take these actions, except ants with `begins` 1, which start an episode."""
-        self.arrays["actions"][:] = actions
-        self._go(begins, same_step)
+        self.arrays["taken"][:] = actions
+        self._go(begins, Command.STEP if same_step else Command.WAIT)
+
+    def _go(self, commands: np.ndarray | int, after_end: Command = Command.WAIT) -> None:
+        """Do a rollout of one step, whose results are `arrays`."""
+        self.arrays["commands"][:] = commands
+        self.arrays["after_end"] = int(after_end)
+        with runtime.alone:
+            launch = self._launch(False, 0)
+            launch(self.arrays)
 
     def rollout(
         self,
@@ -114,8 +117,8 @@ class BatchedEnvironments:
         Args:
             rows: Arrays (steps, n, ...) by name. `taken`, int64, are the actions: given ones or,
                 with a policy, those it chose. The results are `seen`, observations of the dtype of
-                `shown`; `paid`, float64; `results`, uint8, see `layout.TERMINATED`; and if the next
-                episode begins in the step that ends one, `finals`, int32, the last states.
+                `shown`; `rewards_of`, float64; `result_rows`, uint8, see `layout.TERMINATED`; and,
+                if the next episode begins in the step that ends one, `final_states`, int32.
             shown: The observation of each state, int64 or float32 (n_states, ...).
             begins: True for ants that start an episode in the first step, bool (n,).
             after_end: The command after the last step of an episode; STEP if the next episode
@@ -123,37 +126,41 @@ class BatchedEnvironments:
             policy: The best actions in each state, as bits, int64 (n_states,), a random stream for
                 each ant, uint64 (n,), and epsilon; or None.
         """
-        best, choices, epsilon = policy or _NO_POLICY
+        runtime.check_on_cpu(runtime.start(), "a rollout of a vector environment runs")
+        launch = self._launch(policy is not None, shown[0].size)
+        if self._codes is None:
+            from taichi_ants.engines.runs.rollout_kernel import size_of_codes
+
+            self._codes = np.empty(size_of_codes(self.n), np.int64)
+        steps = max(1, _STEPS_OF_LAUNCH // self.n)
+        values = {
+            **self.arrays,
+            "after_end": int(after_end),
+            "shown": shown.reshape(-1),
+            "codes": self._codes,
+        }
+        if policy is not None:
+            best, choices, epsilon = policy
+            below = np.uint64(epsilon * 4294967296.0)
+            values |= {"best": best, "choices": choices, "explore_below": below}
+        self.arrays["commands"][:] = begins
         with runtime.alone:
-            launch = self._rollout_launch(policy is not None, shown[0].size)
-            self.arrays["commands"][:] = np.where(begins, after_end, Command.STEP)
-            values = {
-                **self.arrays,
-                "after_end": int(after_end),
-                "shown": shown.reshape(-1),
-                "best": best,
-                "choices": choices,
-                "explore_below": np.uint64(epsilon * 4294967296.0),
-            }
-            steps = max(1, _STEPS_OF_LAUNCH // self.n)
             for first in range(0, len(rows["taken"]), steps):
                 part = {name: one[first : first + steps].reshape(-1) for name, one in rows.items()}
                 launch({**values, **part, "n_steps": len(part["taken"]) // self.n})
-        self.arrays["rewards_of"][:] = rows["paid"][-1]
+        self.arrays["rewards_of"][:] = rows["rewards_of"][-1]
 
-    def _rollout_launch(self, follows: bool, width: int) -> Callable[[Mapping[str, Any]], None]:
-        if (follows, width) not in self._rollouts:
-            runtime.check_on_cpu(runtime.start(), "a rollout of a vector environment runs")
+    def _launch(self, follows: bool, width: int) -> Callable[[Mapping[str, Any]], None]:
+        """Return the launch of a rollout with observations of `width` numbers."""
+        if (follows, width) not in self._launches:
+            runtime.start()  # configures Taichi before the imports below
             from taichi_ants.engines.arguments import Launch
-            from taichi_ants.engines.runs.kernels import failures_of
-            from taichi_ants.engines.runs.rollout_kernel import rollout_kernel, size_of_codes
+            from taichi_ants.engines.runs.rollout_kernel import WIDTH, rollout_kernel
+            from taichi_ants.engines.runs.step import Rules
 
-            codes = np.empty(size_of_codes(self.n), np.int64)
-            half = self.task.pheromone.view == "half"
-            rules = self.task.sees, self.arrays["deposits"], half, failures_of(self.task)
-            launch = Launch(partial(rollout_kernel, *rules, follows, width))
-            self._rollouts[follows, width] = lambda values: launch({**values, "codes": codes})
-        return self._rollouts[follows, width]
+            form = Rules.of(self.task), follows, width, self.n <= WIDTH
+            self._launches[follows, width] = Launch(partial(rollout_kernel, *form))
+        return self._launches[follows, width]
 
     def snapshot(self, number: int) -> Snapshot:
         """Return the present state of an ant's world; arrays are copies."""
@@ -166,20 +173,6 @@ class BatchedEnvironments:
         cells, carries = arrays["ant_cells"][one].copy(), arrays["carries"][one].astype(bool)
         return Snapshot(grid, ground, trail, cells, headings, carries)
 
-    def _go(self, commands: np.ndarray | int, same_step: bool) -> None:
-        self.arrays["commands"][:] = commands
-        self.arrays["same_step"] = int(same_step)
-        with runtime.alone:
-            if self._launch is None:
-                runtime.start()  # configures Taichi before the imports below
-                from taichi_ants.engines.arguments import Launch
-                from taichi_ants.engines.runs.kernels import failures_of, step_kernel
-
-                half, serial = self.task.pheromone.view == "half", self.n <= _PER_CHUNK
-                rules = self.task.sees, self.arrays["deposits"], half, serial
-                self._launch = Launch(partial(step_kernel, *rules, failures_of(self.task)))
-            self._launch(self.arrays)
-
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
-        return {**vars(self), "_launch": None, "_rollouts": {}}
+        return {**vars(self), "_launches": {}, "_codes": None}

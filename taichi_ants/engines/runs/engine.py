@@ -148,17 +148,15 @@ class Launcher:
     ) -> None:
         # Imported here, because Taichi must be configured first; see `runtime`.
         from taichi_ants.engines.arguments import Launch
-        from taichi_ants.engines.runs.kernels import failures_of, run_kernel
-        from taichi_ants.engines.runs.step import EXTRA_CELLS
+        from taichi_ants.engines.runs.kernels import run_kernel
+        from taichi_ants.engines.runs.step import EXTRA_CELLS, Rules
 
         self._runs = runs
         self._cells, self._headings = world.first_starts(words_of(runs.seeds))
         self.cells_of_a_run = world.grid.size + EXTRA_CELLS
-        learns, pheromone = runs.learner is not None, task.pheromone
-        deposits, half = pheromone.numbers["deposits"], pheromone.view == "half"
-        rules = runs.learner, task.sees, deposits, half, traced, failures_of(task)
-        self._launch = Launch(partial(run_kernel, *rules, task.choice.rule == "softmax"))
-        falls = task.evaporation_in_training if learns else task.evaporation_in_evaluation
+        rules, learner = Rules.of(task), runs.learner
+        self._launch = Launch(partial(run_kernel, rules, learner, traced))
+        falls = task.evaporation_in_training if learner else task.evaporation_in_evaluation
         self._values = {**_NO_WORK, **laid_out([world], task, falls), "max_steps": max_steps}
         self._launch(self._values)  # compiles the kernel
 

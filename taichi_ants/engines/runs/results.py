@@ -11,7 +11,6 @@ import numpy as np
 from taichi_ants import learners, measures
 from taichi_ants.arguments import checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES, padded
-from taichi_ants.engines.records import Record
 from taichi_ants.errors import as_array, expect
 from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
@@ -21,6 +20,7 @@ from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.learner import Memory
 from taichi_ants.measures.finished import counts_of_lone_ant, of_lone_ants
 from taichi_ants.measures.tidy import Measured, Tidy, seed_array
+from taichi_ants.records import Record
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
@@ -67,7 +67,7 @@ class RunState(Record):
         )
 
     @classmethod
-    def fresh(
+    def initial(
         cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int
     ) -> RunState:
         """Return the state of new runs, with leading axes (configurations, seeds)."""

@@ -1,4 +1,4 @@
-"""The kernel for several steps of batched environments, which records each step.
+"""The kernel for one or more steps of batched environments, which records each step.
 
 A thread takes `WIDTH` ants at a time, and each ant takes up to `LENGTH` steps in a row, so that its
 cells stay in the processor's first cache. The ant writes a code for each step into `codes`. Then
@@ -13,11 +13,17 @@ from typing import Any
 import taichi as ti
 
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
-from taichi_ants.engines.runs.kernels import Failures
-from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, act, paper_state_of, restore, state_seen
+from taichi_ants.engines.runs.step import (
+    EXTRA_CELLS,
+    Ant,
+    Rules,
+    act,
+    observe_function,
+    reason_of,
+    restore,
+)
 from taichi_ants.task.constants import PICK_UP
-from taichi_ants.task.events import Event
-from taichi_ants.task.observations import Observation
+from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.rules.delivery import step_end
 from taichi_ants.task.rules.noise import slipped
 from taichi_ants.task.rules.pheromone import FADING
@@ -40,30 +46,30 @@ def size_of_codes(n: int) -> int:
 
 @cache
 def rollout_kernel(
-    observation: Observation,
-    deposit: int,
-    half: bool,
-    failures: Failures,
-    follows: bool,
-    width: int,
-    arguments: Any,
+    rules: Rules, follows: bool, width: int, serial: bool, arguments: Any
 ) -> Callable[..., None]:
     """Return the kernel of a rollout; see `BatchedEnvironments.rollout`.
 
     If `follows`, ants choose by a table, with draws from their own streams, else they take given
-    actions. `width` is the number of values in an observation. Steps are equal to `step_kernel`'s.
+    actions. `width` is the number of values in an observation, or 0 for a single step without
+    observations. If `serial`, one thread does all the work, because waking others would take
+    longer. Each ant draws from its stream in the order of a colony's.
     """
-    state_of = state_seen(observation, half, failures.misreads)
+    deposit, observe, single = rules.deposit, observe_function(rules), width == 0
 
     @ti.func
-    def observe(a: ti.template(), base, ant, clock):
-        """Return the paper's state and the state of an ant, and the stream after possible draws."""
-        paper_state, state, after = paper_state_of(half, a, base, ant, clock), 0, ant.random_state
-        if ti.static(failures.misreads):
-            state, after = state_of(a, base, ant, clock, paper_state)
+    def record(a: ti.template(), row, code):
+        """Write the results of a step."""
+        state, result = ti.cast(code, ti.i32), ti.cast(code >> _RESULT, ti.i32)
+        if ti.static(follows):
+            a.taken[row] = code >> _ACTION & 7
+        a.rewards_of[row] = a.rewards[result & (TRUNCATED - 1)]
+        if ti.static(single):
+            a.results[row] = ti.cast(result & 255, ti.u8)
         else:
-            state = state_of(a, base, ant, clock, paper_state)
-        return paper_state, state, after
+            a.result_rows[row] = ti.cast(result & 255, ti.u8)
+        for k in ti.static(range(width)):
+            a.seen[row * width + k] = a.shown[state * width + k]
 
     @ti.func
     def take_steps(a: ti.template(), i, first, n_steps, place):
@@ -77,24 +83,31 @@ def rollout_kernel(
         # Until an ant changes its world, it reads cells that all ants share.
         steps, base = a.steps[i], ti.select(a.changed[i] == 1, own, origin)
         deliveries = a.deliveries[i]
-        command, choices = ti.cast(a.commands[i], ti.i32), a.choices[i]
+        command, choices = ti.cast(a.commands[i], ti.i32), ti.cast(0, ti.u64)
+        if ti.static(follows):
+            choices = a.choices[i]
+        reason = ti.cast(Reason.NONE, ti.i32)
         for t in range(n_steps):
-            action, event, terminated, truncated = 0, ti.cast(Event.NONE, ti.i32), 0, 0
+            action, event, flags = 0, ti.cast(Event.NONE, ti.i32), 0
             if ti.static(follows):
                 choices = advance(choices)
                 action = choose_from_masks(
                     a.compass, a.best, state, bits_of(choices), a.explore_below
                 )
+            elif ti.static(single):
+                action = ti.cast(a.taken[i], ti.i32)
             else:
                 action = ti.cast(a.codes[place + t * _STRIDE], ti.i32)
             begins = ti.cast(command == Command.BEGIN, ti.i32)
             if command == Command.STEP:
-                executed = action
-                if ti.static(failures.slips):
+                executed, before = action, ant
+                if ti.static(rules.slips):
                     executed, ant.random_state = slipped(action, ant.random_state, a.slip_below)
                 into = ti.select(executed == PICK_UP, own, base)
                 ant = act(deposit, False, a, into, ant, paper_state, executed, steps * a.evaporates)
                 event = ant.event
+                if ti.static(single):
+                    reason = reason_of(a, into, before, ant, executed)
                 if event == Event.PICKED_UP:  # the store keeps this a branch, which is faster
                     a.changed[i] = ti.cast(1, ti.u8)
                     base = own
@@ -105,10 +118,13 @@ def rollout_kernel(
                 terminated, truncated = step_end(
                     event, a.delivery_terminates, a.delivery_truncates, last
                 )
-                if terminated | truncated == 1:
+                flags = terminated * TERMINATED | truncated * TRUNCATED
+                if flags != 0:
                     command = a.after_end
                     if command == Command.STEP:  # the next episode begins in the same step
-                        a.finals[(first + t) * a.n + i] = state
+                        a.final_states[(first + t) * a.n + i] = state
+                        a.final_paper_states[i] = ti.cast(paper_state, ti.u8)
+                        a.final_deliveries[i] = deliveries
                         begins = 1
             seen = state
             if begins == 1:
@@ -121,50 +137,55 @@ def rollout_kernel(
                 steps, deliveries, base, command = 0, 0, origin, Command.STEP
                 paper_state, state, ant.random_state = observe(a, origin, ant, 0)
                 seen = state
-            result = event | terminated * TERMINATED | truncated * TRUNCATED | action << 8
+            result = event | flags | action << 8
             code = ti.cast(seen, ti.i64) | ti.cast(result, ti.i64) << _RESULT
-            a.codes[place + t * _STRIDE] = code
+            if ti.static(single):
+                record(a, i, code)
+            else:
+                a.codes[place + t * _STRIDE] = code
         a.ant_cells[i], a.headings[i] = ant.cell, ti.cast(ant.heading, ti.u8)
         a.carries[i], a.random_states[i] = ti.cast(ant.carries, ti.u8), ant.random_state
         if ti.static(deposit == FADING):
             a.carried[i] = ant.carried
         a.paper_states[i], a.states[i] = ti.cast(paper_state, ti.u8), state
-        a.steps[i], a.deliveries[i], a.commands[i] = steps, deliveries, ti.cast(command, ti.u8)
-        ended = ti.cast(command != Command.STEP, ti.u8)  # for `LoneAnts.over`
-        a.terminations[i], a.truncations[i] = ended, ended
+        a.steps[i], a.deliveries[i] = steps, deliveries
+        if ti.static(single):
+            a.reasons[i] = ti.cast(reason, ti.u8)
+        else:
+            a.commands[i] = ti.cast(command, ti.u8)
+            a.results[i] = ti.cast(ti.select(command == Command.STEP, 0, TRUNCATED), ti.u8)
         if ti.static(follows):
             a.choices[i] = choices
 
     @ti.func
-    def record(a: ti.template(), row, code):
-        """Write the results of a step."""
-        state, result = ti.cast(code, ti.i32), ti.cast(code >> _RESULT, ti.i32)
-        if ti.static(follows):
-            a.taken[row] = code >> _ACTION & 7
-        a.paid[row] = a.rewards[result & (TRUNCATED - 1)]
-        a.results[row] = ti.cast(result & 255, ti.u8)
-        for k in ti.static(range(width)):
-            a.seen[row * width + k] = a.shown[state * width + k]
-
-    @ti.kernel
-    def rollout(a: arguments):
-        ti.loop_config(block_dim=1)
-        for chunk in range((a.n + WIDTH - 1) // WIDTH):
-            ant, ants = chunk * WIDTH, ti.min(WIDTH, a.n - chunk * WIDTH)
-            place, first = chunk * _STRIDE * LENGTH, 0
-            while first < a.n_steps:
-                length = ti.min(LENGTH, a.n_steps - first)
-                if ti.static(not follows):
-                    for t in range(length):
-                        row, line = (first + t) * a.n + ant, place + t * _STRIDE
-                        for j in range(ants):
-                            a.codes[line + j] = a.taken[row + j]
-                for j in range(ants):
-                    take_steps(a, ant + j, first, length, place + j)
+    def take_rows(a: ti.template(), ant, ants, place):
+        """Let `ants` ants from number `ant` on take all steps; their codes start at `place`."""
+        first = 0
+        while first < a.n_steps:
+            length = ti.min(LENGTH, a.n_steps - first)
+            if ti.static(not follows):
                 for t in range(length):
                     row, line = (first + t) * a.n + ant, place + t * _STRIDE
                     for j in range(ants):
-                        record(a, row + j, a.codes[line + j])
-                first += length
+                        a.codes[line + j] = a.taken[row + j]
+            for j in range(ants):
+                take_steps(a, ant + j, first, length, place + j)
+            for t in range(length):
+                row, line = (first + t) * a.n + ant, place + t * _STRIDE
+                for j in range(ants):
+                    record(a, row + j, a.codes[line + j])
+            first += length
+
+    @ti.kernel
+    def rollout(a: arguments):
+        ti.loop_config(block_dim=1, serialize=serial)
+        for chunk in range((a.n + WIDTH - 1) // WIDTH):
+            ant, ants = chunk * WIDTH, ti.min(WIDTH, a.n - chunk * WIDTH)
+            if ti.static(single):
+                for i in range(ant, ant + ants):
+                    if a.commands[i] != Command.WAIT:
+                        take_steps(a, i, 0, 1, 0)
+            else:
+                take_rows(a, ant, ants, chunk * _STRIDE * LENGTH)
 
     return rollout

@@ -2,15 +2,16 @@
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import taichi as ti
 from taichi.math import popcnt
 
 from taichi_ants.engines.views import encode_function, fill_codes, view_type
 from taichi_ants.grid.constants import N_HEADINGS
-from taichi_ants.task.constants import FORWARD, LEFT, PICK_UP, RIGHT
-from taichi_ants.task.events import Event
+from taichi_ants.task import Task
+from taichi_ants.task.constants import FOOD, FORWARD, LEFT, PICK_UP, QUEEN, RIGHT
+from taichi_ants.task.events import Event, Reason
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules import noise, vision
 from taichi_ants.task.rules.actions import (
@@ -37,6 +38,30 @@ Ant = ti.types.struct(
     event=ti.i32,
     random_state=ti.u64,
 )
+
+
+class Rules(NamedTuple):
+    """The rules of a task that are compiled into kernels.
+
+    For `deposit` and `half`, see `rules.pheromone` and `Pheromone.view`; for `slips` and
+    `misreads`, see `task.Noise`. If `softly`, ants choose by the rule "softmax".
+    """
+
+    observation: Observation
+    deposit: int
+    half: bool
+    slips: bool
+    misreads: bool
+    softly: bool
+
+    @classmethod
+    def of(cls, task: Task) -> "Rules":
+        """Return the rules of a task."""
+        pheromone, noise = task.pheromone, task.noise
+        deposit, half = pheromone.numbers["deposits"], pheromone.view == "half"
+        softly = task.choice.rule == "softmax"
+        return cls(task.sees, deposit, half, noise.slip > 0, noise.misread > 0, softly)
+
 
 # After the cells of a run: the first and last cell that the episode has changed.
 EXTRA_CELLS = 2
@@ -146,6 +171,27 @@ def _paper_state_misread(a: ti.template(), base, ant, clock, paper_state):
     return noise.misread_paper_state(paper_state, ant.random_state, a.misread_below)
 
 
+@cache
+def observe_function(rules: Rules) -> Callable[..., Any]:
+    """Return a `ti.func` (a, base, ant, clock) that returns what an ant sees.
+
+    It returns the paper's state, the state index, and the random stream after possible draws.
+    """
+    state_of = state_seen(rules.observation, rules.half, rules.misreads)
+
+    @ti.func
+    def observe(a: ti.template(), base, ant, clock):
+        paper_state, state = paper_state_of(rules.half, a, base, ant, clock), 0
+        after = ant.random_state
+        if ti.static(rules.misreads):
+            state, after = state_of(a, base, ant, clock, paper_state)
+        else:
+            state = state_of(a, base, ant, clock, paper_state)
+        return paper_state, state, after
+
+    return observe
+
+
 @ti.func
 def act(
     deposit: ti.template(),
@@ -220,3 +266,25 @@ def pick_up_or_give(
         after.heading = heading_after_delivery(ant.heading, a.turns_at_queen)
         after.event = Event.DELIVERED
     return after
+
+
+@ti.func
+def reason_of(a: ti.template(), base, before, after, action):
+    """Return the `Reason` why an action was blocked or failed."""
+    reason = ti.cast(Reason.NONE, ti.i32)
+    if after.event == Event.BLOCKED:
+        ahead = before.cell + step_towards(a.compass, after.heading, FORWARD)
+        ground = ground_of(a.cells[base + ahead])
+        reason = Reason.ROCK_OR_EDGE_AHEAD
+        if ground == FOOD:
+            reason = Reason.FOOD_AHEAD
+        elif ground == QUEEN:
+            reason = Reason.QUEEN_AHEAD
+    elif after.event == Event.FAILED:
+        if action == PICK_UP:
+            reason = ti.select(
+                before.carries == 1, Reason.CARRIES_FOOD_ALREADY, Reason.NO_FOOD_IN_VIEW
+            )
+        else:
+            reason = ti.select(before.carries == 1, Reason.NO_QUEEN_IN_VIEW, Reason.CARRIES_NO_FOOD)
+    return reason

@@ -13,12 +13,12 @@ import numpy as np
 
 from taichi_ants import arguments, runtime
 from taichi_ants.engines.layout import OUTCOMES, STEPS, TRACE
-from taichi_ants.engines.records import Record
 from taichi_ants.engines.runs.engine import Launcher, Progress, Runs, pieces
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import checked_table, checked_values
+from taichi_ants.records import Record
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
 from taichi_ants.task.events import Event
@@ -64,7 +64,7 @@ class Trace(Record):
         q_values: float32 (n, 5), the action values of the state when the action was chosen.
         td_errors: float32 (n,), the TD error of the step; None without learning.
         tables: float32 (n, n_states, 5), the Q table after the step; None without learning.
-        made: The arguments of the trace; None for several policies, or if you made it yourself.
+        arguments: Those that reproduce it; None for several policies, or if you made it yourself.
     """
 
     episodes: np.ndarray
@@ -83,7 +83,7 @@ class Trace(Record):
     td_errors: np.ndarray | None = None
     tables: np.ndarray | None = None
     executed: np.ndarray | None = None
-    made: RolloutArguments | None = field(default=None, compare=False, repr=False)
+    arguments: RolloutArguments | None = field(default=None, compare=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -115,10 +115,10 @@ def rollout(
     numbers = np.array([checked_whole("number", number, least=0)])
     epsilon = arguments.checked_share("epsilon", epsilon)
     trace = _trace(world, task, Runs.following(table[None], seeds, numbers, epsilon), max_steps)
-    made = RolloutArguments(
+    made_by = RolloutArguments(
         world, task, int(seeds[0]), max_steps, int(numbers[0]), table.copy(), epsilon
     )
-    return replace(trace, made=made)
+    return replace(trace, arguments=made_by)
 
 
 def trace_policies(
@@ -165,11 +165,11 @@ def trace_training(
     if len(several) > 1:
         raise AntsError(f"config has {len(several)} configurations; pass a single one.")
     seeds = arguments.checked_seeds_for(seed, ())
-    state = RunState.fresh(several, seeds.tolist(), task.n_states).part([0])
+    state = RunState.initial(several, seeds.tolist(), task.n_states).part([0])
     runs = Runs.learning(several, seeds.tolist(), state)
     trace = _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
     return replace(
-        trace, made=RolloutArguments(world, task, int(seeds[0]), max_steps, config=several[0])
+        trace, arguments=RolloutArguments(world, task, int(seeds[0]), max_steps, config=several[0])
     )
 
 

@@ -69,7 +69,7 @@ def train(
         steps=none_yet,
         deliveries=none_yet,
         seconds=0.0,
-        state=RunState.fresh(configs, seeds, task.n_states),
+        state=RunState.initial(configs, seeds, task.n_states),
     )
     return _train(start, episodes, threads, arch, progress)
 

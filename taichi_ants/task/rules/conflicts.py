@@ -39,7 +39,7 @@ def conflict_key(cell, tick):
 
 
 @ti.func
-def prevails(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick):
+def wins_cell(c: ti.template(), traffic: ti.template(), base, cell, wanted, tick):
     """Return whether the ant on `cell` wins the cell `wanted`; False if that is its own cell."""
     kind = c.wants[base + cell] & 8  # 8 to take, else 0
     rivals = who_want(c, base, wanted, MARK, kind)  # the ant itself is one of them
@@ -59,8 +59,8 @@ def who_want(c: ti.template(), base, cell, bits: ti.template(), mark):
     # One byte after the other, because the compiler would move them into a vector and back.
     marks = ti.u64(0)
     for i in ti.static(range(N_HEADINGS)):
-        place = base + cell + c.compass[N_HEADINGS - i]
-        marks = marks << ti.u64(8) | ti.cast(c.wants[place], ti.u64)
+        index = base + cell + c.compass[N_HEADINGS - i]
+        marks = marks << ti.u64(8) | ti.cast(c.wants[index], ti.u64)
     others = marks & ti.u64(bits * _EACH) ^ (
         ti.u64(_WANTING) | ti.cast(mark, ti.u64) * ti.u64(_EACH)
     )
@@ -77,12 +77,12 @@ def first_heading(ants):
 @ti.func
 def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, rivals, tick):
     """Return whether the ant on `cell` precedes all others that want the same, see `who_want`."""
-    own, won, rest = conflict_key(cell, tick), True, rivals
-    while rest != 0:
-        other = wanted + c.compass[first_heading(rest) + 1]
-        rest &= rest - ti.u64(1)
+    key, won, rivals_left = conflict_key(cell, tick), True, rivals
+    while rivals_left != 0:
+        other = wanted + c.compass[first_heading(rivals_left) + 1]
+        rivals_left &= rivals_left - ti.u64(1)
         if other != cell:
-            after = conflict_key(other, tick) > own
+            after = conflict_key(other, tick) > key
             if ti.static(traffic.carriers_first):
                 loaded = c.wants[base + cell] & HAS_FOOD
                 other_loaded = c.wants[base + other] & HAS_FOOD
@@ -92,21 +92,21 @@ def wins(c: ti.template(), traffic: ti.template(), base, cell, wanted, rivals, t
 
 
 @ti.func
-def had_ant(c: ti.template(), place):
+def had_ant(c: ti.template(), index):
     """Return whether an ant was on a cell at the start of the tick, if all ants have a mark."""
-    return c.wants[place] != 0
+    return c.wants[index] != 0
 
 
 @ti.func
-def heading_wanted(c: ti.template(), place):
+def heading_wanted(c: ti.template(), index):
     """Return the heading at which the ant on a cell wants to enter the next cell."""
-    return (ti.cast(c.wants[place], ti.i32) & MARK) - ENTER
+    return (ti.cast(c.wants[index], ti.i32) & MARK) - ENTER
 
 
 @ti.func
-def heading_taken(c: ti.template(), place):
+def heading_taken(c: ti.template(), index):
     """Return the heading at which the ant on a cell takes food, if it does; 0 to 5 in any case."""
-    return ti.max((ti.cast(c.wants[place], ti.i32) & MARK) - TAKE, 0)
+    return ti.max((ti.cast(c.wants[index], ti.i32) & MARK) - TAKE, 0)
 
 
 @ti.func
@@ -130,10 +130,10 @@ def way_is_free(c: ti.template(), traffic: ti.template(), base, cell, wanted):
 @ti.func
 def entering(c: ti.template(), base, cell):
     """Return the cell of the ant that wins `cell`, or -1."""
-    found, winner = -1, who_want(c, base, cell, MARK | WINS, WINS)
+    origin, winner = -1, who_want(c, base, cell, MARK | WINS, WINS)
     if winner != 0:
-        found = cell + c.compass[first_heading(winner) + 1]
-    return found
+        origin = cell + c.compass[first_heading(winner) + 1]
+    return origin
 
 
 @ti.func

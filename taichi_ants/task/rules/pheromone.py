@@ -50,16 +50,16 @@ def evaporated(level, decay):
 
 
 @ti.func
-def diffused(levels: ti.template(), walls: ti.template(), compass: ti.template(), place, share):
+def diffused(levels: ti.template(), walls: ti.template(), compass: ti.template(), index, share):
     """Return the level (f32) of a cell after each cell has given `share` to each neighbour.
 
     A cell keeps the shares for walls.
     """
-    level = levels[place]
-    if walls[place] == 0:
+    level = levels[index]
+    if walls[index] == 0:
         n_open, received = 0.0, 0.0
         for heading in ti.static(range(N_HEADINGS)):
-            neighbour = place + compass[heading + 1]
+            neighbour = index + compass[heading + 1]
             if walls[neighbour] == 0:
                 n_open += 1.0
                 received += levels[neighbour] * share

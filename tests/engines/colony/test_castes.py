@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_castes import drawn_castes
-from random_colonies import random_colony
 from scipy.stats import kstest, lognorm, truncnorm, uniform
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, task, worlds
@@ -45,11 +43,6 @@ def test_ants_of_a_nest_are_divided_by_shares(castes, n, numbers, chances):
     assert numbers_in(given, 0, n) == numbers
     found = chances_in(given, 0, n)
     assert found == pytest.approx(chances or [one["share"] for one in castes.values()])
-
-
-def test_castes_are_blocks_of_ant_numbers():
-    rules = Task(castes={"minor": {"share": 0.75}, "major": {}})
-    assert follows(rules, ants=8).castes.tolist() == [[0] * 6 + [1] * 2]
 
 
 @pytest.mark.parametrize(
@@ -151,38 +144,6 @@ def test_a_caste_with_a_policy_does_not_learn():
     assert (followed == trail_follower()).all()
 
 
-def drawn() -> list:
-    found = []
-    for seed in range(30):
-        one = random_colony(seed, sharing="shared", learner="sarsa", dense=False, changes=True)
-        one = drawn_castes(one, seed, 2, True, None)
-        found += [] if one is None else [one]
-    return found[:1]
-
-
-@pytest.mark.slow
-def test_schedules_threads_and_files_change_nothing(tmp_path):
-    for one in drawn():
-        results = []
-        for schedule, threads in (("by_world", 1), ("by_chunk", 2)):
-            options = {**one.population, "schedule": schedule, "threads": threads}
-            colony = Colony(one.world, one.task, one.training, [3, 4], **options)
-            colony.begin_episode()
-            colony.tick(9)
-            colony.save(tmp_path / "colony.npz")
-            again = Colony.load(tmp_path / "colony.npz")
-            assert again == colony
-            for made in (colony, again):
-                made.tick(9)
-            assert again == colony
-            outcome = colony.outcome()
-            assert (outcome.caste_deliveries.sum(axis=2) == outcome.deliveries).all()
-            results.append((outcome, colony.q_values, colony.stimuli))
-        assert results[0][0] == results[1][0]
-        assert np.array_equal(results[0][1], results[1][1])
-        assert np.array_equal(results[0][2], results[1][2])
-
-
 def test_a_file_of_a_colony_needs_no_policy_file(tmp_path):
     policy = tmp_path / "policy.npz"
     save_policy(policy, random_policy(), {})
@@ -226,16 +187,8 @@ def test_numbers_of_castes_change_in_an_episode():
             r"^`task\.castes\.a\.policy` is 'random', but sharing is \"independent\"",
         ),
         (
-            lambda: follows(Task(castes={"a": {"policy": "no_such"}})),
-            r"^`task\.castes\.a\.policy` is 'no_such'; it must be one of",
-        ),
-        (
             lambda: follows(Task(castes={"a": {"ants": 3}}), ants=5),
             "the castes have 3 ants in nest 0, but 5 ants start there",
-        ),
-        (
-            lambda: follows(Task(castes={"a": {"nest": 1}}), ants=5),
-            "`task.castes.a.nest` is 1, but the world has 1 nest, numbered from 0; choose one",
         ),
     ],
 )

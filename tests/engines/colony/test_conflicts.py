@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taichi_ants import Colony, TrainingConfig, World
+from taichi_ants import Colony, World
 from taichi_ants.grid.randomness import GAMMA, mix
 from taichi_ants.task import Life, Pheromone, Task
-from taichi_ants.task.constants import EMPTY, FOOD, FORWARD, GIVE, LEFT, PICK_UP, RIGHT
-
-TRAINING = TrainingConfig("q_learning", 0.1, 0.9, 0.0, 1.0)
+from taichi_ants.task.constants import EMPTY, FORWARD, GIVE, PICK_UP, RIGHT
 
 
 def begun(world: World, ants: int, life: Life = Life()) -> Colony:  # noqa: B008
@@ -53,20 +51,6 @@ def test_of_two_ants_that_want_one_cell_one_wins(row):
     else:
         assert first == (tuple(normal(cells[0])), 0, 0, -1)
         assert second == (tuple(normal((3, row, 0))), 3, 0, 0)
-
-
-def test_either_of_two_ants_can_win():
-    """Over the rows of the test above each side wins somewhere: the key decides, not the number."""
-    world = World((8, 8, 1), (0, 7, 0))
-    first_wins = [key(world, (2, row, 0)) < key(world, (4, row, 0)) for row in range(6)]
-    assert set(first_wins) == {True, False}
-
-
-def test_the_number_of_an_ant_does_not_matter():
-    """The same two ants listed the other way round: the same one wins."""
-    forward = World((8, 8, 1), (0, 7, 0), ants=[((2, 1, 0), 0), ((4, 1, 0), 3)])
-    backward = World((8, 8, 1), (0, 7, 0), ants=[((4, 1, 0), 3), ((2, 1, 0), 0)])
-    assert ants(act(forward, [1, 1])) == ants(act(backward, [1, 1]))[::-1]
 
 
 def test_two_ants_cannot_swap():
@@ -113,25 +97,12 @@ def test_six_ants_around_the_queen_all_give_in_one_tick():
     assert colony.outcome().deliveries[0, 0] == 6
 
 
-def test_a_blocked_move_turns_the_ant():
-    world = World((8, 8, 1), (3, 0, 0), ants=[((2, 0, 0), 1)])
-    (ant,) = ants(act(world, [LEFT]))  # the queen is up of it
-    assert ant == ((2, 0, 0), 0, 0, -1)
-
-
 def test_ants_look_like_obstacles_to_each_other():
     world = World((8, 8, 1), (0, 7, 0), ants=[((2, 2, 0), 0), ((3, 2, 0), 0)])
     colony = begun(world, 2)
     assert colony.arrays["paper_state"][0] >> 2 & 3 == 1
     colony.act(np.array([[PICK_UP, RIGHT]]))  # the second moves away
     assert colony.arrays["paper_state"][0] >> 2 & 3 == 0
-
-
-def test_food_that_is_taken_grows_back_at_once():
-    world = World((8, 8, 1), (0, 7, 0), foods=[(3, 2, 0)], ants=[((2, 2, 0), 0)])
-    colony = act(world, [PICK_UP], Life(regrowth=0))
-    assert colony.snapshot().ground[world.grid.index((3, 2, 0))] == FOOD
-    assert colony.outcome().regrown[0, 0] == 1
 
 
 def test_a_steep_deposit_after_long_carrying_leaves_nothing():

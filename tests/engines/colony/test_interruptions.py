@@ -5,11 +5,10 @@ from __future__ import annotations
 import signal
 from typing import Any
 
-import numpy as np
 import pytest
 from interrupts import interrupted_after_launch
 
-from taichi_ants import AntsError, Colony, Interventions, TrainingConfig, runtime, task, worlds
+from taichi_ants import AntsError, Colony, Interventions, TrainingConfig, task, worlds
 from taichi_ants.engines.colony import stepping
 from taichi_ants.engines.colony.stepping import ThreadChoice
 from taichi_ants.interventions import AddAnts, Place
@@ -78,41 +77,6 @@ def test_an_episode_that_did_not_begin_completely_is_refused(tmp_path: Any) -> N
     assert made.ticks == 1
 
 
-def test_some_worlds_that_did_not_begin_are_refused() -> None:
-    made = colony()
-    with interrupted_after_launch():
-        made.reset_worlds(np.array([True, False]), [7])
-    with pytest.raises(AntsError, match="not all worlds have begun an episode"):
-        made.tick()
-    made.reset_worlds(np.array([True, False]))
-    made.tick()
-    fresh = Colony(worlds.paper(), task.foraging(), LEARNER, seeds=range(2), ants=8)
-    fresh.reset_worlds(np.array([True, False]))
-    with pytest.raises(AntsError, match="not all worlds have begun an episode"):
-        fresh.tick()
-
-
-def test_an_intervention_that_was_interrupted_is_refused() -> None:
-    made = colony()
-    with interrupted_after_launch():
-        Interventions(made, worlds=[1]).put(made.grid.index([(2, 2, 0)]), FOOD)
-    assert made.running.tolist() == [True, True]  # `observe` stops the others for a moment
-    with pytest.raises(AntsError, match="an intervention was interrupted"):
-        made.tick()
-
-
-def test_worlds_without_room_change_nothing() -> None:
-    made = Colony(worlds.paper(), None, LEARNER, ants=100)
-    made.begin_episode()
-    made.tick(3)
-    before, grid = made.contents()[0], made.grid
-    rocks = grid.cells(np.flatnonzero(grid.exists & (grid.distances((0, 0, 0)) > 3)))
-    with pytest.raises(AntsError):
-        made.begin_episode(world=worlds.World(grid.ranges, (0, 0, 0), [(1, 0, 0)], rocks))
-    assert made.contents()[0] == before
-    made.tick()
-
-
 def test_what_one_world_refuses_changes_none() -> None:
     """Cells, queens, ants and the start of later episodes."""
     made = colony()
@@ -131,17 +95,3 @@ def test_what_one_world_refuses_changes_none() -> None:
             refused.apply(some)
         assert some.state() == before, refused
     made.tick()
-
-
-def test_the_only_food_can_move() -> None:
-    made = colony()
-    (food,) = made.grid.index(made.worlds[0].foods).tolist()
-    there = int(made.grid.index([(2, 2, 0)])[0])
-    Interventions(made).move(food, there)
-    assert [made.snapshot(w).ground[there] for w in range(2)] == [FOOD] * 2
-
-
-def test_a_gpu_is_refused_before_a_colony_starts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runtime, "start", lambda *given: runtime.Runtime("cuda", 1))
-    with pytest.raises(AntsError, match=r"^arch is 'cuda', but colonies run only on the CPU; "):
-        Colony(worlds.paper(), task.foraging(), LEARNER, ants=8, arch="cuda")

@@ -25,7 +25,7 @@ from taichi_ants.settings import declared
 from taichi_ants.task import Pheromone, Task, observations
 from taichi_ants.task.constants import DEPOSIT_LEVEL
 from taichi_ants.task.events import Event
-from taichi_ants.worlds import World, paper
+from taichi_ants.worlds import paper
 
 DELIVERIES = ("terminates", "truncates")
 # Each entry is a kernel of its own, so that there are few: learner, observation, deposit.
@@ -238,11 +238,3 @@ def test_starts_of_ants():
         [(cell, heading)] = starts(world, seed)
         assert tuple(world.grid.cells(cells[0])) == cell
         assert headings[0] == heading
-
-
-def test_worlds_of_one_row():
-    """The narrowest worlds: every side cell lies outside."""
-    world = World((6, 1, 1), queen=(0, 0, 0), foods=[(5, 0, 0)], ants=[((1, 0, 0), 0)])
-    config = TrainingConfig("q_learning", 0.1, 0.9, 0.5, 1.0)
-    plain = assert_equal_steps(world, config, 0, 10, 60, Task(evaporation_in_training=True))
-    assert sum(plain.deliveries) > 0

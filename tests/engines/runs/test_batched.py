@@ -9,11 +9,12 @@ from random_rewards import random_rewards
 from random_worlds import random_world
 
 from taichi_ants import Life, Pheromone, Task, runtime
+from taichi_ants.engines.layout import TERMINATED, TRUNCATED
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.reference import ReferenceColony
 from taichi_ants.task.constants import GIVE, PICK_UP
 from taichi_ants.task.events import Event, Reason
-from taichi_ants.worlds import World, from_text, paper
+from taichi_ants.worlds import World, from_text
 
 # Each is a kernel of its own: observation, deposit, view.
 KERNELS = [
@@ -106,10 +107,9 @@ def test_each_step_equals_the_reference(kernel):
             for i, colony in enumerate(colonies):
                 if begins[i] and not same_step:
                     colony.begin_episode()
-                    assert arrays["events"][i] == Event.NONE
+                    assert arrays["results"][i] == Event.NONE
                     assert arrays["reasons"][i] == Reason.NONE
-                    assert arrays["rewards_of"][i] == arrays["terminations"][i] == 0
-                    assert arrays["truncations"][i] == 0
+                    assert arrays["rewards_of"][i] == 0
                     check_equal(ants, i, colony, world)
                     continue
                 act(colony, actions[i])
@@ -119,18 +119,17 @@ def test_each_step_equals_the_reference(kernel):
                 terminated = gave and ends == "terminates"
                 last = colony.record.ticks == max_steps or (gave and ends != "continues")
                 assert arrays["rewards_of"][i] == step.reward
-                assert arrays["events"][i] == step.event
                 succeeds = step.event not in (Event.BLOCKED, Event.FAILED)
                 assert (arrays["reasons"][i] == Reason.NONE) == succeeds
-                assert arrays["terminations"][i] == terminated
-                assert arrays["truncations"][i] == (last and not terminated)
+                ends_with = TERMINATED * terminated | TRUNCATED * (last and not terminated)
+                assert arrays["results"][i] == step.event | ends_with
                 if last and same_step:
                     (ant,) = colony.ants.values()
                     assert arrays["final_states"][i] == ant.state
                     assert arrays["final_paper_states"][i] == ant.paper_state
                     colony.begin_episode()
                 check_equal(ants, i, colony, world)
-            begins = (arrays["terminations"] | arrays["truncations"]).astype(bool)
+            begins = arrays["results"] >= TRUNCATED
     assert delivered > 12
 
 
@@ -197,11 +196,3 @@ def test_ants_of_different_worlds_and_threads_do_not_meet():
             alone.step(row[mine], same_step=True)
         for name in ("states", "rewards_of", "steps", "ant_cells", "random_states"):
             np.testing.assert_array_equal(alone.arrays[name], seen[1][name][mine], err_msg=name)
-
-
-def test_first_starts_are_those_of_the_world():
-    seeds = np.arange(40, dtype=np.uint64) * np.uint64(2**58 + 7)
-    for world in (paper(), *(random_world(seed) for seed in range(30))):
-        cells, headings = world.first_starts(seeds)
-        for seed, cell, heading in zip(seeds.tolist(), cells, headings, strict=True):
-            assert (cell, heading) == tuple(one[0] for one in world.start(seed))

@@ -114,26 +114,6 @@ def test_micro_worlds_reach_every_state():
             assert seen(world, state >= 64) == state, state_name(state)
 
 
-def test_no_micro_world_shows_another_carrying_state():
-    """The same construction finds no place for the queen in the 28 others."""
-    others = set(range(64, N_STATES)) - set(CARRYING)
-    assert len(others) == 28
-    for state in others:
-        assert not any(queens(state, heading) for heading in range(6)), state_name(state)
-
-
-def test_obstacles_of_all_kinds():
-    """The edge of the world and the queen look O without food; the edge and food do with food."""
-    row = World((4, 1, 1), queen=(0, 0, 0), foods=[(3, 0, 0)], ants=[((1, 0, 0), 3)])
-    assert state_name(seen(row, False)) == "foraging O O O"  # edge, queen, edge
-    between = World((4, 1, 1), queen=(0, 0, 0), foods=[(3, 0, 0)], ants=[((2, 0, 0), 0)])
-    assert state_name(seen(between, False)) == "foraging O F O"
-    assert state_name(seen(between, True)) == "carrying O S O"
-    foods = [beside(CENTRE, heading) for heading in (3, 5, 0, 1)]
-    pantry = World(RANGES, queen=(5, 5, 0), foods=foods, ants=[(CENTRE, 3)])
-    assert state_name(seen(pantry, True)) == "carrying O O O"
-
-
 def test_random_worlds_show_no_other_state():
     """Random walks and learning ants, in all kinds of worlds."""
     met: set[int] = set()

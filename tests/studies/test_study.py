@@ -1,20 +1,30 @@
-"""Studies in blocks: the same results in any order, from any state of the folder."""
+"""Studies: wanted minus present, in blocks of any size, by stages, in shards."""
 
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
+import shutil
+from dataclasses import fields, make_dataclass, replace
 
 import numpy as np
 import pytest
 
 from taichi_ants import AntsError, Colony, TrainingConfig, evaluate, train
-from taichi_ants.files import archives
+from taichi_ants.protocol import At, Every
 from taichi_ants.studies import points as kinds_of_points
-from taichi_ants.studies import runner
-from taichi_ants.studies.points import EVALUATION_SEEDS, ColonyPoint, RunPoint, world_facts
+from taichi_ants.studies.points import (
+    EVALUATION_SEEDS,
+    ColonyPoint,
+    Drawn,
+    FixedPolicy,
+    RunPoint,
+    key_of,
+    settings_of,
+    world_facts,
+)
 from taichi_ants.studies.provenance import provenance, source
-from taichi_ants.studies.runner import Study
+from taichi_ants.studies.store import Store
+from taichi_ants.studies.study import Study, run, share_of
 from taichi_ants.task import Life, Pheromone, Rewards, Task
 from taichi_ants.worlds import World, open_world, paper
 
@@ -32,51 +42,73 @@ KINDS = (
 POINTS = tuple(RunPoint(paper(), task, config, 6, 80, 3) for task, config in KINDS)
 SEEDS = (4, 0, 9, 7, -2)
 NAMES = ("returns", "steps", "deliveries")
+OF_RUNS = (*NAMES, *(f"greedy_{name}" for name in NAMES), "q_values")
+OF_COLONIES = ("deliveries", "first_delivery", "moves", "blocked", "returns")
+
+
+def runs(points, seeds=SEEDS):
+    return Study(points, seeds, OF_RUNS)
+
+
+def colonies(points, seeds=(3, 5)):
+    return Study(points, seeds, OF_COLONIES)
+
+
+def outcomes_of(study, folder, **how):
+    """The arrays of each point, after the study has run."""
+    run(study, Store(folder), **how)
+    return found_in(study, folder)
+
+
+def found_in(study, folder, part=False):
+    arrays = Store(folder).read(study.keys, study.seeds, study.arrays, part)
+    return {p: {n: a[row] for n, a in arrays.items()} for row, p in enumerate(study.points)}
+
+
+def same(one, other):
+    """Whether two studies gave the same."""
+    return one.keys() == other.keys() and all(
+        set(one[point]) == set(other[point])
+        and all(np.array_equal(one[point][name], other[point][name]) for name in one[point])
+        for point in one
+    )
+
+
+def files_in(folder):
+    return sorted((folder / "blocks").glob("*.npz"))
 
 
 @pytest.fixture(params=[2, 11], ids=["blocks of some seeds", "blocks of some points"])
 def study(request, monkeypatch):
     """Five points and five seeds, in blocks of so many runs at most."""
-    monkeypatch.setattr(kinds_of_points, "_STEPS_OF_A_BLOCK", request.param * 6 * 80)
-    return Study(POINTS, SEEDS)
-
-
-def same(one, other):
-    """Whether two studies gave the same, but for the time that it took."""
-    return one.keys() == other.keys() and all(
-        set(one[point]) == set(other[point])
-        and all(
-            np.array_equal(one[point][name], other[point][name])
-            for name in one[point]
-            if name != "seconds"
-        )
-        for point in one
-    )
+    monkeypatch.setattr(RunPoint, "runs_of_a_block", request.param)
+    return runs(POINTS)
 
 
 def test_blocks_cover_all_runs_once_with_one_task_and_learner_each(study):
-    done = []
-    limit = kinds_of_points._STEPS_OF_A_BLOCK // (6 * 80)
-    for some, at in study.blocks():
+    done, limit = [], RunPoint.runs_of_a_block
+    for some, at in study.blocks(np.ones((5, 5), bool)):
         points, seeds = [POINTS[p] for p in some], [SEEDS[s] for s in at]
         assert len(points) * len(seeds) <= limit
         assert len({(p.task, p.training.learner) for p in points}) == 1
         done += itertools.product(points, seeds)
     assert sorted(done, key=str) == sorted(itertools.product(POINTS, SEEDS), key=str)
-    assert len(list(study.blocks())) == {2: 5 * 3, 11: 4}[limit]
 
 
-def test_blocks_are_limited_in_runs_too():
+def test_blocks_are_cut_evenly_and_limited_in_runs():
     short = replace(POINTS[0], episodes=1, max_steps=1, rollouts=1)
-    study = Study((short,), tuple(range(9000)))
-    assert max(len(at) for _, at in study.blocks()) <= 5000
+    sizes = [len(at) for _, at in runs((short,), range(9000)).blocks(np.ones((1, 9000), bool))]
+    assert sizes == [4500, 4500]
     long = replace(POINTS[0], episodes=10**6, max_steps=10**7)
-    assert {len(at) for _, at in Study((long,), (0, 1)).blocks()} == {1}
+    blocks = runs((long,), (0, 1)).blocks(np.ones((1, 2), bool))
+    assert [len(at) for _, at in blocks] == [1, 1]
+    usual = RunPoint(paper(), Task(), SARSA)
+    assert usual.runs_of_a_block == pytest.approx(833)
 
 
 def test_a_study_of_runs_is_training_and_evaluation(study, tmp_path):
     shares = []
-    outcomes = study.run(tmp_path, progress=shares.append)
+    outcomes = outcomes_of(study, tmp_path, progress=shares.append)
     for point in POINTS:
         trained = train(paper(), point.training, SEEDS, 6, 80, point.task)
         greedy = evaluate(paper(), trained.q_values, 3, SEEDS, 80, point.task)
@@ -84,18 +116,17 @@ def test_a_study_of_runs_is_training_and_evaluation(study, tmp_path):
             assert np.array_equal(outcomes[point][name], getattr(trained, name)[0])
             assert np.array_equal(outcomes[point][f"greedy_{name}"], getattr(greedy, name)[0])
         assert np.array_equal(outcomes[point]["q_values"], trained.q_values[0])
-        assert (outcomes[point]["seconds"] > 0).all()
     assert shares[0] == 0
     assert shares[-1] == pytest.approx(1)
     assert all(earlier <= later + 1e-9 for earlier, later in itertools.pairwise(shares))
-    assert len(list(study.blocks())) == len(list(tmp_path.iterdir()))
+    assert len(list(study.blocks(np.ones((5, 5), bool)))) == len(files_in(tmp_path))
 
 
 @pytest.mark.parametrize(("training", "greedy"), [(True, True), (True, False), (False, False)])
 def test_evaporation_is_a_setting_of_each(training, greedy, tmp_path):
     task = Task(evaporation_in_training=training, evaporation_in_evaluation=greedy)
     point = RunPoint(paper(), task, SARSA, 20, 80, 2)
-    outcome = Study((point,), (0, 1)).run(tmp_path)[point]
+    outcome = outcomes_of(runs((point,), (0, 1)), tmp_path)[point]
     trained = train(paper(), SARSA, (0, 1), 20, 80, Task(evaporation_in_training=training))
     other = Task(evaporation_in_evaluation=greedy)
     rollouts = evaluate(paper(), trained.q_values, 2, (0, 1), 80, other)
@@ -106,28 +137,30 @@ def test_evaporation_is_a_setting_of_each(training, greedy, tmp_path):
 
 def test_the_key_of_a_point_holds_the_physics_number(monkeypatch):
     """Results of other physics must not mix; a version alone does not change results."""
-    point = RunPoint(paper(), Task(), SARSA, 20, 80, 2)
-    keys = Study((point,), (0,)).keys
+    key = key_of(POINTS[0])
     monkeypatch.setattr("taichi_ants.__version__", "9.9")
-    assert Study((point,), (0,)).keys == keys
-    monkeypatch.setattr(runner, "PHYSICS", runner.PHYSICS + 1)
-    assert Study((point,), (0,)).keys != keys
+    assert key_of(POINTS[0]) == key
+    assert key_of(POINTS[0], "plugin") != key
+    monkeypatch.setattr(kinds_of_points, "PHYSICS", kinds_of_points.PHYSICS + 1)
+    assert key_of(POINTS[0]) != key
 
 
 LIVELY = Task(delivery="truncates", evaporation_in_training=True, life=Life(regrowth=0))
 WORLDS = tuple(open_world(seed, (12, 12, 12)) for seed in (3, 5))
-ALONE = ColonyPoint(WORLDS, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
+DRAWN = Drawn.by("open", ranges=(12, 12, 12))
+ALONE = ColonyPoint(DRAWN, LIVELY, SARSA, episodes=2, ticks=60, rollouts=2)
 
 
 @pytest.mark.slow
 def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
     joint = replace(ALONE, ants=4, after=ALONE)
     own = replace(ALONE, ants=4, sharing="independent", start="spread")
-    outcomes = Study((joint, own), (3, 5)).run(tmp_path)
-    assert set(outcomes) == {ALONE, joint, own}
+    study = colonies((joint, own))
+    outcomes = outcomes_of(study, tmp_path)
+    (table,) = Store(tmp_path).read(study.first.keys, (3, 5), ("q_values",))["q_values"]
     first = Colony(WORLDS, LIVELY, SARSA, (3, 5))
     first.run(2, 60)
-    assert np.array_equal(outcomes[ALONE]["q_values"], first.q_values)
+    assert np.array_equal(table, first.q_values)
     calm = replace(SARSA, epsilon=SARSA.min_epsilon, epsilon_decay=1.0)
     others = [seed + EVALUATION_SEEDS for seed in (3, 5)]
     for point, more in ((joint, {"q_values": first.q_values}), (own, {})):
@@ -139,81 +172,69 @@ def test_a_study_of_colonies_is_learning_and_evaluation(tmp_path):
         episodes = colony.run(2, 60)
         for name in ("deliveries", "first_delivery", "moves", "blocked", "returns"):
             assert np.array_equal(outcomes[point][name], getattr(episodes, name).T)
-    assert "q_values" not in outcomes[own]  # a table for each ant is not kept
 
 
 @pytest.mark.parametrize("shards", [1, 2, 3, 7, 30])
 def test_shards_have_equal_work_and_keep_points_with_their_tables(shards):
-    seeds = (3, 5, 8, 1, 0)
     one = replace(ALONE, world=WORLDS[0])
     large = replace(one, ants=9)
-    study = Study((large, replace(one, ants=4, episodes=0, after=one)), seeds)
-    shares = [study.share(number, shards) for number in range(1, shards + 1)]
+    study = colonies((large, replace(one, ants=4, episodes=0, after=one), one), (3, 5, 8, 1, 0))
+    shares = [share_of(study.seconds, study.families, n + 1, shards) for n in range(shards)]
     assert (sum(share.astype(int) for share in shares) == 1).all()
-    place, after = (study.in_order.index(study.points[1]), study.in_order.index(one))
     for share in shares:
-        assert (share[place] == share[after]).all()
-    works = [study.weights[share].sum() for share in shares]
-    heaviest = study.weights[study.in_order.index(large), 0]
-    assert max(works) - min(works) <= 2 * heaviest
+        assert (share[1] == share[2]).all()
+    works = [study.seconds[share].sum() for share in shares]
+    assert max(works) - min(works) <= 2 * study.seconds[0, 0]
     if shards == 30:
-        assert sum(share.any() for share in shares) == 2 * len(seeds)
+        assert sum(share.any() for share in shares) == 2 * 5
 
 
-def test_shards_fill_one_folder(tmp_path):
-    study = Study((replace(ALONE, ants=4, episodes=0, after=ALONE), ALONE), (3, 5))
-    (tmp_path / "a").mkdir()
-    (tmp_path / "b").mkdir()
+COPIES = replace(ALONE, ants=4, episodes=0, after=ALONE)
+
+
+def test_shards_in_any_order_fill_one_folder_or_several(tmp_path):
+    study, plain = colonies((COPIES, ALONE)), tmp_path / "plain"
+    expected = outcomes_of(study, plain)
     for number in (2, 1):
-        assert study.run(tmp_path / "a", shard=(number, 2)) == {}
-    blocks = set((tmp_path / "a").iterdir())
-    assert same(study.run(tmp_path / "a"), study.run(tmp_path / "b"))
-    assert set((tmp_path / "a").iterdir()) == blocks
+        run(study, Store(tmp_path / "one"), shard=(number, 2))
+        run(study, Store(tmp_path / f"part {number}"), shard=(number, 2))
+        shutil.copytree(tmp_path / f"part {number}", tmp_path / "merged", dirs_exist_ok=True)
+    for place in ("one", "merged"):
+        before = files_in(tmp_path / place)
+        assert same(outcomes_of(study, tmp_path / place), expected)
+        assert files_in(tmp_path / place) == before  # nothing was missing
 
 
 def only_deliveries(points, seeds, outcome):
-    return {"value_deliveries": outcome["deliveries"].sum(axis=2)}
+    return {"total": outcome["deliveries"].sum(axis=2)}
 
 
-def test_tables_that_were_not_saved_are_learned_again_for_the_points_that_need_them(tmp_path):
-    copies = replace(ALONE, ants=4, episodes=0, after=ALONE)
-    for name in ("a", "b"):
-        (tmp_path / name).mkdir()
-    few = Study((ALONE,), (3, 5)).reduced(tmp_path / "a", only_deliveries)
-    grown = Study((copies, ALONE), (3, 5))
-    ((_, saved),) = Study((ALONE,), (3, 5)).read(tmp_path / "a", (0,))
-    assert saved.keys() == {"value_deliveries"}
-    of_copies = np.array([[False, False], [True, True]])
-    grown.complete(tmp_path / "a", of_copies, "deliveries")
-    plain = grown.run(tmp_path / "b")
-    ((_, found),) = grown.read(tmp_path / "a", [1], "deliveries")
-    for name, array in plain[copies].items():
-        assert np.array_equal(found[name], array)
-    assert np.array_equal(few["deliveries"][0], plain[ALONE]["deliveries"].sum(axis=1))
+def test_tables_that_were_not_kept_are_learned_again_for_the_points_that_need_them(tmp_path):
+    few = Study((ALONE,), (3, 5), ("total",), only_deliveries)
+    assert outcomes_of(few, tmp_path)[ALONE].keys() == {"total"}
+    grown = Study((COPIES, ALONE), (3, 5), ("total",), only_deliveries)
+    expected = outcomes_of(grown, tmp_path / "other")
+    assert same(outcomes_of(grown, tmp_path), expected)
+    with np.load(files_in(tmp_path)[0]) as file:
+        assert {"total", "about"} <= set(file.files) <= {"total", "q_values", "about"}
 
 
 def test_colonies_in_blocks_of_some_seeds_give_the_same(tmp_path, monkeypatch):
     """With worlds of their own, with one for all, from a pool, and going on from others."""
-    seeds = (3, 5, 8, 1, 0)
-    each = replace(ALONE, world=tuple(open_world(seed, (12, 12, 12)) for seed in seeds))
-    one = replace(ALONE, world=WORLDS[0])
+    one, each = replace(ALONE, world=WORLDS[0]), ALONE
     points = (each, replace(each, ants=4, after=each), replace(one, ants=3, sharing="independent"))
     points += (replace(one, ants=4, episodes=0, after=one), replace(each, pool=WORLDS))
-    study, found = Study(points, seeds), []
+    study, found = colonies(points, (3, 5, 8, 1, 0)), []
     for size in (kinds_of_points._NUMBERS_OF_A_BLOCK, 8_000):
         monkeypatch.setattr(kinds_of_points, "_NUMBERS_OF_A_BLOCK", size)
-        blocks = [[at for some, at in study.blocks() if some[0] == p] for p in range(6)]
-        folder = tmp_path / str(size)
-        folder.mkdir()
-        found.append(study.run(folder))
-        assert len(list(folder.iterdir())) == sum(map(len, blocks))
+        found.append(outcomes_of(study, tmp_path / str(size)))
     assert same(*found)
-    assert [len(of_point) for of_point in blocks] == [3, 3, 5, 3, 3, 3]
+    assert len(files_in(tmp_path / "8000")) == 2 * 3 + 3 + 5 + 3 + 3 + 3 - 3
 
 
 def test_a_block_of_colonies_is_limited_in_memory(monkeypatch):
     """To a quarter of a gigabyte, but it has one seed at least."""
-    monkeypatch.setattr(kinds_of_points, "_WORK_OF_A_BLOCK", 1e12)
+    monkeypatch.setattr(kinds_of_points, "_SECONDS_OF_A_BLOCK", 1e12)
     many = replace(ALONE, world=WORLDS[0], ants=10_000, start="spread")
     assert 100 < many.runs_of_a_block < 1000
     tables = replace(many, sharing="independent")
@@ -223,53 +244,50 @@ def test_a_block_of_colonies_is_limited_in_memory(monkeypatch):
 
 @pytest.mark.parametrize("ants", [1, 16, 500, 10**6])
 def test_a_block_of_colonies_is_limited_in_work(ants):
-    """To that of 10^8 ticks of an ant, or to one seed."""
+    """To five seconds of one processor, or to one seed."""
     diffuses = replace(LIVELY, pheromone=Pheromone("exponential", half_life=9, diffusion=0.1))
     for task in (LIVELY, diffuses):
         point = replace(ALONE, world=WORLDS[0], task=task, start="spread", episodes=50, ticks=1000)
         point = replace(point, ants=ants, capacity=10**6 + 1)
-        assert point.weight >= ants * 52_000
-        assert point.runs_of_a_block * point.weight <= 1e8 or point.runs_of_a_block == 1
-    assert point.weight > 52_000 * (ants + 0.07 * WORLDS[0].grid.size)
+        assert point.seconds >= ants * 52_000 / 1e7
+        assert point.runs_of_a_block * point.seconds < 8 or point.runs_of_a_block == 1
+    assert point.seconds > 52_000 * (ants + 0.07 * WORLDS[0].grid.size) / 1e7
 
 
 def test_copies_follow_what_another_point_has_learned_and_train_nothing(tmp_path):
-    copies = replace(ALONE, ants=4, episodes=0, after=ALONE)
-    outcomes = Study((copies,), (3, 5)).run(tmp_path)
+    study = colonies((COPIES,))
+    outcomes = outcomes_of(study, tmp_path)
     calm = replace(SARSA, epsilon=SARSA.min_epsilon, epsilon_decay=1.0)
     others = [seed + EVALUATION_SEEDS for seed in (3, 5)]
-    table = outcomes[ALONE]["q_values"]
+    (table,) = Store(tmp_path).read(study.first.keys, (3, 5), ("q_values",))["q_values"]
     colony = Colony(WORLDS, LIVELY, calm, others, ants=4, sharing="frozen", q_values=table)
-    assert np.array_equal(outcomes[copies]["moves"], colony.run(2, 60).moves.T)
+    assert np.array_equal(outcomes[COPIES]["moves"], colony.run(2, 60).moves.T)
 
 
 def test_points_in_common_are_done_once(tmp_path):
-    copies = replace(ALONE, ants=4, episodes=0, after=ALONE)
-    study = Study((copies, ALONE, replace(ALONE, ants=1)), (3, 5))
-    assert study.in_order == (ALONE, copies)
-    study.run(tmp_path)
-    assert len(list(tmp_path.iterdir())) == 2
+    study = colonies((COPIES, ALONE, replace(ALONE, ants=1)))
+    assert study.points == (COPIES, ALONE)
+    run(study, Store(tmp_path))
+    assert len(files_in(tmp_path)) == 2
 
 
 @pytest.mark.parametrize("kind", ["runs", "colonies"])
-def test_a_study_goes_on_from_any_blocks(kind, study, tmp_path, monkeypatch):
+def test_a_study_resumes_from_any_blocks(kind, study, tmp_path, monkeypatch):
     if kind == "colonies":
-        points = (replace(ALONE, ants=3, after=ALONE), replace(ALONE, ants=2))
-        study = Study(points, (3, 5))
-    first = study.run(tmp_path)
-    blocks = sorted(tmp_path.iterdir())
+        study = colonies((replace(ALONE, ants=3, after=ALONE), replace(ALONE, ants=2), ALONE))
+    first, calls = outcomes_of(study, tmp_path), []
+    blocks = files_in(tmp_path)
     stamps = {file: file.stat().st_mtime_ns for file in blocks}
-    calls = []
     owner = type(study.points[0])
     real = owner.do
     do = staticmethod(lambda *given: calls.append(given) or real(*given))
     monkeypatch.setattr(owner, "do", do)
-    assert same(study.run(tmp_path), first)
+    assert same(outcomes_of(study, tmp_path), first)
     assert calls == []
     for file in blocks[::2]:
         file.unlink()
-    assert same(study.run(tmp_path), first)
-    assert len(calls) == len(blocks[::2])
+    assert same(outcomes_of(study, tmp_path), first)
+    assert len(calls) >= len(blocks[::2])
     for file in blocks[1::2]:
         assert file.stat().st_mtime_ns == stamps[file]
 
@@ -289,7 +307,6 @@ def shift_an_array(path):
 
 DAMAGES = {
     "another header": shift_an_array,
-    "of other points": lambda path: path.write_bytes(min(path.parent.iterdir()).read_bytes()),
     "empty": lambda path: path.write_bytes(b""),
     "cut off": lambda path: path.write_bytes(path.read_bytes()[:-40]),
     "no archive": lambda path: path.write_text("block"),
@@ -298,14 +315,19 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_blocks_are_done_again(damage, study, tmp_path, capsys):
-    first = study.run(tmp_path)
-    path = sorted(tmp_path.iterdir())[2]
+def test_damaged_blocks_are_set_aside_and_done_again(damage, study, tmp_path):
+    """When they are listed or, if an array is damaged, when they are read."""
+    first = outcomes_of(study, tmp_path)
+    path = files_in(tmp_path)[2]
     DAMAGES[damage](path)
-    assert same(study.run(tmp_path), first)
-    (said,) = capsys.readouterr().err.splitlines()
-    assert said.startswith(f"{str(path)!r} is damaged or has other settings")
-    assert archives.read(path)["returns"].size
+    run(study, store := Store(tmp_path))
+    if not store.damaged:
+        with pytest.raises(AntsError, match=f"^'{path}' is damaged, so its runs are missing"):
+            store.read(study.keys, study.seeds, study.arrays)
+        run(study, store)
+    assert store.damaged == [path]
+    assert same(found_in(study, tmp_path), first)
+    assert path.with_suffix(".damaged").exists()
 
 
 def test_an_interruption_loses_one_block_at_most(study, tmp_path):
@@ -314,11 +336,9 @@ def test_an_interruption_loses_one_block_at_most(study, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        study.run(tmp_path, progress=stop)
-    assert 1 <= len(list(tmp_path.iterdir())) < len(list(study.blocks()))
-    other = tmp_path / "other"
-    other.mkdir()
-    assert same(study.run(tmp_path), study.run(other))
+        run(study, Store(tmp_path), progress=stop)
+    assert 1 <= len(files_in(tmp_path)) < len(list(study.blocks(np.ones((5, 5), bool))))
+    assert same(outcomes_of(study, tmp_path), outcomes_of(study, tmp_path / "other"))
 
 
 @pytest.mark.parametrize(
@@ -370,44 +390,94 @@ def test_bad_points_of_colonies_are_named(change, says):
         ((replace(POINTS[0], world=None),), (0,), "world is None"),
         ((replace(POINTS[0], world=World((2, 1, 1), (0, 0, 0), [(1, 0, 0)])),), (0,), "room for 0"),
         ((replace(POINTS[0], world=World((3, 3, 3), (0, 0, 0))),), (0,), "the world has no food"),
-        ((ALONE,), (1, 2, 3), "2 worlds for 3 seeds"),
         ((replace(ALONE, ants=4000),), (3, 5), "the number of ants is 4000"),
     ],
 )
 def test_bad_studies_are_refused_before_any_work(points, seeds, says):
     with pytest.raises(AntsError) as caught:
-        Study(tuple(points), tuple(seeds))
+        Study(tuple(points), tuple(seeds), ("returns",))
     assert says in str(caught.value)
 
 
-def test_settings_tell_all_that_determines_results():
-    first = POINTS[0]
-    settings = Study(POINTS, SEEDS).settings()
-    others = {
+def test_all_that_determines_results_changes_the_key():
+    changes = {
         "world": World((3, 3, 3), (0, 0, 0), foods=[(2, 0, 0)]),
         "task": Task(rewards=Rewards(deliver=11)),
         "training": replace(SARSA, min_epsilon=0.02),
         **{"episodes": 7, "max_steps": 81, "rollouts": 4},
     }
-    for name, value in others.items():
-        changed = Study((replace(first, **{name: value}), *POINTS[1:]), SEEDS)
-        assert changed.settings() != settings, name
-    assert Study(POINTS, SEEDS[:-1]).settings() != settings
-    assert Study(POINTS[:-1], SEEDS).settings() != settings
-    assert Study(tuple(map(replace, POINTS)), SEEDS).settings() == settings
+    several = [POINTS[0], *(replace(POINTS[0], **{n: one}) for n, one in changes.items())]
     joint = replace(ALONE, ants=4, after=ALONE)
-    for name, value in {
-        "after": None,
-        "start": "spread",
-        "ticks": 61,
-        "sharing": "independent",
-    }.items():
-        changed = Study((ALONE, replace(joint, **{name: value})), (3, 5))
-        assert changed.settings() != Study((ALONE, joint), (3, 5)).settings(), name
+    changes = {"after": None, "start": "spread", "ticks": 61, "sharing": "independent"}
+    changes |= {"world": Drawn.by("open", 1, ranges=(12, 12, 12)), "pool": WORLDS}
+    several += [joint, *(replace(joint, **{name: one}) for name, one in changes.items())]
+    assert len({*map(key_of, several)}) == len(several)
+    assert key_of(replace(POINTS[0])) == key_of(POINTS[0])
+
+
+MODEL = Task(life=Life(births=True)).replace(
+    traffic="following", noise={"slip": 0.1}, fields={"home": {"level": 9}}
+)
+GOLDEN = {
+    "runs": POINTS[0],
+    "planning": POINTS[1],
+    "shaped": replace(POINTS[0], task=Task(rewards=Rewards(shaping=0))),
+    "long": RunPoint(paper(), TRUNCATES, SARSA, 500, 600),
+    "followed": RunPoint(
+        *(paper(), Task(), TrainingConfig.frozen(), 0),
+        policy=FixedPolicy.named("trail_follower", Task()),
+    ),
+    "drawn": ALONE,
+    "copies": COPIES,
+    "pool": replace(ALONE, pool=WORLDS, sharing="independent"),
+    "model": ColonyPoint(WORLDS[0], MODEL, SARSA, ants=9, capacity=40),
+    "protocol": replace(
+        ALONE,
+        protocol=[At(20, trail=0), Every(15, add_ants=1)],
+        measures=("entropy",),
+        measure_every=20,
+        capacity=12,
+    ),
+}
+KEYS = {
+    "runs": "f315cfc3ba7dbdaed71ef3dfd98375ad",
+    "planning": "dbec7bcf00150ca36b0062f712f5c625",
+    "shaped": "7db33c8a94ebdb58222af8eeed93c317",
+    "long": "e2ab7a3ee979b55992e96fe628b696c0",
+    "followed": "2f0fbce38ede204d81c7387acc7dfe42",
+    "drawn": "c01e1a3a2d6e90b12d4a29f9a27b8b2c",
+    "copies": "7294b20c6e665c15c86b96b266a30b29",
+    "pool": "60b1fc0f3c9846ff46d786de74631b50",
+    "model": "28ad4587b098e26341d6fff7a71a2551",
+    "protocol": "a0ab1efc8cf6f7c041192fab1b4deea4",
+}
+
+
+@pytest.mark.parametrize("name", GOLDEN)
+def test_keys_are_what_they_were(name):
+    """They change with the physics number only, not if a setting with a neutral default is new."""
+    point = GOLDEN[name]
+    assert key_of(point) == KEYS[name]
+    grown = make_dataclass("Grown", [("later", int, 0)], bases=(type(point),), frozen=True)
+    own = {one.name: getattr(point, one.name) for one in fields(point)}
+    assert key_of(grown(**own)) == KEYS[name]
+    assert key_of(grown(**own, later=1)) != KEYS[name]
+
+
+def test_equal_numbers_of_other_types_have_equal_keys():
+    """As in extended sweeps, whose files write 50 or 50.0, or digits that a float lacks."""
+    for one, other in ((5, 5.0), (0.1, 0.1000000000000000055)):
+        keys = {
+            key_of(replace(POINTS[0], task=Task(rewards=Rewards(deliver=5)), training=training))
+            for training in (replace(SARSA, initial_q=one), replace(SARSA, initial_q=other))
+        }
+        assert len(keys) == 1
+    recipes = (Drawn.by("open", ranges=(12, 12, 12), rock_share=share) for share in (0, 0.0))
+    assert len({*recipes}) == 1
 
 
 def test_settings_say_once_what_all_points_have_in_common():
-    settings = Study(POINTS, SEEDS).settings()
+    settings = settings_of(POINTS, SEEDS)
     assert settings["task.delivery"] == [task.delivery for task, _ in KINDS]
     assert settings["task.rewards.deliver"] == 10
     assert settings["training.hyperparameters.planning_steps"] == [None, 2, None, None, None]

@@ -1,0 +1,51 @@
+"""A second process, which computes bounds and draws; threads of one would take turns at that."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import Any
+
+from taichi_ants.runtime import available_threads
+from taichi_ants.studies.executors import Workers
+
+Begun = Callable[[], Any]  # waits for the result of a call
+
+_process: Workers | None = None
+
+
+@contextmanager
+def second(wanted: bool) -> Iterator[None]:
+    """Yield while there is a second process, if it is wanted and the machine can run two."""
+    global _process
+    if wanted and available_threads() > 1:
+        with Workers(1) as _process:
+            yield
+        _process = None
+    else:
+        yield
+
+
+def begin(call: Callable[..., Any], *given: Any, **named: Any) -> Begun:
+    """Return a function that waits for the result of a call, which the second process runs.
+
+    Without one, the call runs here, when the function is called. The called function must be at the
+    top level of a module of this folder or of the package.
+    """
+    here = partial(call, *given, **named)
+    return _process.submit(here).result if _process else here
+
+
+def results_of(calls: Sequence[Begun], progress: Callable[[float], None]) -> list[Any]:
+    """Return the results of calls that have begun; raises an error after all have ended."""
+    found, errors = [], []
+    for number, call in enumerate(calls):
+        progress(number / len(calls))
+        try:
+            found.append(call())
+        except Exception as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]
+    return found

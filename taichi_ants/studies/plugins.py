@@ -1,0 +1,141 @@
+"""Python files of users: plugins, and the modules of studies. They travel to workers as bytes."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib.util
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.machinery import ModuleSpec, PathFinder
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from taichi_ants.errors import AntsError
+
+Code = Mapping[str, bytes]  # a file by its path, and then the files in its folder that it imports
+
+_imports: dict[str, ModuleSpec | None] = {}  # files that plugins import from their folders
+_finder: Any = SimpleNamespace(find_spec=lambda name, *_: _imports.get(name))  # see `sys.meta_path`
+_loaded: dict[str, list[bytes]] = {}  # what `load_code` has loaded, by the name of the file
+_folders: list[tempfile.TemporaryDirectory[str]] = []  # of loaded code, until this process ends
+
+
+def read_plugin(path: str | None) -> dict[str, bytes]:
+    """Return the contents of a plugin, if any, and then of the files that it needs.
+
+    These are the modules and packages of its folder that it imports, and `NAME*.toml` and
+    `NAME*.html` for NAME.py.
+
+    Raises:
+        AntsError: A file cannot be read, or has the name of an installed module.
+    """
+    if path is None:
+        return {}
+    found, waiting, folder = dict[str, bytes](), [Path(path)], Path(path).parent
+    for one in waiting:
+        if str(one) in found:
+            continue
+        try:
+            found[str(one)] = one.read_bytes()
+        except (OSError, ValueError) as error:
+            raise AntsError(
+                f"cannot read the plugin {path!r}; name a Python file (.py)."
+            ) from error
+        if one.suffix == ".py" or one == Path(path):
+            waiting += _needed(folder, one, found[str(one)])
+    return found
+
+
+def _needed(folder: Path, path: Path, content: bytes) -> Iterator[Path]:
+    """Yield the files of a folder that one of its modules needs."""
+    for end in (".toml", ".html") if path.parent == folder else ():
+        yield from sorted(folder.glob(f"{path.stem}*{end}"))
+    try:
+        nodes = [*ast.walk(ast.parse(content, path))]
+    except SyntaxError:
+        return  # which `load_plugin` reports
+    names = [name.name for node in nodes if isinstance(node, ast.Import) for name in node.names]
+    names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+    installed = [one for one in sys.path if one.endswith(("site-packages", "dist-packages"))]
+    for name in dict.fromkeys(name.partition(".")[0] for name in names if name):
+        module, package = folder / f"{name}.py", folder / name / "__init__.py"
+        several = [module] if module.is_file() else []
+        if package.is_file():
+            every = sorted(package.parent.rglob("*"))
+            several = [package, *(e for e in every if e.suffix in (".py", ".toml", ".html"))]
+        if several and (name in sys.stdlib_module_names or PathFinder.find_spec(name, installed)):
+            raise AntsError(f"{str(several[0])!r} has an installed module's name; rename it.")
+        yield from several
+
+
+def load_plugin(path: str | None) -> Any:
+    """Return the module of a Python file, after running it; do nothing for None.
+
+    Raises:
+        AntsError: The file cannot be read, raises or exits.
+    """
+    if path is None:
+        return None
+    spec = importlib.util.spec_from_file_location(f"plugin_{Path(path).stem}", path)
+    if spec is None or spec.loader is None:
+        raise AntsError(f"cannot read the plugin {path!r}; name a Python file (.py).")
+    if _finder not in sys.meta_path:
+        sys.meta_path.insert(0, _finder)
+    module = importlib.util.module_from_spec(spec)
+    try:
+        for one in [Path(one) for one in read_plugin(path)][1:]:
+            if one.suffix == ".py" and (one.parent == Path(path).parent or one.stem == "__init__"):
+                _let_import(one)
+        sys.modules[spec.name] = module  # Taichi reads the source of functions by their module
+        spec.loader.exec_module(module)
+    except AntsError:
+        raise
+    except (Exception, SystemExit) as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".splitlines())
+        lacks = isinstance(error, ModuleNotFoundError)
+        remedy = "install it, or save it in the plugin's folder" if lacks else "correct the file"
+        raise AntsError(f"the plugin {path!r} failed with {reason}; {remedy}.") from error
+    return module
+
+
+def _let_import(path: Path) -> None:
+    """Let Python find the module or package of a file by its name alone."""
+    name = path.parent.name if path.stem == "__init__" else path.stem
+    _imports[name] = importlib.util.spec_from_file_location(name, path)
+    before = getattr(sys.modules.get(name), "__file__", None)
+    if before and Path(before).resolve() != path.resolve():  # that of another plugin
+        for one in [one for one in sys.modules if one == name or one.startswith(f"{name}.")]:
+            del sys.modules[one]
+
+
+def load_code(several: Iterable[Code]) -> None:
+    """Load code that came to this process as bytes, unless it has loaded it before.
+
+    Raises:
+        AntsError: A file raises, or the process has loaded another file of this name.
+    """
+    for code in several:
+        name, contents = Path(next(iter(code))).name, [*code.values()]
+        if _loaded.setdefault(name, contents) != contents:
+            raise AntsError(f"a worker has loaded another file {name!r}; start new workers.")
+        if f"plugin_{Path(name).stem}" in sys.modules:
+            continue
+        _folders.append(tempfile.TemporaryDirectory())
+        for place, content in placed(code, Path(_folders[-1].name)).items():
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(content)  # because Taichi reads the source of functions
+        load_plugin(str(Path(_folders[-1].name, name)))
+
+
+def placed(code: Code, folder: Path) -> dict[Path, bytes]:
+    """Return the contents of code by the paths that its files would have in another folder."""
+    own = Path(next(iter(code), "")).parent
+    return {folder / Path(one).relative_to(own): content for one, content in code.items()}
+
+
+def checksum_of(code: Code) -> str:
+    """Return the hexadecimal SHA-256 of the contents of code."""
+    return hashlib.sha256(b"\0".join(code.values())).hexdigest()

@@ -1,0 +1,162 @@
+"""Ray as an executor: workers on this machine, or in a cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import taichi_ants
+from taichi_ants.errors import AntsError, count, imported
+from taichi_ants.runtime import available_threads
+from taichi_ants.studies.executors import RESUME, LostWorkersError
+
+_LOOK_EVERY, _PATIENCE, _RETRIES = 5.0, 3.0, 3  # seconds between looks, and for an answer
+# Ray reads them when it starts: it sends no statistics, and prints fatal errors only.
+_ENVIRONMENT = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_BACKEND_LOG_LEVEL": "fatal",
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+}
+
+
+class RayWorkers(Executor):
+    """Workers that Ray starts, each with `threads` processors, and a GPU for "cuda".
+
+    Ray must not run in this process. It is connected until the `with` block ends. If a worker or
+    its machine dies, Ray repeats the call elsewhere. The workers of a cluster run the source of
+    this package that this process runs.
+
+    Args:
+        address: HOST:PORT of a cluster that this machine belongs to; None starts Ray on this
+            machine alone, and ends it.
+
+    Raises:
+        AntsError: Ray is not installed, or no cluster is at the address.
+    """
+
+    def __init__(self, address: str | None = None, threads: int = 1, arch: str = "cpu") -> None:
+        for name, value in _ENVIRONMENT.items():
+            os.environ.setdefault(name, value)
+        where: dict[str, Any] = {"address": "local", "num_cpus": available_threads()}
+        where["include_dashboard"] = False
+        if address:
+            _check_listens(address)
+            if _has_token():  # `ray start` demands it then; clusters without tokens ignore it
+                os.environ.setdefault("RAY_AUTH_MODE", "token")
+            own = str(Path(taichi_ants.__file__).parent)
+            where = {"address": address, "runtime_env": {"py_modules": [own]}}
+        self._ray = imported("a cluster", "ray", "ray")
+        with _quiet_start():
+            try:
+                self._ray.init(**where, logging_level="ERROR", log_to_driver=False)
+            except (Exception, SystemExit) as error:
+                why = (str(error).strip() or type(error).__name__).splitlines()[0].rstrip(".:")
+                raise AntsError(
+                    f"cannot use Ray at {address or 'this machine'} ({why}); check it with `ray "
+                    "status`, and if it needs a token, set RAY_AUTH_MODE to token, and "
+                    "RAY_AUTH_TOKEN to the one that `ray get-auth-token` prints on the head."
+                ) from error
+        self._head: str = self._ray.get_runtime_context().gcs_address
+        self._needs = {"CPU": threads, "GPU": int(arch == "cuda")}
+        needs = {"num_cpus": threads, "num_gpus": self._needs["GPU"]}
+        self._remote = self._ray.remote(**needs, max_retries=_RETRIES)
+        self._tasks: dict[Callable[..., Any], Any] = {}
+        self._looked, self.num_workers = 0.0, 1
+        self._ended = threading.Event()
+        threading.Thread(target=self._count, daemon=True).start()
+
+    def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        """Return the future of a call in a worker."""
+        if call not in self._tasks:
+            self._tasks[call] = self._remote(call)
+        mine: Future[Any] = Future()
+        mine.set_running_or_notify_cancel()
+        theirs = self._tasks[call].remote(*given, **named).future()
+        theirs.add_done_callback(lambda done: self._pass_on(mine, done))
+        return mine
+
+    def _pass_on(self, mine: Future[Any], theirs: Future[Any]) -> None:
+        """Give the outcome of Ray's future to the one that `submit` has returned."""
+        error = theirs.exception()
+        if error is None:
+            mine.set_result(theirs.result())
+        elif isinstance(error, self._ray.exceptions.RayTaskError):  # its text has a traceback
+            last = str(error).strip().rpartition("\n")[2]
+            mine.set_exception(getattr(error, "cause", None) or RuntimeError(last))
+        else:
+            mine.set_exception(BrokenExecutor(type(error).__name__))
+
+    def _count(self) -> None:
+        """Count workers in another thread, because Ray waits a minute for a dead head."""
+        while not self._ended.is_set():
+            with suppress(Exception):  # `check` reports a dead head
+                has = self._ray.cluster_resources()
+                room = (has.get(name, 0) // n for name, n in self._needs.items() if n)
+                self.num_workers = max(1, int(min(room)))
+            self._ended.wait(_LOOK_EVERY)
+
+    def check(self) -> None:
+        """Raise LostWorkersError if the head has died; Ray would end this process without a word.
+
+        Any question to a dead head hangs, so this only opens a connection to it.
+        """
+        if time.monotonic() - self._looked < _LOOK_EVERY:
+            return
+        with suppress(AntsError):
+            _check_listens(self._head)
+            self._looked = time.monotonic()
+            return
+        raise LostWorkersError(
+            f"the head of the Ray cluster at {self._head!r} does not answer any more; {RESUME}."
+        )
+
+    def state(self) -> str:
+        """Return the number of workers, for progress bars."""
+        return count(self.num_workers, "worker")
+
+    def __exit__(self, *raised: object) -> None:
+        self._ended.set()
+        self._ray.shutdown()
+
+
+def _has_token() -> bool:
+    """Return whether this machine has a token of Ray, by which clusters know their users."""
+    names = {"RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"}
+    return bool(names & os.environ.keys()) or Path("~/.ray/auth_token").expanduser().exists()
+
+
+def _check_listens(address: str) -> None:
+    """Raise AntsError unless a program listens at HOST:PORT."""
+    host, _, port = address.rpartition(":")
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE).close()
+    except OSError as error:
+        why = error.strerror or str(error) or type(error).__name__
+        raise AntsError(
+            f"no Ray cluster listens at {address!r} ({why}); give the address that `ray start` has "
+            "printed, or --ray alone to use this machine."
+        ) from error
+
+
+@contextmanager
+def _quiet_start() -> Iterator[None]:
+    """Discard what Ray's library in C++ prints at the start, and keep what SIGTERM does."""
+    before, errors = signal.getsignal(signal.SIGTERM), os.dup(2)
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 2)
+        yield
+    finally:
+        os.dup2(errors, 2)
+        os.close(errors)
+        os.close(nothing)
+        with suppress(ValueError):  # this is not the main thread
+            signal.signal(signal.SIGTERM, before)
