@@ -208,15 +208,10 @@ def search(
     and Hoos 2000); for their rules and papers, see docs/baselines.md. Every ant walks at random
     from the queen until it reaches food. Its walk without loops is its *tour*.
 
-    Args:
-        world: The world; its trails and listed ants have no effect.
-        method: "ant_system": all ants deposit. "max_min": the best ant of the iteration deposits,
-            and tau stays between bounds that depend on the shortest tour so far.
-        iterations, ants: The number of iterations, and of ants in each colony.
-        colonies: The number of colonies; more colonies do not change the first ones.
-        alpha: The exponent of pheromone in the choice of arcs.
-        evaporation: rho; None means 0.5, or 0.02 with "max_min".
-        max_steps: The number of steps after which an ant gives up and deposits nothing.
+    With "ant_system", all ants deposit. With "max_min", the best ant of the iteration does, and tau
+    stays between bounds that depend on the shortest tour so far. `alpha` is the exponent of
+    pheromone in the choice of arcs, and `evaporation` is rho: by default 0.5, with "max_min" 0.02.
+    An ant gives up after `max_steps`. More colonies do not change the first ones.
     """
     rho = EVAPORATION[method] if evaporation is None else evaporation
     _, neighbours, is_food, start, shortest = open_cells(world)

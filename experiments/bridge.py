@@ -135,7 +135,7 @@ def crossed(
 
 
 def tables(plan: Plan, results: Results) -> str:
-    """Return the report, which needs all runs, and write counts and figures."""
+    """Return the report, which needs all runs, after writing counts and figures."""
     if not results.present.all():
         raise AntsError("not all runs are there yet, and the report compares all designs; wait.")
     arrays = results.read(f"crossings_{plan.ticks}")

@@ -299,7 +299,7 @@ def with_bounds(
 
 
 def tables(plan: Plan, runs: Runs) -> str:
-    """Return the report, and write all results; while runs are missing, those of whole conditions.
+    """Return the report, after writing all results; while runs are missing, of whole conditions.
 
     The policies are those of median seeds.
     """

@@ -106,19 +106,12 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
 
 @dataclass(frozen=True)
 class Plan:
-    """The study of a comparison.
-
-    Attributes:
-        study: The points of the grid.
-        world_name: The name of the world for readers.
-        exact: A function that waits for the exact bounds.
-        renders: Whether figures come with animations.
-    """
+    """The study of a comparison: the points of the grid."""
 
     study: Study
-    world_name: str
-    exact: process.Begun
-    renders: bool
+    world_name: str  # for readers
+    exact: process.Begun  # waits for the exact bounds
+    renders: bool  # whether figures come with animations
 
 
 def plan(options: Mapping[str, Any]) -> Plan:
@@ -225,7 +218,7 @@ def what_policies_do(
 
 
 def tables(plan: Plan, results: Results) -> str:
-    """Return the report, and write all results; while runs are missing, those of whole rows."""
+    """Return the report, after writing all results; while runs are missing, of whole rows."""
     folder, arch = results.folder, results.arch
     rows = np.flatnonzero(results.present.all(axis=1)).tolist()
     if not rows:
@@ -274,7 +267,7 @@ def comparison_of(study: Study, world: str, arrays: Mapping[str, np.ndarray]) ->
 def write_tables(
     folder: Path, comparison: Comparison, baselines: Sequence[Baseline]
 ) -> tuple[list[Line], Audit]:
-    """Return our table 2 and the findings on the claims, and write all tables."""
+    """Return our table 2 and the findings on the claims, after writing all tables."""
     summaries = summarise(comparison)
     lines, audit = table2(comparison, summaries), assess(comparison)
     for name, rows in {

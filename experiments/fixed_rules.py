@@ -72,12 +72,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
     add = parser.add_argument
-    worlds = {
-        "nargs": "+",
-        "choices": tuple(WORLDS),
-        "metavar": "NAME",
-        "default": tuple(WORLD_KINDS),
-    }
+    worlds = {"nargs": "+", "choices": tuple(WORLDS), "metavar": "NAME"}
+    worlds["default"] = tuple(WORLD_KINDS)
     add("--worlds", **worlds, help="kinds of world, as in colony.py study --world-kinds")
     add("--ants", type=whole_number(1), default=64, metavar="N", help="number of ants per colony")
     seeds = "number of seeds, starting at 0"

@@ -111,14 +111,10 @@ def choices(
     10 r cells of 2 seconds each. An ant is in the first cell when it chooses and in the last when
     it arrives. `docs/research_notes.md` compares readings of the paper.
 
-    Args:
-        short, long: Steps to cross the branches, see `crossing_steps`; `short` is not above `long`.
-        colonies: The number of colonies; more colonies do not change the first ones.
-        ants: The number of choices, which is even: ants choose in turn at the nest, first, and at
-            the food.
-        k, n: The constant and the exponent of the choice function.
-        opens: The number of ants, from 0 to `ants`, that choose before the short branch opens and
-            have to take the long one.
+    `short` and `long` are the steps to cross the branches, see `crossing_steps`. `ants` is the
+    number of choices, and even: ants choose in turn at the nest, first, and at the food. The first
+    `opens` ants choose before the short branch opens, and take the long one. More colonies do not
+    change the first ones.
     """
     checked_whole("`long`", long, short)
     checked_whole("`opens`", opens, 0, ants)

@@ -14,24 +14,18 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import math
     from collections.abc import Iterator, Sequence
     from dataclasses import dataclass, replace
-    from itertools import islice
-    from typing import Any
+    from itertools import zip_longest
 
     import numpy as np
 
-    from taichi_ants import TrainingConfig, World, evaluate, learners, train
+    from taichi_ants import TrainingConfig, World, evaluate, learners, rollout, train
     from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS, OTHER, classify
     from taichi_ants.commands import render
     from taichi_ants.errors import count
     from taichi_ants.rendering import Episode, check_animation, colours, text
     from taichi_ants.rendering.rasteriser import Rasteriser, cell, draw_marks
     from taichi_ants.rendering.scene import check_size
-    from taichi_ants.studies.command_line import (
-        Parser,
-        given_world,
-        run_command,
-        whole_number,
-    )
+    from taichi_ants.studies.command_line import Parser, given_world, run_command, whole_number
     from taichi_ants.studies.plugins import load_plugin
     from taichi_ants.task import Rewards, Task
     from taichi_ants.task.constants import N_ACTIONS
@@ -81,23 +75,18 @@ def learning_checkpoints(
     config: TrainingConfig,
     seed: int,
     checkpoints: Sequence[int],
-    max_steps: int = 150,
+    steps: int = 150,
     task: Task = render.TASK,
     epsilon: float = 0.0,
 ) -> list[Checkpoint]:
-    """Return rollouts of an ant's policy, one after each given number of training episodes.
-
-    `max_steps` and the exploration rate `epsilon` are those of rollouts.
-    """
+    """Return rollouts of at most `steps`, one after each given number of training episodes."""
     found = []
     for n in checkpoints:
         table = action_values(world, config, [seed], n, task)[0]
-        limits: dict[str, Any] = {"max_steps": max_steps, "task": task, "epsilon": epsilon}
-        episode = Episode.play(world, table, seed=seed, **limits)
-        behaviour = classify(episode.trace, max_steps)[0][0]
-        note = BEHAVIOURS[behaviour]
-        if behaviour in (DELIVERS, OTHER):
-            note = "delivered" if episode.delivered else ""
+        episode = Episode(rollout(world, table, seed, 0, steps, task, epsilon), "")
+        behaviour = classify(episode.trace, steps)[0][0]
+        delivered = "delivered" if episode.delivered else ""
+        note = delivered if behaviour in (DELIVERS, OTHER) else BEHAVIOURS[behaviour]
         found.append(Checkpoint(n, episode, note))
     return found
 
@@ -107,7 +96,7 @@ def typical_seed(
     config: TrainingConfig,
     seeds: Sequence[int],
     checkpoints: Sequence[int],
-    max_steps: int = 150,
+    steps: int = 150,
     task: Task = render.TASK,
     epsilon: float = 0.0,
 ) -> tuple[int, list[int]]:
@@ -120,7 +109,7 @@ def typical_seed(
     distances, deliver = np.zeros(len(seeds)), []
     for n in checkpoints:
         tables = action_values(world, config, seeds, n, task)
-        outcome = evaluate(world, tables, 1, seeds, max_steps, task, epsilon)
+        outcome = evaluate(world, tables, 1, seeds, steps, task, epsilon)
         for values in (outcome.returns[:, 0], outcome.steps[:, 0]):
             above = np.sign(values[:, None] - values).sum(axis=1)  # 0 at the middle rank
             distances = np.maximum(distances, np.abs(above) / len(seeds))
@@ -163,13 +152,11 @@ def learning_frames(
     top += (bottom - top - rows * h) // 2
     grid, margin = checkpoints[0].episode.arguments.world.grid, max(2, round(min(w, h) / 60))
     rasteriser = Rasteriser(grid, w, max(1, h - lines), margin)
-    pictures = [
-        tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints
-    ]
-    for _ in range(max(len(checkpoint.episode) for checkpoint in checkpoints)):
-        for place, waiting in enumerate(pictures):
+    tiles = [tile_pictures(checkpoint, rasteriser, h, letters, more) for checkpoint in checkpoints]
+    for present in zip_longest(*tiles):
+        for place, tile in enumerate(present):
             x, y = place % columns * w, top + place // columns * h
-            for tile in islice(waiting, 1):
+            if tile is not None:
                 canvas[y : y + h, x : x + w] = tile
         yield canvas.copy()
 
@@ -231,13 +218,8 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     add = parser.add_argument
     seeds = "without --seed, train seeds 0 to N - 1 and show the median one"
     add("--seeds", type=whole_number(1, 10_000), default=200, metavar="N", help=seeds)
-    after = "numbers of training episodes after which to show the ant"
-    add(
-        "--checkpoints",
-        **{"nargs": "+", "type": whole_number(0), "metavar": "N"},
-        default=CHECKPOINTS,
-        help=after,
-    )
+    more = {"nargs": "+", "type": whole_number(0), "metavar": "N", "default": CHECKPOINTS}
+    add("--checkpoints", **more, help="numbers of training episodes after which to show the ant")
     settings = render.parse(parser, arguments)
     if settings.checkpoints != sorted(set(settings.checkpoints)):
         parser.error(f"--checkpoints is {settings.checkpoints}; it must be ascending numbers")

@@ -68,22 +68,18 @@ def possible_states(observation: Observation) -> Sequence[int]:
 
 def usual_spread(q_values: np.ndarray, observation: Observation) -> float:
     """Return the mean spread of action values, over possible states whose values differ."""
-    rows = q_values.astype(np.float64)[list(possible_states(observation))]
-    spreads = np.ptp(rows, axis=1)
+    spreads = np.ptp(q_values.astype(np.float64)[list(possible_states(observation))], axis=1)
     return float(spreads[spreads > 0].mean()) if spreads.any() else 0.0
 
 
 def clarity(values: np.ndarray, spread: float) -> float:
-    """Return the gap between the two best action values as a share of the usual spread, 0 to 1.
-
-    Relative to the state's own values, every small gap would look like a clear choice.
-    """
+    """Return the gap between the two best of action values (5,) as a share of the usual spread."""
     *_, second, best = np.sort(values.astype(np.float64)).tolist()
     return min(1.0, (best - second) / spread)
 
 
 def learned(values: np.ndarray, spread: float) -> bool:
-    """Return whether action values (5,) differ by 1 % of the table's `usual_spread` or more.
+    """Return whether action values (5,) differ by 1 % of the usual spread or more.
 
     If they differ by less, the best action may just be the one that was tried least.
     """

@@ -225,17 +225,10 @@ def forage(
     where the reward R_p is 1 in a cell of goal p, else 0. Then it moves to the neighbour with the
     highest utility of the other goal. `docs/baselines.md` lists sources and deviations.
 
-    Args:
-        world: The world; its trails and listed ants have no effect.
-        ticks: The number of ticks.
-        ants: The number of ants in each colony, which all start in the nest.
-        colonies: The number of colonies; more colonies do not change the first ones.
-        capacity: The largest number of ants in a cell; the nest has no limit.
-        discount: The factor by which utility decreases per step, above 0 and below 1.
-        evaporation: The share of all utilities that evaporates per tick.
-        exploration: The probability of a random step if a neighbour has a utility above 0.
-        momentum: The probability of a step straight ahead, if possible, where no neighbour has a
-            utility above 0.
+    All `ants` of a colony start in the nest, which has room for all; a cell has room for
+    `capacity`. `evaporation` is the share of utilities that evaporates per tick. `exploration` is
+    the probability of a random step if a neighbour has a utility above 0. Where none has,
+    `momentum` is that of a step straight ahead, if possible. More colonies do not change the first.
     """
     cells, neighbours, is_food, nest, steps = open_cells(world)
     numbers = np.arange(colonies)[:, None] * 2**32 + np.arange(ants)

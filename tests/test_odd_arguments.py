@@ -15,7 +15,6 @@ from taichi_ants import (
     learners,
     offline,
     record,
-    rendering,
     rollout,
     states,
     train,
@@ -25,7 +24,6 @@ from taichi_ants.analysis import statistics
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
-from taichi_ants.rendering import save_animation
 from taichi_ants.studies.command_line import Parser, notice
 from taichi_ants.viewer import check_page, frame, notebook, record_colony
 
@@ -60,8 +58,6 @@ ODD = {
     "a far cell": lambda _: WORLD.grid.index([(2**63, 0, 0)]),
     "far cells": lambda _: WORLD.grid.number([(2**62, -(2**62), 0)]),
     "index": lambda _: WORLD.grid.cells(RAGGED),
-    "moments": lambda _: next(rendering.frames("x")),
-    "frames": lambda _: save_animation("never.gif", SCALAR),
     "a learner": lambda _: learners.get(LONG),
     "no learner": lambda _: learners.get(["sarsa"]),
     "no configuration": lambda _: learners.with_hyperparameters(None),

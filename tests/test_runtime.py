@@ -6,12 +6,10 @@ import os
 import subprocess
 import sys
 import tempfile
-from pathlib import Path
 
 import pytest
 from command_lines import ROOT
 
-from taichi_ants import runtime
 from taichi_ants.environment import fallback_folder, prepare_for_taichi
 
 BEGINNING = """
@@ -174,27 +172,6 @@ colony.tick()
 trained()
 """
     python(BEGINNING + script, tmp_path, PYTHONWARNINGS="ignore")
-
-
-@pytest.mark.parametrize(
-    ("contents", "threads"),
-    [
-        (["150000 100000\n"], 2),
-        (["100000 100000\n"], 1),
-        (["50000\n", "100000\n"], 1),  # half a processor
-        (["max 100000\n"], 64),  # no quota
-        (["-1\n", "100000\n"], 64),
-        (["?"], 64),
-        ([], 64),
-    ],
-)
-def test_a_container_grants_time(contents, threads, monkeypatch, tmp_path):
-    names = tuple(str(tmp_path / str(k)) for k in range(max(1, len(contents))))
-    for name, text in zip(names, contents, strict=False):
-        Path(name).write_text(text)
-    monkeypatch.setattr(runtime, "_QUOTAS", (names,))
-    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(64), raising=False)
-    assert runtime.available_threads() == threads
 
 
 @pytest.fixture

@@ -51,8 +51,8 @@ def _look(world, ground, trail, cell, heading, carries):
     if carries:
         for k in range(3):
             look = ground[cell + world.ahead[k, heading]]
-            lure = look == 0 and world.closer[k, cell, heading]
-            state = state << 2 | (CUE if lure else look >> 2)
+            shows_cue = look == 0 and world.closer[k, cell, heading]
+            state = state << 2 | (CUE if shows_cue else look >> 2)
         return state
     strongest = 2
     for k in range(3):
@@ -61,8 +61,8 @@ def _look(world, ground, trail, cell, heading, carries):
             strongest = max(strongest, trail[there])
     for k in range(3):
         there = cell + world.ahead[k, heading]
-        lure = ground[there] == 0 and 2 * trail[there] >= strongest
-        state = state << 2 | (CUE if lure else ground[there] & 3)
+        shows_cue = ground[there] == 0 and 2 * trail[there] >= strongest
+        state = state << 2 | (CUE if shows_cue else ground[there] & 3)
     return state
 
 

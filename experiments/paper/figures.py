@@ -161,12 +161,12 @@ def return_against_deliveries(comparison: Comparison, baselines: Sequence[Baseli
     return figure
 
 
-FIGURES = (learning_curves, return_against_deliveries)
-
-
 def draw_all(comparison: Comparison, baselines: Sequence[Baseline]) -> dict[str, Figure]:
     """Return all figures by name."""
-    return {draw.__name__: draw(comparison, baselines) for draw in FIGURES}
+    return {
+        draw.__name__: draw(comparison, baselines)
+        for draw in (learning_curves, return_against_deliveries)
+    }
 
 
 def save_all(comparison: Comparison, baselines: Sequence[Baseline], folder: Path) -> None:

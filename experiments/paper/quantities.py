@@ -159,29 +159,32 @@ class Quantity:
 
 def of(read: Read, measure: str, *variants: Variant) -> Quantity:
     """Return the measure of each learner."""
-    effects = {variant.label: _effect(read, measure, variant) for variant in variants}
+    effects = {one.label: partial(_value, read, measure, one) for one in variants}
     return _quantity(read.words, measure, effects, SHARE)
 
 
 def of_each(measure: str, variant: Variant, *reads: Read) -> Quantity:
     """Return the measure of a learner, computed in several ways."""
-    effects = {f"{variant.label}, {one.words}": _effect(one, measure, variant) for one in reads}
+    effects = {
+        f"{variant.label}, {one.words}": partial(_value, one, measure, variant) for one in reads
+    }
     return _quantity(ALL, measure, effects)
 
 
 def minus(read: Read, measure: str, *both: tuple[Variant, Variant]) -> Quantity:
     """Return the measure of the first minus that of the second learner of each pair, by seed."""
     effects = {
-        f"{one.label} minus {other.label}": _effect(read, measure, one, other)
+        f"{one.label} minus {other.label}": partial(_value, read, measure, one, less=other)
         for one, other in both
     }
     return _quantity(read.words, measure, effects, DIFFERENCE)
 
 
-def _effect(read: Read, measure: str, variant: Variant, less: Variant | None = None) -> Effect:
-    if less is None:
-        return lambda grids: read.values(grids, measure, variant)
-    return lambda grids: read.values(grids, measure, variant) - read.values(grids, measure, less)
+def _value(
+    read: Read, measure: str, variant: Variant, grids: Grids, less: Variant | None = None
+) -> np.ndarray:
+    values = read.values(grids, measure, variant)
+    return values - read.values(grids, measure, less) if less else values
 
 
 def _quantity(

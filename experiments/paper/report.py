@@ -96,8 +96,8 @@ def _glance(lines: Sequence[Line]) -> Table:
         gains = estimates["return_last50"]
         cells = [
             *(line.label, line.delivery, _mean(gains), number(gains.iqm)),
-            *(number(best["return_last50"].median), number(line.of_paper("return"))),
-            *(number(estimates["steps_all"].mean), number(best["steps_all"].median)),
+            *(number(best["return_last50"]["median"]), number(line.of_paper("return"))),
+            *(number(estimates["steps_all"].mean), number(best["steps_all"]["median"])),
             *(number(line.of_paper("steps")), number(estimates["deliveries_last50"].mean, 2)),
         ]
         rows.append(cells if beside else [*cells[:5], *cells[6:8], cells[9]])
@@ -136,9 +136,9 @@ def figure_tables(lines: Sequence[Line], comparison: Comparison) -> list[Table]:
                 *(line.label, line.delivery),
                 _spread(name, *estimator[:3], mark=f" {APART}" if estimator.apart else ""),
                 _spread(name, *estimator[3:6]),
-                _spread(name, *best[:3]),
+                _spread(name, best["median"], best["low"], best["high"]),
                 number(line.of_paper(name), 2 if "deliver" in name else 1),
-                percent(best.paper_percentile / 100),
+                percent(best["paper_percentile"] / 100),
             ]
             rows.append(cells[:width])
         tables.append(Table(title, headers[:width], rows, text_columns=2))

@@ -112,24 +112,16 @@ def best_of(
     return {name: comparison.measures[name][won] for name in FIGURES}
 
 
-class BestRun(NamedTuple):
-    """A measure of the best run of all configurations, if each is trained once.
+def best_run(values: np.ndarray, paper: float = math.nan) -> dict[str, float]:
+    """Return the columns of a measure of the best run, from values of repetitions.
 
-    `low` and `high` are the percentiles 2.5 and 97.5 of repetitions with other seeds;
-    `paper_percentile` is the percentile of the paper's number.
+    They are the median, the percentiles 2.5 and 97.5, and the percentile of the paper's number,
+    with which ties count by half.
     """
-
-    median: float
-    low: float
-    high: float
-    paper_percentile: float
-
-    @classmethod
-    def of(cls, values: np.ndarray, paper: float = math.nan) -> BestRun:
-        """Return the best run from values of repetitions; ties with `paper` count by half."""
-        low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
-        below = float(50 * ((values < paper).mean() + (values <= paper).mean()))
-        return cls(median, low, high, math.nan if math.isnan(paper) else below)
+    low, median, high = np.percentile(values, (2.5, 50, 97.5)).tolist()
+    below = float(50 * ((values < paper).mean() + (values <= paper).mean()))
+    below = math.nan if math.isnan(paper) else below
+    return {"median": median, "low": low, "high": high, "paper_percentile": below}
 
 
 class Line(NamedTuple):
@@ -138,7 +130,7 @@ class Line(NamedTuple):
     summary: Summary  # of the configuration that `shown_position` chooses
     paper: PaperRow | None  # see `paper_row`
     best_run_of: int  # number of configurations
-    best_run: Mapping[str, BestRun]  # by the names of `FIGURES`
+    best_run: Mapping[str, Mapping[str, float]]  # by the names of `FIGURES`, see `best_run`
 
     @property
     def delivery(self) -> str:
@@ -170,7 +162,7 @@ class Line(NamedTuple):
             **{
                 f"best_run_{name}_{field}": value
                 for name, best in self.best_run.items()
-                for field, value in best._asdict().items()
+                for field, value in best.items()
             },
         }
 
@@ -181,7 +173,7 @@ def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DR
     for learner in comparison.learners:
         paper = paper_row(comparison, learner[1])
         best = {
-            name: BestRun.of(values, paper.figure(name) if paper else math.nan)
+            name: best_run(values, paper.figure(name) if paper else math.nan)
             for name, values in best_of(comparison, *learner, draws).items()
         }
         shown = summaries[shown_position(comparison, *learner)]

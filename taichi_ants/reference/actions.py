@@ -46,7 +46,7 @@ class Intent:
         heading: The heading of a move or a pick-up, towards its target.
         target: The cell to enter, or whose food to take. None if the way is closed, no food is in
             view, or the action is to give.
-        lured: Whether the target looks T or S or, with an ant on it, is better than the own cell.
+        shows_cue: Whether the target looks T or S or, with an ant on it, is better than its cell.
         gives: Whether the ant delivers.
         rests: Whether the ant is idle; its action is then GIVE, which has no effect.
     """

@@ -37,15 +37,18 @@ def channels(colours: int | np.ndarray) -> np.ndarray:
     return (words >> np.array([16, 8, 0], dtype=np.uint32)).astype(np.uint8)
 
 
-_samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()]))
-_places = np.linspace(0, len(_samples) - 1, 256)
-_red, _green, _blue = (np.interp(_places, range(len(_samples)), channel) for channel in _samples.T)
+def _packed(rgb: np.ndarray) -> np.ndarray:
+    """Return colours 0xRRGGBB, uint32 (...), of red, green and blue, numbers (..., 3)."""
+    return np.rint(rgb).astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+
+
+_samples = channels(np.array([int(word, 16) for word in _TRAIL_SAMPLES.split()])).T
+_places = np.linspace(0, _samples.shape[1] - 1, 256)
 # uint32 (256,): colours of trails from just above level 0 to `strongest`.
-TRAIL_RAMP = np.rint([_red, _green, _blue]).astype(np.uint32).T @ np.array(
-    [1 << 16, 1 << 8, 1], np.uint32
+TRAIL_RAMP = _packed(
+    np.stack([np.interp(_places, range(len(channel)), channel) for channel in _samples], axis=-1)
 )
 TRAIL_RAMP.setflags(write=False)
-
 
 # The darkest colours of further fields, which repeat.
 _FIELDS = (0xD57AF3, 0xCAA228, 0x9564D3, 0xA6582A)
@@ -56,23 +59,19 @@ def field_ramp(number: int) -> np.ndarray:
     """Return the colours of further field `number`, from 0, from weak to strong, uint32 (256,)."""
     ends = channels(np.array([CELL_EMPTY, _FIELDS[number % N_FIELDS]])).astype(float)
     parts = np.linspace(0.31, 1.0, 256)[:, None]
-    mixed = np.rint(ends[0] * (1 - parts) + ends[1] * parts).astype(np.uint32)
-    return mixed @ np.array([1 << 16, 1 << 8, 1], np.uint32)
+    return _packed(ends[0] * (1 - parts) + ends[1] * parts)
 
 
-# The colours of nests, for the queen and her ants, and of kinds of food, by number, which repeat.
+# The colours of nests, for the queen and her ants, and of kinds of food, by number.
 _NESTS = (0x83000F, 0x76583D, 0x610854, 0x0625AA, 0x808002, 0x63686D)
 _FOODS = (CELL_FOOD, 0x810508, 0x6B904C, 0xEBC01C, 0x5D4135, 0x3E5C83, 0x181100, 0xDD9297)
 QUEENS, ANTS = (np.array([first, *_NESTS], np.uint32) for first in (CELL_QUEEN, ANT))
 FOODS = np.array(_FOODS, np.uint32)
-
-
-def floors(of_things: np.ndarray, first: int) -> np.ndarray:
-    """Return the light backgrounds of things, uint32 (n,); `first` is that of the first thing."""
-    mixed = np.rint(0.85 * channels(PAGE) + 0.15 * channels(of_things)).astype(np.uint32)
-    light: np.ndarray = mixed @ np.array([1 << 16, 1 << 8, 1], np.uint32)
-    light[0] = first
-    return light
+# Their light backgrounds.
+QUEEN_FLOORS, FOOD_FLOORS = (
+    np.append(first, _packed(0.85 * channels(PAGE) + 0.15 * channels(several[1:])))
+    for first, several in ((np.uint32(FLOOR_QUEEN), QUEENS), (np.uint32(FLOOR_FOOD), FOODS))
+)
 
 
 class Mark(IntEnum):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from types import ModuleType
 
 import numpy as np
 import numpy.typing as npt
@@ -35,17 +34,17 @@ _DARTS_BELOW = 11.0  # size below which ants are darts
 _DOT = 0.9  # pixels, the minimum radius of a dot
 _FILL = 0.83  # radius of an ant as a share of its hexagon, whose inner circle has 0.866
 
-_COLOURS = {Mark.FOOD: colours.CELL_FOOD, Mark.QUEEN: colours.CELL_QUEEN}
-# For each letter of a state: the colour of the cell, and the mark on it.
-_CELLS: dict[str, tuple[int, Mark | None]] = {
-    "E": (colours.CELL_EMPTY, None),
-    "O": (colours.CELL_OBSTACLE, None),
-    "T": (int(colours.TRAIL_RAMP[120]), None),
-    "S": (colours.CELL_NEARER, None),
-    "F": (colours.FLOOR_FOOD, Mark.FOOD),
-    "Q": (colours.FLOOR_QUEEN, Mark.QUEEN),
+# Colours of cells by their letters in states.
+_CELLS = {
+    **{"E": colours.CELL_EMPTY, "O": colours.CELL_OBSTACLE, "T": int(colours.TRAIL_RAMP[120])},
+    **{"S": colours.CELL_NEARER, "F": colours.FLOOR_FOOD, "Q": colours.FLOOR_QUEEN},
 }
 CELL_LETTERS = "".join(_CELLS)
+# Cells with something on them: the mark, its colours and those of the cell, by number.
+_THINGS = {
+    "F": (Mark.FOOD, colours.FOODS, colours.FOOD_FLOORS),
+    "Q": (Mark.QUEEN, colours.QUEENS, colours.QUEEN_FLOORS),
+}
 
 
 def marks(
@@ -70,39 +69,29 @@ def marks(
     return table
 
 
-def marker(
-    places: npt.ArrayLike, hexagon: float, mark: Mark, colour: np.ndarray | None = None
-) -> np.ndarray:
+def marker(places: npt.ArrayLike, hexagon: float, mark: Mark, colour: np.ndarray) -> np.ndarray:
     """Return marks of food or queens; cells have the radius `hexagon`, in pixels."""
-    return marks(places, 0.72 * hexagon, mark, _COLOURS[mark] if colour is None else colour)
+    return marks(places, 0.72 * hexagon, mark, colour)
 
 
 def cell_colour(letter: str) -> int:
     """Return the colour of a cell by its letter in a state; unknown letters look empty."""
-    return _CELLS.get(letter[0], _CELLS["E"])[0]
+    return _CELLS.get(letter[0], colours.CELL_EMPTY)
 
 
-def cell(letter: str, centre: npt.ArrayLike, hexagon: float) -> np.ndarray:
-    """Return marks of a cell and its content, by its letter in a state."""
-    table = marks(centre, hexagon, Mark.HEXAGON, cell_colour(letter))
-    stands = _CELLS.get(letter, _CELLS["E"])[1]
-    return table if stands is None else np.concatenate([table, marker(centre, hexagon, stands)])
-
-
-def numbered(centre: npt.ArrayLike, hexagon: float, mark: Mark, number: int) -> list[np.ndarray]:
-    """Return marks of a cell with a queen or food of this number of nest or kind."""
-    floor, of_nests = (colours.FLOOR_QUEEN, colours.QUEENS)
-    if mark == Mark.FOOD:
-        floor, of_nests = (colours.FLOOR_FOOD, colours.FOODS)
-    n = number % len(of_nests)
-    cell = marks(centre, hexagon, Mark.HEXAGON, int(colours.floors(of_nests, floor)[n]))
-    return [cell, marker(centre, hexagon, mark, of_nests[[n]])]
+def cell(letter: str, centre: npt.ArrayLike, hexagon: float, number: int = 0) -> np.ndarray:
+    """Return marks of a cell by its letter in a state, with the food or queen of a number on it."""
+    if letter not in _THINGS:
+        return marks(centre, hexagon, Mark.HEXAGON, cell_colour(letter))
+    mark, of_things, floors = _THINGS[letter]
+    floor = marks(centre, hexagon, Mark.HEXAGON, floors[number])
+    return np.concatenate([floor, marker(centre, hexagon, mark, of_things[number])])
 
 
 def ants(
     places: npt.ArrayLike,
     headings: npt.ArrayLike,
-    carries: np.ndarray,
+    carries: bool | np.ndarray,
     hexagon: float,
     radius: float | None = None,
     opacity: float = 1.0,
@@ -121,31 +110,30 @@ def ants(
     return marks(places, radius or _FILL * hexagon, look, colour, headings, opacity, load)
 
 
-def kernels() -> ModuleType:
-    """Return the kernels after starting Taichi, which must run before they are imported."""
+def draw_marks(frame: np.ndarray, *tables: np.ndarray) -> None:
+    """Draw tables of `marks` over a frame, uint8 (height, width, 3), in their order."""
+    _launch("draw_marks", frame, np.concatenate(tables))
+
+
+def _launch(kernel: str, *arguments: object) -> None:
+    """Run a kernel after starting Taichi, which must run before kernels are imported."""
     runtime.start()
     from taichi_ants.rendering import raster_kernels
 
-    return raster_kernels
-
-
-def draw_marks(frame: np.ndarray, *tables: np.ndarray) -> None:
-    """Draw tables of `marks` over a frame, uint8 (height, width, 3), in their order."""
-    draw = kernels().draw_marks
     with runtime.quiet():
-        draw(frame, np.concatenate(tables))
+        getattr(raster_kernels, kernel)(*arguments)
 
 
-def queens_of(snapshot: Snapshot) -> np.ndarray:
-    """Return the flat indices of the queens, in the order of nests if the snapshot has it."""
-    known = len(snapshot.queens) > 0
-    return snapshot.queens if known else np.flatnonzero(snapshot.ground == QUEEN)
-
-
-def kinds_of(snapshot: Snapshot) -> np.ndarray:
-    """Return the kind of the food in each cell, uint8 (grid.size,)."""
-    known = len(snapshot.food_kinds) > 0
-    return snapshot.food_kinds if known else np.zeros(len(snapshot.ground), np.uint8)
+def _things_of(snapshot: Snapshot) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return flat indices and kinds of food items, and flat indices of queens by nest."""
+    foods, kinds, queens = (
+        np.flatnonzero(snapshot.ground == FOOD),
+        snapshot.food_kinds,
+        snapshot.queens,
+    )
+    if not len(queens):
+        queens = np.flatnonzero(snapshot.ground == QUEEN)
+    return foods, kinds[foods] if len(kinds) else 0 * foods, queens
 
 
 class Rasteriser:
@@ -201,10 +189,9 @@ class Rasteriser:
         """
         hexagon, tables = self.hexagon, []
         frame = self.draw_cells(self.cell_colours(snapshot))
-        of_queens, of_foods = queens_of(snapshot), np.flatnonzero(snapshot.ground == FOOD)
-        queens, foods = self._places(of_queens), self._places(of_foods)
-        of_queens = colours.QUEENS[np.arange(len(queens)) % len(colours.QUEENS)]
-        of_foods = colours.FOODS[kinds_of(snapshot)[of_foods] % len(colours.FOODS)]
+        food_cells, kinds, queen_cells = _things_of(snapshot)
+        foods, of_foods = self._places(food_cells), colours.FOODS[kinds]
+        queens, of_queens = self._places(queen_cells), colours.QUEENS[: len(queen_cells)]
         if hexagon < _SMALLEST_DRAWING:
             # The ring distinguishes food from trails, some of which are as light as its dot.
             radius = max(_CRUMB * hexagon, _SMALLEST_CRUMB)
@@ -239,9 +226,7 @@ class Rasteriser:
         frame = self._page.copy()
         if hexagon < _DOTS_BELOW:
             layout = (*self._origin.tolist(), hexagon, grid.width, grid.height, grid.ranges[2])
-            draw = kernels().draw_small_cells
-            with runtime.quiet():
-                draw(frame, of_cells, *layout)
+            _launch("draw_small_cells", frame, of_cells, *layout)
             return frame
         # The lines between cells vanish in small cells, and are at most 3 pixels wide.
         line = min(max(0.09 * hexagon - 0.25, 0.0), 3.0)
@@ -255,16 +240,13 @@ class Rasteriser:
 
     def cell_colours(self, snapshot: Snapshot) -> np.ndarray:
         """Return the colours of all cells, uint32 (grid.size,), by content or trail level."""
-        small = self.hexagon < _SMALLEST_DRAWING
         of_ground = np.full(16, colours.CELL_EMPTY, dtype=np.uint32)
         of_ground[OBSTACLE] = colours.CELL_OBSTACLE
         of_cells = of_ground[snapshot.ground & 15]
-        foods, queens = np.flatnonzero(snapshot.ground == FOOD), queens_of(snapshot)
-        floors = colours.floors(colours.FOODS, colours.FLOOR_FOOD)
-        of_cells[foods] = floors[kinds_of(snapshot)[foods] % len(floors)]
-        floors = colours.floors(colours.QUEENS, colours.FLOOR_QUEEN)
-        floors = colours.QUEENS if small else floors
-        of_cells[queens] = floors[np.arange(len(queens)) % len(floors)]
+        foods, kinds, queens = _things_of(snapshot)
+        of_cells[foods] = colours.FOOD_FLOORS[kinds]
+        small = self.hexagon < _SMALLEST_DRAWING
+        of_cells[queens] = (colours.QUEENS if small else colours.QUEEN_FLOORS)[: len(queens)]
         ramps = [(colours.TRAIL_RAMP, snapshot.trail, self.darkest(snapshot.trail))]
         ramps += [
             (colours.field_ramp(number), levels, self.darkest(levels, name))
@@ -306,9 +288,9 @@ class Rasteriser:
             opacity = min(1.0, 0.5 * max(covered, 1e-9) ** -0.6)
         colour: int | np.ndarray = colours.ANT
         if len(snapshot.ant_nests):
-            colour = colours.ANTS[snapshot.ant_nests % len(colours.ANTS)]
+            colour = colours.ANTS[snapshot.ant_nests]
         load: int | np.ndarray = colours.CELL_FOOD
         if len(snapshot.ant_foods):
-            load = colours.FOODS[np.maximum(snapshot.ant_foods, 0) % len(colours.FOODS)]
+            load = colours.FOODS[np.maximum(snapshot.ant_foods, 0)]
         look = snapshot.ant_headings, snapshot.ant_carries, hexagon
         return ants(places, *look, opacity=opacity, colour=colour, load=load)

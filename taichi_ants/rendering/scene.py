@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, checked_flag, checked_whole, expect, shown
+from taichi_ants.errors import AntsError, checked_whole, expect, shown
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.records import Snapshot
 from taichi_ants.rendering import colours, text
 from taichi_ants.rendering.colours import Mark
-from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks, numbered
+from taichi_ants.rendering.rasteriser import Rasteriser, ants, cell, draw_marks, marks
 from taichi_ants.task import Observation, Pheromone, Task, observations
 from taichi_ants.task.constants import ACTION_NAMES, DEPOSIT_LEVEL, FOOD, N_ACTIONS, QUEEN
 from taichi_ants.task.field import COMPASS, TRAIL
@@ -25,16 +27,28 @@ DEFAULT_SIZE = (1280, 720)
 _PANEL_WIDTH = 15
 _TITLE_HEIGHT = 2.2
 _LEGEND_HEIGHT = 14.8
+_PITCH = 1.55  # between entries of the legend
 _SMALLEST_LETTERS = 10.0  # smallest hexagon with a letter, in pixels
-# Letter of the cell, whether an ant on it carries food (None: no ant), letter drawn on it, label.
+
+
+class _Entry(NamedTuple):
+    """An entry of the legend: a cell with what is on it, and its label."""
+
+    label: str
+    cell: str = "E"  # letter in a state; "" for the field of this number
+    number: int = 0  # of the field, nest or kind of food
+    letter: str = ""  # drawn on the cell
+    ant: bool | None = None  # whether it carries food; None for no ant
+
+
 _LEGEND = (
-    ("E", None, "", "empty (E)"),
-    ("O", None, "", "obstacle (O)"),
-    ("F", None, "", "food (F)"),
-    ("Q", None, "", "queen (Q)"),
-    ("E", None, "S", "nearer to the queen"),
-    ("E", False, "", "ant"),
-    ("E", True, "", "ant with food"),
+    _Entry("empty (E)"),
+    _Entry("obstacle (O)", "O"),
+    _Entry("food (F)", "F"),
+    _Entry("queen (Q)", "Q"),
+    _Entry("nearer to the queen", letter="S"),
+    _Entry("ant", ant=False),
+    _Entry("ant with food", ant=True),
 )
 
 
@@ -115,14 +129,10 @@ class Scene:
     ) -> None:
         expect("grid", grid, AxialGrid)
         expect("task", task, Task, type(None))
-        strongest = checked_whole("strongest", strongest)
         of_fields = {name: _scale(field) for name, field in task.fields.items()} if task else {}
         self._foods = list(task.foods) if task else []
         width, height = check_size(size)
-        expect("title", title, str)
-        view = checked_flag("view", view)
-        self._overlay = checked_flag("overlay", overlay)
-        letters = round(min(width, height) / 38)
+        self._overlay, letters = overlay, round(min(width, height) / 38)
         self._background = np.full((height, width, 3), colours.channels(colours.PAGE))
         margin = max(2, round(min(width, height) / 60))
         self._has_panel = overlay and letters >= text.SMALLEST
@@ -134,16 +144,12 @@ class Scene:
             *(_scale(task.pheromone) if task else strongest, of_fields),
         )
         if self._has_panel:
-            column = width - margin - room
-            bottom = height - margin - round(_LEGEND_HEIGHT * letters)
-            text.write(self._background, title, room, margin + letters, letters, room=column)
-            top = margin + round(_TITLE_HEIGHT * letters) * bool(title)
-            self._status_place = room, top, column, letters
-            self._legend_top = bottom
-            hexagon = self._rasteriser.hexagon
-            cue = task.homing_cue if task else COMPASS
-            place = self._background, room, bottom, column, letters, hexagon
-            self._scale_line = draw_legend(*place, cue)
+            self._panel = room, width - margin - room, letters  # left edge, width, text size
+            self._top = margin + round(_TITLE_HEIGHT * letters) * bool(title)
+            self._legend_top = height - margin - round(_LEGEND_HEIGHT * letters)
+            place = room, margin + letters, letters
+            text.write(self._background, title, *place, room=width - margin - room)
+            self._scale_line = self._draw_legend(task.homing_cue if task else COMPASS)
 
     def draw(self, snapshot: Snapshot, status: Status | None = None) -> np.ndarray:
         """Return the picture of a snapshot and its panel, uint8 (height, width, 3).
@@ -162,45 +168,68 @@ class Scene:
         frame = self._background.copy()
         frame[:, : world.shape[1]] = world
         if self._has_panel and status is not None:
-            _draw_status(frame, status, *self._status_place)
+            _draw_status(frame, status, self._top, *self._panel)
         if self._has_panel:
-            self._draw_more_legend(frame, snapshot)
+            further = self._further_entries(snapshot)
+            self._draw_entries(frame, further, -len(further))
+            left, width, size = self._panel
+            most, y = f"{self._rasteriser.darkest(snapshot.trail)} and more", self._scale_line
+            text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
         return frame
 
-    def _draw_more_legend(self, frame: np.ndarray, snapshot: Snapshot) -> None:
-        """Draw the scales of fields, and an entry for each further field, nest and kind of food."""
-        left, _, width, size = self._status_place
-        most, y = f"{self._rasteriser.darkest(snapshot.trail)} and more", self._scale_line
-        text.write(frame, most, left + width, y, size, colours.FAINT_INK, align="right")
-        radius = 0.82 * size
+    def _draw_legend(self, homing_cue: str) -> int:
+        """Return the y of the text below the ramp, after drawing what all pictures explain."""
+        (left, width, size), frame = self._panel, self._background
+        cue = "trail (S)" if homing_cue == TRAIL else f"field {homing_cue} (S)"
+        told = homing_cue == COMPASS  # by the label
+        entries = [
+            entry._replace(label=cue) if entry.letter and not told else entry for entry in _LEGEND
+        ]
+        self._draw_entries(frame, entries, 0)
+        y = self._legend_top + len(entries) * round(_PITCH * size) + round(1.45 * size)
+        text.write(frame, "trail (T), by strength", left, y, size)
+        y += round(0.45 * size)
+        columns = np.linspace(0, len(colours.TRAIL_RAMP) - 1, width).astype(int)
+        ramp = colours.channels(colours.TRAIL_RAMP[columns])
+        frame[y : y + round(0.7 * size), left : left + width] = ramp
+        y += round(1.75 * size)
+        text.write(frame, "1", left, y, size, colours.FAINT_INK)
+        return y
+
+    def _draw_entries(self, frame: np.ndarray, entries: Sequence[_Entry], first: int) -> None:
+        """Draw entries of the legend; row 0 is its first entry, and further ones are above it."""
+        (left, _, size), hexagon = self._panel, self._rasteriser.hexagon
+        x, radius = left + 0.85 * size, 0.82 * size
+        for row, entry in enumerate(entries, start=first):
+            y = self._legend_top + row * round(_PITCH * size) + 0.75 * size
+            ant_x, label_x = x, left + round(2.1 * size)
+            strongest = int(colours.field_ramp(entry.number)[-1])
+            field = marks((x, y), radius, Mark.HEXAGON, strongest)
+            tables = [cell(entry.cell, (x, y), radius, entry.number) if entry.cell else field]
+            if entry.ant is not None:
+                if entry.cell == "Q":  # to the right of the queen
+                    ant_x, label_x = x + 1.7 * size, label_x + round(1.7 * size)
+                look, colour = (entry.ant, hexagon, 0.83 * radius), int(colours.ANTS[entry.number])
+                tables.append(ants((ant_x, y), 1, *look, colour=colour))
+            draw_marks(frame, *tables)
+            baseline = round(y + 0.36 * size)
+            text.write(frame, entry.letter, x, baseline, size, align="middle")
+            text.write(frame, entry.label, label_x, baseline, size)
+
+    def _further_entries(self, snapshot: Snapshot) -> list[_Entry]:
+        """Return entries of further fields, several nests and several kinds of food."""
+        further = [
+            _Entry(f"field {name}, {self._rasteriser.darkest(levels, name)} and more", "", number)
+            for number, (name, levels) in enumerate(snapshot.further_fields.items())
+        ]
+        if len(snapshot.queens) > 1:
+            nests = range(len(snapshot.queens))
+            further += [_Entry(f"nest {n}", "Q", n, ant=False) for n in nests]
         kinds = 1 if snapshot.world is None else snapshot.world.n_food_kinds
         foods = self._foods or [f"of kind {n}" for n in range(kinds)]
-        entries = [
-            (word, mark, number, name)
-            for word, mark, least, names in (
-                ("field", Mark.HEXAGON, 1, list(snapshot.further_fields)),
-                ("nest", Mark.QUEEN, 2, range(len(snapshot.queens))),
-                ("food", Mark.FOOD, 2, foods),
-            )
-            for number, name in enumerate(names if len(names) >= least else ())
-        ]
-        for row, (word, mark, number, name) in enumerate(entries):
-            y = self._legend_top - (len(entries) - row) * round(1.55 * size)
-            x, middle, end = left + 0.85 * size, y + 0.75 * size, left + round(2.1 * size)
-            if mark == Mark.HEXAGON:
-                tables = [marks((x, middle), radius, mark, int(colours.field_ramp(number)[-1]))]
-                levels = snapshot.further_fields[str(name)]
-                name = f"{name}, {self._rasteriser.darkest(levels, str(name))} and more"
-            else:
-                tables = numbered((x, middle), radius, mark, number)
-            if mark == Mark.QUEEN:
-                ant = colours.ANTS[[number % len(colours.ANTS)]]
-                place = x + 1.7 * size, middle
-                look = np.array([False]), self._rasteriser.hexagon, 0.83 * radius
-                tables.append(ants(place, 1, *look, colour=ant))
-                end += round(1.7 * size)
-            draw_marks(frame, *tables)
-            text.write(frame, f"{word} {name}", end, round(y + 1.11 * size), size)
+        if len(foods) > 1:
+            further += [_Entry(f"food {name}", "F", n) for n, name in enumerate(foods)]
+        return further
 
     def _draw_world(self, snapshot: Snapshot, status: Status | None) -> np.ndarray:
         """Draw the world, with outlines and letters on the cells that ant number 0 sees."""
@@ -223,7 +252,7 @@ class Scene:
 
 
 def _draw_status(
-    frame: np.ndarray, status: Status, left: int, top: int, width: int, size: int
+    frame: np.ndarray, status: Status, top: int, left: int, width: int, size: int
 ) -> None:
     """Draw the lines and bars of a status into a part of a frame."""
     y = top + size
@@ -259,42 +288,6 @@ def _draw_bars(
         number = f"{round(value, 2) + 0.0:.2f}"  # 0.0 turns -0.0 into 0.0
         text.write(frame, number, left + width, baseline, size, ink, align="right")
     fill(frame, zero - 1, top + 0.1 * size, 1, N_ACTIONS * pitch - 0.1 * size, colours.FAINT_INK)
-
-
-def draw_legend(
-    frame: np.ndarray,
-    left: int,
-    top: int,
-    width: int,
-    size: int,
-    hexagon: float,
-    homing_cue: str = COMPASS,
-) -> int:
-    """Return the y of the text below the ramp, after drawing the legend of colours and letters.
-
-    It is `_LEGEND_HEIGHT` text sizes high. `hexagon` is the size of the world's cells in pixels.
-    """
-    pitch, radius = round(1.55 * size), 0.82 * size
-    for row, (kind, carries, letter, label) in enumerate(_LEGEND):
-        x, y = left + 0.85 * size, top + row * pitch + 0.75 * size
-        tables = [cell(kind, (x, y), radius)]
-        if carries is not None:
-            tables.append(ants((x, y), 1, np.array([carries]), hexagon, 0.83 * radius))
-        draw_marks(frame, *tables)
-        baseline = round(y + 0.36 * size)
-        if letter == "S" and homing_cue != COMPASS:
-            label = "trail (S)" if homing_cue == TRAIL else f"field {homing_cue} (S)"
-        text.write(frame, letter, x, baseline, size, align="middle")
-        text.write(frame, label, left + round(2.1 * size), baseline, size)
-    y = top + len(_LEGEND) * pitch + round(1.45 * size)
-    text.write(frame, "trail (T), by strength", left, y, size)
-    y += round(0.45 * size)
-    columns = np.linspace(0, len(colours.TRAIL_RAMP) - 1, width).astype(int)
-    ramp = colours.channels(colours.TRAIL_RAMP[columns])
-    frame[y : y + round(0.7 * size), left : left + width] = ramp
-    y += round(1.75 * size)
-    text.write(frame, "1", left, y, size, colours.FAINT_INK)
-    return y
 
 
 def fill(

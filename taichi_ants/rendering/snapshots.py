@@ -29,9 +29,7 @@ CaptionedSnapshot = tuple[Snapshot, Status]
 
 def at_start(world: World, seed: int = 0, n: int = 1) -> Snapshot:
     """Return a world with n ants at the start of an episode; raises as `World.start` does."""
-    expect("world", world, World)
-    cells, headings = world.start(seed, n)
-    return _start_of(world, cells, headings)
+    return _start_of(world, *world.start(seed, n))
 
 
 def _start_of(world: World, cells: np.ndarray, headings: np.ndarray) -> Snapshot:
@@ -48,7 +46,6 @@ def _start_of(world: World, cells: np.ndarray, headings: np.ndarray) -> Snapshot
 
 def picture(world: World, size: tuple[int, int] = DEFAULT_SIZE) -> np.ndarray:
     """Return a picture of a world and its listed ants, uint8 (height, width, 3)."""
-    expect("world", world, World)
     cells, headings = world.grid.index(world.ants[:, :3]), world.ants[:, 3].astype(np.int32)
     return Scene(world.grid, size).draw(_start_of(world, cells, headings))
 
@@ -61,13 +58,10 @@ def frames(
     `size` is width and height in pixels; `look` are further arguments of `Scene`.
     """
     scene = None
-    expect("snapshots", snapshots, Iterable)
-    for captioned in snapshots:
-        expect("a captioned snapshot", captioned, tuple)
-        snapshot, status = captioned
-        expect("the snapshot", snapshot, Snapshot)
-        view = getattr(status, "state", None) is not None
-        scene = scene or Scene(snapshot.grid, size, view=view, **look)
+    for snapshot, status in snapshots:
+        scene = scene or Scene(
+            snapshot.grid, size, view=getattr(status, "state", None) is not None, **look
+        )
         yield scene.draw(snapshot, status)
 
 
@@ -90,7 +84,6 @@ class Episode:
         epsilon: float = 0.0,
     ) -> Episode:
         """Return a rollout of a policy; arguments and errors are those of `rollout`."""
-        expect("world", world, World)
         trace = rollout(world, q_values, seed, 0, max_steps, task, epsilon)
         return cls(trace, "greedy" if epsilon == 0 else f"epsilon {epsilon:g}")
 

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 import io
 import os
-import struct
-from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from itertools import chain, groupby
-from numbers import Real
+from itertools import chain
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, Annotated, BinaryIO
 
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, expect, imported, shown
+from taichi_ants.errors import AntsError, expect, imported
 from taichi_ants.rendering import colours
+from taichi_ants.settings import Setting, checked_arguments
 
-DEFAULT_FPS = 8.0
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
 PAUSE = 1.5  # seconds for which the last frame of an episode is shown
-# The shortest and the longest side of a picture in pixels, by file type. PNG is limited by memory.
-_SIDES = {".gif": (1, 65_535), ".mp4": (2, 16_384), "": (1, 2**31 - 1)}
-
-_SAME = 255  # colour index of unchanged pixels in a GIF; palettes use fewer colours
-_LONGEST = 600  # seconds for which a GIF shows one picture; the format allows 655
+_UNCHANGED = 255  # colour index of unchanged pixels in a GIF; palettes use fewer colours
+_LONGEST = 600_000  # milliseconds for which a GIF shows one picture; the format allows 655 350
+Fps = Annotated[float, Setting(least=0.1, most=50)]  # viewers slow down faster GIFs
 
 # Colours of scenes, which are in every palette. Steps of ramps are too small to see.
 _KEPT = np.unique(
@@ -33,15 +31,15 @@ _KEPT = np.unique(
         *(colours.PAGE, colours.CELL_EMPTY, colours.CELL_OBSTACLE, colours.CELL_NEARER),
         *(colours.INK, colours.FAINT_INK, colours.RULE, colours.CHOSEN, colours.FOOD_DOT),
         *(*colours.QUEENS, *colours.ANTS, *colours.FOODS),
-        *colours.floors(colours.QUEENS, colours.FLOOR_QUEEN),
-        *colours.floors(colours.FOODS, colours.FLOOR_FOOD),
+        *(*colours.QUEEN_FLOORS, *colours.FOOD_FLOORS),
         *colours.TRAIL_RAMP[::6],
         *(word for n in range(colours.N_FIELDS) for word in colours.field_ramp(n)[255::-36]),
     ]
 )
 
 
-def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
+@checked_arguments
+def check_animation(path: files.PathLike, fps: Fps = 8.0) -> Path:
     """Return the path of an animation after checking that it can be written.
 
     Args:
@@ -53,31 +51,23 @@ def check_animation(path: files.PathLike, fps: float = DEFAULT_FPS) -> Path:
     """
     expect("path", path, str, os.PathLike)
     target = Path(path)
-    is_old_folder = not target.suffix and os.path.lexists(target)
-    if not is_old_folder:
-        files.check_writable_file(target)
     if target.suffix.lower() not in (".gif", ".mp4", ""):
         raise AntsError(
             f"{str(path)!r} ends in {target.suffix!r}; an animation must end in .gif or .mp4, or "
             "have no extension to make a folder of PNG pictures."
         )
-    _check_number("fps", fps, "number", 0.1, 50)  # viewers slow down faster GIFs
     if target.suffix.lower() == ".mp4":
         imported("an MP4 file", "av", "video")
-    if is_old_folder:
-        files.check_writable_folder(target.absolute().parent)
-        named = target.name not in ("", "..") and not target.is_symlink()
-        if not (named and target.is_dir() and not any(target.iterdir())):
-            raise AntsError(
-                f"{str(path)!r} already exists and is not an empty folder; choose a new folder, or "
-                "a file that ends in .gif or .mp4."
-            )
+    if target.suffix or not os.path.lexists(target):
+        return files.check_writable_file(target)
+    files.check_writable_folder(target.absolute().parent)
+    named = target.name not in ("", "..") and not target.is_symlink()
+    if not (named and target.is_dir() and not any(target.iterdir())):
+        raise AntsError(
+            f"{str(path)!r} already exists and is not an empty folder; choose a new folder, or a "
+            "file that ends in .gif or .mp4."
+        )
     return target
-
-
-def _check_number(name: str, value: float, kind: str, least: float, most: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, Real) or not least <= value <= most:
-        raise AntsError(f"{name} is {shown(value)}; it must be a {kind} from {least} to {most}.")
 
 
 def is_picture(path: files.PathLike) -> bool:
@@ -100,12 +90,13 @@ def check_single(path: files.PathLike, holds: str, *endings: str) -> Path:
     return target
 
 
+@checked_arguments
 def save_animation(
     path: files.PathLike,
     frames: Iterable[np.ndarray],
-    fps: float = DEFAULT_FPS,
+    fps: Fps = 8.0,
     *,
-    pause: float = 0.0,
+    pause: Annotated[float, Setting(least=0, most=60)] = 0.0,
 ) -> None:
     """Write an animation frame by frame; checks and raises as `check_animation` does.
 
@@ -116,9 +107,8 @@ def save_animation(
         pause: Seconds, at most 60, for which the last frame is shown before the animation repeats.
     """
     target = check_animation(path, fps)
-    _check_number("pause", pause, "number of seconds", 0, 60)
-    sides = _SIDES.get(target.suffix.lower(), _SIDES[""])
-    checked = _checked(frames, round(pause * fps) - 1, sides)
+    expect("frames", frames, Iterable)
+    checked = _checked(frames, round(pause * fps) - 1)
     encode = _mp4 if target.suffix.lower() == ".mp4" else _gif
     missing = [folder for folder in target.absolute().parents if not folder.exists()]
     try:
@@ -164,17 +154,11 @@ def _write_folder(folder: Path, frames: Iterable[np.ndarray]) -> None:
         os.replace(whole, folder)
 
 
-def _checked(
-    frames: Iterable[np.ndarray], more: int, sides: tuple[int, int]
-) -> Iterator[np.ndarray]:
-    """Yield the frames after checking their sizes, and the last one `more` times again."""
-    try:
-        coming = iter(frames)
-    except TypeError:
-        raise AntsError(f"frames is {shown(frames)}; it must be an iterable of arrays.") from None
+def _checked(frames: Iterable[np.ndarray], more: int) -> Iterator[np.ndarray]:
+    """Yield the frames after checking their shapes, and the last one `more` times again."""
     shape = None
-    for number, frame in enumerate(coming):
-        _check_frame(frame, sides)
+    for number, frame in enumerate(frames):
+        _check_frame(frame)
         shape = shape or frame.shape
         if frame.shape != shape:
             raise AntsError(
@@ -188,18 +172,11 @@ def _checked(
         yield frame
 
 
-def _check_frame(frame: np.ndarray, sides: tuple[int, int] = _SIDES[""]) -> None:
+def _check_frame(frame: np.ndarray) -> None:
     expect("a frame", frame, np.ndarray)
     if frame.dtype != np.uint8 or frame.shape[2:] != (3,) or 0 in frame.shape:
         raise AntsError(
             f"a frame is {frame.dtype} {frame.shape}; it must be uint8 (height, width, 3)."
-        )
-    height, width = frame.shape[:2]
-    least, most = sides
-    if not least <= min(height, width) <= max(height, width) <= most:
-        raise AntsError(
-            f"a frame is {width} pixels wide and {height} high; each side must be from {least} to "
-            f"{most} for this file type, so choose another size or file type."
         )
 
 
@@ -213,44 +190,33 @@ def png(frame: np.ndarray, optimize: bool = False) -> bytes:
 
 
 def _gif(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:
-    """Write a GIF that repeats forever.
+    """Write a GIF that repeats forever; Pillow merges equal frames and stores only changes."""
+    images = _with_palette(frames, _palette(first), fps)
+    changes = {"optimize": True, "transparency": _UNCHANGED, "disposal": 1}
+    next(images).save(file, "GIF", save_all=True, append_images=images, loop=0, **changes)
 
-    Pillow's own writer holds all frames in memory. This one holds two, lets Pillow compress the
-    difference, and merges equal frames.
-    """
-    from PIL import GifImagePlugin, Image
 
-    palette = _palette(first)
+def _with_palette(frames: Iterable[np.ndarray], palette: np.ndarray, fps: float) -> Iterator[Image]:
+    """Yield frames in the nearest colours of a palette, each with its duration."""
+    from PIL import Image
+
     nearest = np.full(1 << 24, -1, np.int16)  # the index of each colour in the palette, once known
-    height, width = first.shape[:2]
-    file.write(b"GIF89a" + struct.pack("<HHBBB", width, height, 0xF7, 0, 0))
-    file.write(palette.tobytes().ljust(3 * 256, b"\0"))
-    file.write(b"!\xff\x0bNETSCAPE2.0\x03\x01\0\0\0")  # repeat without end
-
-    def drawn() -> Iterator[tuple[int, bytes]]:
-        for number, frame in enumerate(frames, start=1):
-            words = frame.astype(np.int32) @ (1 << 16, 1 << 8, 1)
-            new = np.unique(words[nearest[words] < 0])
-            for some in np.array_split(new, 1 + len(new) // 4096):
-                away = colours.channels(some)[:, None].astype(np.int32) - palette
-                nearest[some] = (away**2).sum(axis=2).argmin(axis=1)
-            yield number, nearest[words].astype(np.uint8).tobytes()
-
-    before, shown = np.full((height, width), _SAME, np.uint8), 0
-    most = _LONGEST * fps
-    for _, same in groupby(drawn(), key=lambda frame: (frame[1], (frame[0] - 1) // most)):
-        ((number, content),) = deque(same, maxlen=1)
-        picture = np.frombuffer(content, np.uint8).reshape(height, width)
-        differs = picture != before
-        box = Image.fromarray(differs).getbbox() or (0, 0, 1, 1)
-        change = Image.fromarray(np.where(differs, picture, np.uint8(_SAME))).crop(box)
+    before, told, still = np.zeros(0), 0, 0  # milliseconds so far, and of the present picture
+    for number, frame in enumerate(frames, start=1):
+        words = frame.astype(np.int32) @ (1 << 16, 1 << 8, 1)
+        new = np.unique(words[nearest[words] < 0])
+        for some in np.array_split(new, 1 + len(new) // 4096):
+            away = colours.channels(some)[:, None].astype(np.int32) - palette
+            nearest[some] = (away**2).sum(axis=2).argmin(axis=1)
+        indices = nearest[words].astype(np.uint8)
         # GIF durations are in hundredths of a second. Rounding the end time keeps their sum exact.
         until = 10 * round(100 * number / fps)
-        options = {"duration": until - shown, "transparency": _SAME, "disposal": 1}
-        for part in GifImagePlugin.getdata(change, box[:2], **options):
-            file.write(part)
-        before, shown = picture, until
-    file.write(b";")
+        still = until - told + (still if np.array_equal(indices, before) else 0)
+        image = Image.fromarray(indices)
+        image.putpalette(palette.tobytes().ljust(3 * 256, b"\0"))
+        image.info["duration"] = until - told if still <= _LONGEST else 0
+        yield image
+        before, told = indices, until
 
 
 def _palette(first: np.ndarray) -> np.ndarray:
@@ -260,8 +226,8 @@ def _palette(first: np.ndarray) -> np.ndarray:
     kept = colours.channels(_KEPT)
     # Colours packed into integers sort several times faster than rows.
     sample = colours.channels(np.unique(first.astype(np.int32) @ (1 << 16, 1 << 8, 1)))
-    free = Image.fromarray(sample[None]).quantize(_SAME - len(kept)).getpalette()
-    return np.concatenate([kept, np.array(free, dtype=np.uint8).reshape(-1, 3)])[:_SAME]
+    free = Image.fromarray(sample[None]).quantize(_UNCHANGED - len(kept)).getpalette()
+    return np.concatenate([kept, np.array(free, dtype=np.uint8).reshape(-1, 3)])[:_UNCHANGED]
 
 
 def _mp4(file: BinaryIO, first: np.ndarray, frames: Iterable[np.ndarray], fps: float) -> None:

@@ -109,18 +109,6 @@ def test_what_gives_wrong_rows_is_refused_at_once(encode, says):
     assert "mine" not in observations.names()
 
 
-def of_a_dictionary(view):
-    return {0: 1, 1: 0}[int(view.carries)]
-
-
-def test_what_taichi_cannot_compile_is_refused_and_taichi_goes_on(capfd):
-    task = Task(observations.register(Observation("mine", 128, of_a_dictionary)).name)
-    with pytest.raises(AntsError, match=r"^Taichi cannot compile a kernel with your code: "):
-        train(paper(), CONFIG, 0, 2, 50, task)
-    assert capfd.readouterr() == ("", "")
-    assert train(paper(), CONFIG, 0, 2, 50).q_values.any()
-
-
 def of_home(view):
     """Which of the cells ahead have a higher level of the field, and whether this one has any."""
     index = 0

@@ -9,7 +9,6 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from taichi_ants import AntsError, Task, worlds
-from taichi_ants.envs import Event
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
 from taichi_ants.task.task import foraging
@@ -126,31 +125,6 @@ def test_the_autoreset_modes_differ_in_when_they_begin_alone():
             assert ("final_obs" in ours[-1]) == (step in (19, 39))
             for name in ("state", "action_mask", "event", "deliveries"):
                 assert_same(final[name], theirs[-1][name])
-
-
-def test_an_ant_that_delivers_is_terminated_and_goes_on():
-    """Where delivery terminates; a batch in which food lies beside the nest."""
-    env = ants_of(task=Task(), max_steps=300)
-    _, infos = env.reset(seed=2)
-    rng = np.random.default_rng(5)
-    delivered = 0
-    for _ in range(299):
-        before = infos["state"]
-        seen, rewards, terminated, truncated, infos = env.step(guided(infos["action_mask"], rng))
-        assert not truncated.any()
-        assert ("final_obs" in infos) == terminated.any()
-        assert np.array_equal(infos["event"] == Event.NONE, terminated)
-        assert Event.DELIVERED not in infos["event"]
-        if terminated.any():
-            gave = infos["final_info"]["event"] == Event.DELIVERED
-            assert np.array_equal(terminated, gave)
-            delivered += gave.sum()
-            assert (rewards[gave] == 10).all()
-            assert np.array_equal(infos["_final_obs"], gave)
-            assert_same(np.stack(infos["final_obs"][gave]), seen[gave])  # it goes on from there
-            assert (before[gave] >= 64).all()
-            assert (seen[gave] < 64).all()
-    assert delivered > 5
 
 
 @pytest.mark.parametrize(

@@ -21,9 +21,9 @@ from paper.comparison import (
 )
 from paper.report import table2_markdown
 from paper.table2 import (
-    BestRun,
     Line,
     best_of,
+    best_run,
     example_name,
     examples,
     shown_position,
@@ -90,7 +90,7 @@ def test_seeds_of_the_configurations_are_independent() -> None:
 def test_percentiles_count_ties_by_half() -> None:
     values = np.array([1.0, 2.0, 2.0, 3.0])
     for figure, percentile in ((2.0, 50), (0.5, 0), (2.5, 75), (9.0, 100)):
-        assert BestRun.of(values, figure).paper_percentile == percentile
+        assert best_run(values, figure)["paper_percentile"] == percentile
 
 
 def test_table2_lines(comparison: Comparison) -> None:
@@ -108,9 +108,12 @@ def test_table2_lines(comparison: Comparison) -> None:
     assert line["best_run_return_last50_median"] == np.median(best["return_last50"])
     for name in ("steps_all", "steps_last50"):
         assert line[f"best_run_{name}_high"] == pytest.approx(np.percentile(best[name], 97.5))
-        assert line[f"best_run_{name}_paper_percentile"] == BestRun.of(best[name], 73.0)[3]
+        assert (
+            line[f"best_run_{name}_paper_percentile"]
+            == best_run(best[name], 73.0)["paper_percentile"]
+        )
     percentile = line["best_run_return_last50_paper_percentile"]
-    assert percentile == BestRun.of(best["return_last50"], 47.3)[3]
+    assert percentile == best_run(best["return_last50"], 47.3)["paper_percentile"]
 
 
 def test_another_world_has_nothing_of_the_paper(comparison: Comparison) -> None:
@@ -119,7 +122,7 @@ def test_another_world_has_nothing_of_the_paper(comparison: Comparison) -> None:
     assert len(lines) == 8
     assert not any(line.paper_configuration for line in lines)
     assert all(math.isnan(line.of_paper("return")) for line in lines)
-    assert all(math.isnan(line.best_run["steps_all"].paper_percentile) for line in lines)
+    assert all(math.isnan(line.best_run["steps_all"]["paper_percentile"]) for line in lines)
     text = table2_markdown(garden, lines)
     assert text.startswith("World: garden.txt.\n")
     assert "| Learner | Delivery | Mean | IQM | Best run |" in text

@@ -24,7 +24,7 @@ import record
 record.section("nests", 1)
 record.section("castes_fields", 1)
 record.section("labour_traces", 1)
-record.section("dyna_q", 1)
+record.section("planning", 1)
 record.section("n_step_sarsa", 1)
 record.section("frames")
 """

@@ -41,14 +41,6 @@ def test_the_form_has_every_setting_with_its_bounds():
     assert offered["world.aside"]["world"] == "double_bridge"
 
 
-def test_what_the_command_begins_with_can_be_chosen():
-    setup = Choices({}).setup(watch.START)
-    again = Choices({}).chosen(setup)
-    assert watch.START["settings"].items() <= again.pop("settings").items()
-    assert again.items() <= watch.START.items()
-    assert setup.learns
-
-
 def test_the_python_of_the_guide_works(tmp_path, monkeypatch):
     text = (ROOT / "docs" / "watching.md").read_text(encoding="utf-8")
     names: dict = {}

@@ -9,7 +9,6 @@ import pytest
 
 from taichi_ants import AntsError, Dataset, Task, record, worlds
 from taichi_ants.files import archives
-from taichi_ants.offline.dataset import COLUMNS
 
 
 @pytest.fixture(scope="module")
@@ -35,14 +34,6 @@ def test_other_files_are_refused_in_one_sentence(data, tmp_path):
     archives.write(path, {"facts": "{}"})
     with pytest.raises(AntsError, match="does not contain a data set"):
         Dataset.load(path)
-
-
-def test_arrays_are_read_only_and_their_owner_keeps_his(data):
-    with pytest.raises(ValueError, match="read-only"):
-        data.state[0] = 1
-    mine = data.state.copy()
-    replace(data, state=mine)
-    mine[0] = mine[0]
 
 
 def test_returns_discount_from_the_first_step_of_each_episode(data):
@@ -88,13 +79,3 @@ def changed(data, name, row, value):
 def test_arrays_that_do_not_belong_together_are_refused(data, name, row, value, says):
     with pytest.raises(AntsError, match=says):
         replace(data, **changed(data, name, row, value))
-
-
-def test_arrays_of_another_type_or_length_are_refused(data):
-    for name in COLUMNS:
-        with pytest.raises(AntsError, match=name if name != "run" else "data set"):
-            replace(data, **{name: getattr(data, name)[1:]})
-    with pytest.raises(AntsError, match="state of a data set is an array of shape"):
-        replace(data, state=data.state.astype(float))
-    with pytest.raises(AntsError, match="no transitions"):
-        replace(data, **{name: getattr(data, name)[:0] for name in COLUMNS})

@@ -71,17 +71,6 @@ def test_an_interval_covers_the_truth_about_as_often_as_it_says():
     assert covered >= 33
 
 
-def test_threads_change_no_bit():
-    data = random_data(worlds.paper(), 6)
-    table = np.random.default_rng(2).normal(size=(128, 5))
-    one, two = (  # the judges inside, because another number of threads restarts Taichi
-        [judge(data, table, 0.9, 0.5, threads=n) for judge in (importance_sampling, model_based)]
-        for n in (1, 2)
-    )
-    assert one == two
-    assert [found.value.shape for found in one] == [()] * 2
-
-
 def test_what_cannot_be_judged():
     data = random_data(worlds.paper(), 6)
     table = np.zeros((128, 5))

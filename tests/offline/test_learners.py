@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from plain_data import episodes_of, random_data
@@ -105,28 +103,6 @@ def test_values_worked_by_hand():
     assert batch_q_learning(by_hand([CHAIN[0], CHAIN[4]]), 0.5, 1.0, 2)[0, 1] == 5
 
 
-def test_the_order_of_the_data_is_irrelevant_to_models():
-    data = random_data(worlds.paper(), 5)
-    order = np.random.default_rng(1).permutation(len(data.begins) - 1)
-    rows = np.concatenate([np.arange(data.begins[e], data.begins[e + 1]) for e in order])
-    moved = {name: getattr(data, name)[rows] for name in COLUMNS}
-    moved["episode"] = np.repeat(np.arange(len(order)), np.diff(data.begins)[order])
-    moved["run"] = np.zeros_like(moved["run"])
-    moved["episode"] = moved["episode"].astype(np.int32)
-    shuffled = replace(data, **moved)
-    for learn in (fitted_q_iteration, pessimistic_q_iteration):
-        assert np.array_equal(learn(data), learn(shuffled))
-    assert not np.array_equal(batch_q_learning(data), batch_q_learning(shuffled))
-
-
-def test_threads_change_no_bit():
-    data = random_data(worlds.paper(), 6, runs=7)
-    # The learners inside, because another number of threads restarts Taichi.
-    both = [[learn(data, by_run=True, threads=n) for learn in LEARNERS] for n in (1, 2)]
-    for one, two in zip(*both, strict=True):
-        assert np.array_equal(one, two)
-
-
 def test_what_is_learned_from_random_ants_delivers(tmp_path):
     """A policy file of it acts in the world."""
     still = Task(evaporation_in_evaluation=False)
@@ -151,12 +127,3 @@ def test_what_cannot_be_learned_from(learn, given):
     data = given.get("data", by_hand(CHAIN))
     with pytest.raises(AntsError, match=next(iter(given))):
         learn(data, given.get("discount", 0.9))
-
-
-def test_arguments_of_single_learners():
-    with pytest.raises(AntsError, match="`discount` is 1"):
-        fitted_q_iteration(by_hand(CHAIN), 1.0)
-    with pytest.raises(AntsError, match="`penalty` is -1"):
-        pessimistic_q_iteration(by_hand(CHAIN), penalty=-1)
-    with pytest.raises(AntsError, match="`sweeps` is 0"):
-        batch_q_learning(by_hand(CHAIN), sweeps=0)

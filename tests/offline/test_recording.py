@@ -13,15 +13,12 @@ from taichi_ants import (
     Life,
     Task,
     TrainingConfig,
-    evaluate,
     record,
     record_colony,
     rollout,
     worlds,
 )
-from taichi_ants.engines.colony import stepping
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.offline.dataset import COLUMNS
 from taichi_ants.reference import ReferenceColony
 
 FIELDS = ("step", "state", "action", "reward", "next_state", "terminated")
@@ -83,19 +80,6 @@ def test_tables_do_what_they_do_in_rollouts():
     assert np.array_equal(record(world, None, 1, 4, 20).behaviour_probability, np.full(20, 0.2))
 
 
-def test_many_steps_come_in_several_pieces(monkeypatch):
-    """And the pieces are put together in order."""
-    whole = record(worlds.paper(), None, 7, range(5), 30)
-    monkeypatch.setattr("taichi_ants.engines.runs.traces.MAX_ROLLOUT_STEPS", 100)
-    shares = []
-    assert record(worlds.paper(), None, 7, range(5), 30, progress=shares.append) == whole
-    assert len(shares) > 5
-    assert shares == sorted(shares)
-    assert shares[-1] == 1
-    steps = evaluate(worlds.paper(), np.zeros((5, 128, 5)), 7, range(5), 30).steps
-    assert np.diff(whole.begins).tolist() == steps.ravel().tolist()
-
-
 COLONIES = [
     ("sarsa", "shared", "terminates", Life(births=True, lifespan=9, regrowth=0)),
     ("q_learning", "shared", "truncates", Life(births=True, lifespan=9, regrowth=0)),
@@ -138,31 +122,6 @@ def test_ants_of_a_colony_that_appear_and_die(learner, sharing, delivery, life):
     assert len(lives) > 20
 
 
-def test_a_colony_that_sorts_its_ants_is_recorded_alike(monkeypatch):
-    monkeypatch.setattr(stepping, "_MOST_TICKS", 16)  # between two sorts
-    config, life = TrainingConfig("q_learning", 0.3, 0.9, 0.3, 1.0), Life(regrowth=0)
-    both = [
-        record_colony(
-            Colony(
-                worlds.open_world(5, (9, 9, 9)), Task(life=life), config, (1, 2), 12, schedule=how
-            ),
-            *(1, 70),
-        )
-        for how in ("by_world", "by_chunk")
-    ]
-    assert both[0] == both[1]
-    assert len(both[0]) == 2 * 12 * 70
-
-
-def test_a_colony_of_one_with_a_table_of_its_own_is_a_run():
-    config, world = TrainingConfig("sarsa", 0.5, 0.9, 0.4, 0.7), random_world(3)
-    colony = Colony(world, None, config, (1, 2), sharing="independent", ends_at_delivery=True)
-    both = record_colony(colony, 6, 60), record(world, config, 6, (1, 2), 60)
-    for name in COLUMNS:
-        assert np.array_equal(*(getattr(one, name) for one in both)), name
-    assert both[0].terminated.any()
-
-
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -175,12 +134,3 @@ def test_a_colony_of_one_with_a_table_of_its_own_is_a_run():
 def test_what_cannot_be_recorded(change, says):
     with pytest.raises(AntsError, match=says):
         record(**{"world": worlds.paper(), "seeds": (1, 2), **change})
-
-
-def test_colonies_in_different_worlds_are_refused():
-    places = [worlds.open_world(seed, (6, 6, 6)) for seed in range(2)]
-    config = TrainingConfig("q_learning", 0.3, 0.9, 0.3, 1.0)
-    with pytest.raises(AntsError, match="worlds of the colony differ"):
-        record_colony(Colony(places, None, config, (0, 1), 2))
-    with pytest.raises(AntsError, match="colony is 3"):
-        record_colony(3)

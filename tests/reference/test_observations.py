@@ -153,28 +153,6 @@ def test_another_ant_is_told_from_a_rock_whatever_it_carries(carries, other_carr
 P, OTHER, AHEAD = 4, 5, 6  # ants: other load on a better cell, on any other; same load on a better
 
 
-@pytest.mark.parametrize(
-    ("loads", "of_upper", "of_lower"),
-    [
-        # (upper, lower). With food a cell is better if it is nearer to the queen: the lower one is.
-        ((True, False), P, OTHER),
-        ((False, True), OTHER, OTHER),  # no trail is stronger than none
-        ((True, True), AHEAD, 1),
-        ((False, False), 1, 1),
-    ],
-)
-def test_ants_look_like_what_they_carry_and_where_they_stand(loads, of_upper, of_lower):
-    for name, base in (("ants", 6), ("queues", 7)):
-        colony = begun(CROWD, observation=name)
-        load(colony, *(slot for slot in range(2) if loads[slot]))
-        for slot in range(2):
-            colony.observe(colony.ants[slot])
-        seen = [1 if code == AHEAD and name == "ants" else code for code in (of_upper, of_lower)]
-        upper, lower = (colony.ants[slot].state for slot in range(2))
-        assert upper // base % base == seen[0]
-        assert lower == digits(base, int(loads[1]), 1, seen[1], 1)
-
-
 @pytest.mark.parametrize(("levels", "code"), [((7, 6), P), ((6, 6), OTHER), ((0, 6), OTHER)])
 def test_without_food_a_better_cell_has_a_stronger_trail_than_the_ants_own(levels, code):
     ahead = neighbour(A, 0)

@@ -9,10 +9,11 @@ import pytest
 from named_states import parse_state
 
 from taichi_ants import AntsError
-from taichi_ants.rendering import Scene, Status, at_start, frames, scene, text
+from taichi_ants.grid.hexgrid import AxialGrid
+from taichi_ants.rendering import Scene, Status, at_start, frames, text
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.rasteriser import Rasteriser
-from taichi_ants.task import Observation, observations
+from taichi_ants.task import observations
 from taichi_ants.worlds import World, paper
 
 WORLD = paper()
@@ -70,27 +71,6 @@ def test_text_keeps_off_the_edges(size) -> None:
     assert (frame[:, -2:] == 255).all()
 
 
-def test_small_pictures_have_no_text() -> None:
-    for size in ((64, 64), (320, 322)):
-        assert (picture(size, title="x") == picture(size, overlay=False)).all()
-
-
-@pytest.mark.parametrize(
-    "size", [(63, 100), (100, 4097), (0, 0), (-5, 100), (100.5, 100), ("a", 3), (100,), None, 100]
-)
-def test_sizes_that_are_refused(size) -> None:
-    with pytest.raises(AntsError, match="size"):
-        Scene(WORLD.grid, size)
-
-
-def test_a_picture_is_the_callers_own() -> None:
-    scene = Scene(WORLD.grid, (128, 96))
-    first = scene.draw(at_start(WORLD))
-    kept = first.copy()
-    first[:] = 0
-    assert (scene.draw(at_start(WORLD)) == kept).all()
-
-
 def test_letters_lie_in_the_cells_in_view() -> None:
     snapshot = at_start(WORLD)
     scene = Scene(WORLD.grid, (320, 320))
@@ -110,25 +90,6 @@ def test_letters_lie_in_the_cells_in_view() -> None:
     assert (plainer.draw(snapshot, seen) == plain).all()
 
 
-def test_an_observation_of_five_cells_marks_five() -> None:
-    """The ant stands at (0, 8, 8) and looks up."""
-    five = Observation(
-        "five",
-        1,
-        lambda view: 0,
-        cells=(-2, -1, 0, 1, 2),
-        name_of=lambda row: "foraging E T O E T",
-    )
-    scene = Scene(WORLD.grid, (320, 320))
-    plain = scene.draw(at_start(WORLD))
-    seen = scene.draw(at_start(WORLD), Status((), state=0, observation=five))
-    for cell, marked in (((0, 8, 9), True), ((0, 9, 8), True), ((0, 9, 9), False)):
-        x, y = places_of(WORLD, cell, 320).astype(int)
-        reach = 9 if marked else 4  # to the outline, or not as far as that of a neighbour
-        part = (slice(y - reach, y + reach), slice(x - reach, x + reach))
-        assert (seen[part] != plain[part]).any() == marked
-
-
 @pytest.mark.parametrize("size", [(320, 320), (320, 200), (200, 320), (1280, 720)])
 def test_no_cell_in_view_is_cut_off_by_the_edge(size) -> None:
     """An ant at each cell of the world that sees all six around; the page stays white behind."""
@@ -143,32 +104,6 @@ def test_no_cell_in_view_is_cut_off_by_the_edge(size) -> None:
     assert (drawn == scene.draw(start, status)).all()
 
 
-@pytest.mark.parametrize("side", [200, 320])
-def test_no_letter_lies_on_food_or_queen(side) -> None:
-    """The ant of a delivered episode sees the queen as an obstacle; her crown stays whole."""
-    world = World((3, 3, 3), (0, 0, 0), [(1, 1, 0)], ants=[((0, 1, 0), 5)])
-    scene = Scene(world.grid, (side, side))
-    snapshot = at_start(world)
-    free = (0, 1, 1)
-    plain = scene.draw(snapshot)
-    seen = scene.draw(snapshot, Status((), state=parse_state("carrying O O O")))
-    reach = int(0.5 * Rasteriser(world.grid, side, side, side // 60).hexagon)
-    for place in (world.queen, (1, 1, 0), free):
-        x, y = places_of(world, place, side).astype(int)
-        part = (slice(y - reach, y + reach), slice(x - reach, x + reach))
-        assert (seen[part] == plain[part]).all() == (place != free)
-
-
-def test_text_is_cut_off_at_the_frame() -> None:
-    frame = np.full((20, 30, 3), 255, dtype=np.uint8)
-    for x, y in ((-100, 10), (25, 10), (10, -50), (10, 500), (-5, 4)):
-        text.write(frame, "words", x, y, 14)
-    assert frame.shape == (20, 30, 3)
-    blank = np.full((20, 30, 3), 255, dtype=np.uint8)
-    text.write(blank, "", 5, 15, 14)
-    assert (blank == 255).all()
-
-
 def test_text_in_place() -> None:
     for align, low, high in (("left", 50, 90), ("middle", 30, 70), ("right", 10, 51)):
         frame = np.full((40, 100, 3), 255, dtype=np.uint8)
@@ -180,45 +115,49 @@ def test_text_in_place() -> None:
         assert rows[-1] > 25  # the g reaches below the baseline
 
 
-def test_shortening() -> None:
-    assert text.shortened("short", 12, 500) == "short"
-    cut = text.shortened("a rather long line of text", 12, 80)
-    assert cut.endswith("...")
-    assert text.width(cut, 12) <= 80
-    assert text.shortened("anything", 12, 1) == ""
-    assert text.width("\u00e9\u4e2d", 12) == text.width("e", 12)
+def test_ants_of_the_legend_look_as_those_of_the_world() -> None:
+    """Drawn alike: darts in small cells, with legs in large ones, dots where cells are dots."""
+
+    def legend(side: int) -> np.ndarray:
+        grid = AxialGrid((side, side, 1))
+        frame = Scene(grid, (640, 400)).draw(at_start(World((side, side, 1), (0, 0, 0))))
+        return frame[230:393, 470:]  # the legend
+
+    legs, darts, dots = legend(4), legend(30), legend(200)
+    rows = slice(5 * 17, 7 * 17)  # the last two of seven entries
+    ink = []
+    for drawn in (legs, darts, dots):
+        assert (np.delete(drawn, rows, axis=0) == np.delete(darts, rows, axis=0)).all()
+        ink.append(int((drawn[rows, :20].max(axis=2) < 160).sum()))
+    assert 0 < ink[2] < min(ink[:2])
+    assert (darts != legs).any()
 
 
-def test_letters_with_accents_lose_these_only() -> None:
-    for written, plain in (("Ångström é ñ ü", "Angstrom e n u"), ("蟻 ants", " ants")):
-        assert text.width(written, 14) == text.width(plain, 14)
-        frames = [np.full((30, 200, 3), 255, dtype=np.uint8) for _ in range(2)]
-        text.write(frames[0], written, 5, 20, 14)
-        text.write(frames[1], plain, 5, 20, 14)
-        assert (frames[0] == frames[1]).all()
-
-
-def test_a_plain_picture_is_the_world_alone() -> None:
+def test_pictures_without_a_panel_are_the_world_alone() -> None:
+    """Where text would not fit, or without the overlay."""
+    for size in ((64, 64), (320, 322)):
+        assert (picture(size, title="x") == picture(size, overlay=False)).all()
     plain, whole = picture(overlay=False, title="x"), picture(title="x")
     assert (plain == Rasteriser(WORLD.grid, 640, 400, 7).draw(at_start(WORLD))).all()
     assert (whole[:, 480:] != 255).any()
 
 
-def test_ants_of_the_legend_look_as_those_of_the_world() -> None:
-    """Drawn alike: darts in small cells, with legs in large ones, dots where cells are dots."""
+SNAPSHOT = at_start(WORLD)
+REFUSED = {
+    "a small size": (lambda: Scene(WORLD.grid, (63, 100)), "from 64 to 4096|64 and 4096"),
+    "a large size": (lambda: Scene(WORLD.grid, (100, 4097)), "64 and 4096"),
+    "half a pixel": (lambda: Scene(WORLD.grid, (100.5, 100)), "size"),
+    "one side": (lambda: Scene(WORLD.grid, (100,)), "a width and a height"),
+    "no grid": (lambda: Scene(WORLD), "grid"),
+    "no task": (lambda: Scene(WORLD.grid, task="paper"), "task"),
+    "no snapshot": (lambda: Scene(WORLD.grid).draw(WORLD), "snapshot"),
+    "no status": (lambda: Scene(WORLD.grid).draw(SNAPSHOT, 7), "status"),
+    "another grid": (lambda: Scene(AxialGrid((3, 3, 3))).draw(SNAPSHOT), "has ranges"),
+}
 
-    def legend(hexagon: float) -> np.ndarray:
-        frame = np.full((260, 200, 3), 255, dtype=np.uint8)
-        scene.draw_legend(frame, 4, 4, 180, 16, hexagon)
-        return frame
 
-    darts, legs, dots = legend(8.0), legend(20.0), legend(1.0)
-    assert (legend(10.0) == darts).all()
-    assert (legend(40.0) == legs).all()
-    rows = slice(4 + 5 * 25, 4 + 7 * 25)  # the last two of seven entries
-    ink = []
-    for picture_ in (darts, legs, dots):
-        assert (np.delete(picture_, rows, axis=0) == np.delete(darts, rows, axis=0)).all()
-        ink.append(int((picture_[rows, :30].max(axis=2) < 160).sum()))
-    assert 0 < ink[2] < 20 < min(ink[:2])
-    assert (darts != legs).any()
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_refused(name) -> None:
+    call, message = REFUSED[name]
+    with pytest.raises(AntsError, match=message):
+        call()

@@ -17,7 +17,7 @@ from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.rendering import Scene, Snapshot, at_start, colours, rasteriser, text
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import Field, Food, Pheromone, Task
-from taichi_ants.worlds import World, paper
+from taichi_ants.worlds import World
 
 GOLDEN = Path(__file__).parent / "golden" / "world.png"
 
@@ -69,22 +69,6 @@ def test_a_world_fills_its_picture(ranges, width, height) -> None:
     assert free[1] == pytest.approx(free[3])
 
 
-def test_headings_on_the_page() -> None:
-    """Worked by hand: heading 0 is straight up, and they run clockwise."""
-    rasteriser = Rasteriser(AxialGrid((3, 3, 3)), 400, 400)
-    x, y = rasteriser.centres((0, 0, 0))
-    half, side = rasteriser.hexagon * np.sqrt(3) / 2, 1.5 * rasteriser.hexagon
-    expected = [
-        (x, y - 2 * half),
-        (x + side, y - half),
-        (x + side, y + half),
-        (x, y + 2 * half),
-        (x - side, y + half),
-        (x - side, y - half),
-    ]
-    assert rasteriser.centres(neighbours((0, 0, 0))) == pytest.approx(np.array(expected))
-
-
 @pytest.mark.parametrize(("ranges", "size"), [((3, 5, 2), (400, 300)), ((7, 2, 4), (130, 90))])
 def test_each_pixel_has_the_colour_of_its_cell(ranges, size) -> None:
     """The world is not symmetric, so a picture that is mirrored, turned or transposed disagrees."""
@@ -120,23 +104,6 @@ def test_a_picture_of_cells_owes_nothing_to_those_before_it() -> None:
     assert np.array_equal(used.draw_cells(of_cells), expected)
 
 
-def test_edges_are_smooth() -> None:
-    """At this size there are no lines between cells, so the picture is near the plain mean."""
-    grid = AxialGrid((9, 12, 7))
-    rasteriser = Rasteriser(grid, 90, 80)
-    assert 2.5 <= rasteriser.hexagon < 2.8
-    of_cells = random_colours(grid)
-    error = np.abs(rasteriser.draw_cells(of_cells) - sampled(rasteriser, of_cells, 8))
-    # Where cells meet, the later one is half a pixel larger.
-    assert error.mean() < 16.0
-    # In cells of one colour no page shines through between them.
-    frame = rasteriser.draw_cells(np.where(grid.exists, 0x336699, colours.PAGE).astype(np.uint32))
-    inside = index_at(rasteriser, pixels(rasteriser)[2:-2, 2:-2]) >= 0
-    whole = np.lib.stride_tricks.sliding_window_view(inside, (5, 5)).all(axis=(2, 3))
-    assert whole.sum() > 1000
-    assert np.abs(frame[4:-4, 4:-4][whole].astype(int) - (0x33, 0x66, 0x99)).max() <= 12
-
-
 def test_a_straight_edge_is_exact() -> None:
     """Two cells, one above the other: the line between them covers as much as it is wide."""
     grid = AxialGrid((2, 1, 1))
@@ -162,29 +129,6 @@ def test_small_cells_are_averaged(side) -> None:
     assert error.mean() < (5.0 if rasteriser.hexagon < 0.5 else 9.0)
 
 
-def test_a_fine_pattern_does_not_turn_into_noise() -> None:
-    """Black and white rows of cells far smaller than a pixel are grey, without a beat."""
-    grid = AxialGrid((500, 500, 1))
-    rasteriser = Rasteriser(grid, 128, 128)
-    assert rasteriser.hexagon < 0.15
-    of_cells = np.where(np.arange(grid.size) % grid.width % 2, 0xFFFFFF, 0).astype(np.uint32)
-    of_cells[~grid.exists] = colours.PAGE
-    middle = rasteriser.draw_cells(of_cells)[40:88, 50:78].astype(float)
-    assert abs(middle.mean() - 127.5) < 2
-    assert middle.std() < 8
-
-
-def test_one_colour_stays_that_colour() -> None:
-    for side in (12, 90):
-        grid = AxialGrid((side, side, 1))
-        rasteriser = Rasteriser(grid, 50, 60)
-        frame = rasteriser.draw_cells(np.full(grid.size, 0x336699, dtype=np.uint32))
-        inside = index_at(rasteriser, pixels(rasteriser)) >= 0
-        whole = inside[1:, 1:] & inside[:-1, 1:] & inside[1:, :-1] & inside[:-1, :-1]
-        assert whole.sum() > 300
-        assert (frame[:-1, :-1][whole] == (0x33, 0x66, 0x99)).all()
-
-
 def crowd(grid: AxialGrid, cells: np.ndarray, carries: bool = False) -> Snapshot:
     n = len(cells)
     return Snapshot(
@@ -208,17 +152,6 @@ def test_ants_stay_visible_in_a_world_of_millions() -> None:
     darkness = (background - around[..., 0]).sum() / background
     # A disc of 0.9 pixels covers 2.5 of them, more than a square of 1.5 by 1.5.
     assert 2.0 < darkness < 3.0
-
-
-def test_food_is_a_dot_with_a_ring_where_cells_are_small() -> None:
-    """A trail may be as light as food; the ring is lighter then."""
-    world = World(ranges=(60, 60, 60), queen=(0, 0, 0), foods=[(30, 0, 0)])
-    scene = Rasteriser(world.grid, 600, 600)
-    assert scene.hexagon < 6
-    x, y = scene.centres((30, 0, 0)).astype(int).tolist()
-    frame = scene.draw(at_start(world, n=1))[y - 6 : y + 7, x - 6 : x + 7]
-    for colour in (colours.CELL_FOOD, colours.FLOOR_FOOD):
-        assert (frame == colours.channels(colour)).all(axis=2).sum() >= 4
 
 
 @pytest.mark.parametrize("hexagon", ["small", "large"])
@@ -322,19 +255,6 @@ def test_the_legend_names_the_homing_cue() -> None:
     assert legends[0] == Scene(grid).draw(world).tobytes()
 
 
-def test_a_crowd_is_a_shade_that_grows_with_it() -> None:
-    grid = AxialGrid((600, 600, 1))
-    cells = np.flatnonzero(grid.exists)
-    scene = Rasteriser(grid, 128, 128)
-    light = []
-    for share in (0.0, 0.02, 0.2, 1.0):
-        chosen = np.random.default_rng(1).choice(cells, int(share * len(cells)), replace=False)
-        frame = scene.draw(crowd(grid, chosen))
-        light.append(float(frame[54:74, 54:74].mean()))
-    assert light[0] > light[1] + 20 > light[2] + 20
-    assert light[2] > light[3]
-
-
 def test_a_crowd_does_not_hide_the_queen() -> None:
     world = World(ranges=(300, 300, 1), queen=(150, 150, 0))
     scene = Rasteriser(world.grid, 100, 100)
@@ -343,18 +263,6 @@ def test_a_crowd_does_not_hide_the_queen() -> None:
     ring = (frame == colours.channels(colours.CELL_QUEEN)).all(axis=2)
     assert ring[y - 7 : y + 8, x - 7 : x + 8].sum() >= 20
     assert frame[y, x + 10].max() < 130
-
-
-def test_the_queen_does_not_hide_the_ants_beside_her() -> None:
-    """A picture of 20 ants, all of them within a pixel of her."""
-    world = World(ranges=(2000, 2000, 1), queen=(1000, 1000, 0))
-    scene = Rasteriser(world.grid, 1280, 720)
-    x, y = scene.centres(world.queen).astype(int).tolist()
-    frame = scene.draw(at_start(world, n=20))
-    near = frame[y - 1 : y + 2, x - 1 : x + 2]
-    assert near.max(axis=2).min() < 60  # as dark as an ant
-    ring = (frame == colours.channels(colours.CELL_QUEEN)).all(axis=2)
-    assert ring[y - 7 : y + 8, x - 7 : x + 8].sum() >= 20
 
 
 @pytest.mark.parametrize("hexagon", [4, 9, 20, 50])
@@ -377,34 +285,6 @@ def test_an_ant_points_where_it_is_heading(hexagon) -> None:
         direction = (target - middle) / np.linalg.norm(target - middle)
         assert crumb @ direction > 0.4 * view.hexagon
         assert np.linalg.norm(crumb - (crumb @ direction) * direction) < 0.15 * view.hexagon + 0.5
-
-
-@pytest.mark.parametrize("side", [25, 95, 160, 290])
-def test_the_marks_of_the_view_leave_the_ant_free(side) -> None:
-    """What marks the view changes pixels near the ant, but none where it stands."""
-    world = World(ranges=(11, 11, 11), queen=(10, 0, 0), ants=[((0, 0, 0), 0)])
-    snapshot = at_start(world)
-    rasteriser = Rasteriser(world.grid, side, side)
-    in_view = snapshot.ant_cells + world.grid.offsets[[5, 0, 1]]
-    plain, marked = rasteriser.draw(snapshot), rasteriser.draw(snapshot, in_view)
-    rows, columns = np.nonzero((plain != marked).any(axis=2))
-    x, y = rasteriser.centres((0, 0, 0))
-    away = np.hypot(rows + 0.5 - y, columns + 0.5 - x)
-    assert len(away) > 30
-    assert away.min() > max(0.75 * rasteriser.hexagon, 1.8)
-    assert away.max() < max(2.9 * rasteriser.hexagon, 9.5)
-
-
-def test_nothing_is_drawn_outside_the_world() -> None:
-    grid = AxialGrid((4, 9, 2))
-    rasteriser = Rasteriser(grid, 500, 260, margin=4)
-    frame = rasteriser.draw(crowd(grid, np.flatnonzero(grid.exists)[:7]))
-    places = pixels(rasteriser) + 0.5
-    centres = rasteriser.centres(grid.cells(np.flatnonzero(grid.exists)))
-    away = np.linalg.norm(places[:, :, None] - centres, axis=3).min(axis=2)
-    outside = (index_at(rasteriser, places) < 0) & (away > rasteriser.hexagon + 1)
-    assert outside.sum() > 5000
-    assert (frame[outside] == 255).all()
 
 
 def golden_scene() -> np.ndarray:
@@ -436,18 +316,6 @@ def test_the_golden_picture() -> None:
         assert difference(wrong, golden) > 1.0
 
 
-def test_text_changes_nothing_of_the_world() -> None:
-    """The world's part of a picture with text is the world alone, wherever fonts put the text."""
-    world = paper()
-    snapshot = at_start(world)
-    with_text = Scene(world.grid, (640, 400), title="some title")
-    frame = with_text.draw(snapshot)
-    width = 640 - 15 * 11 - 7
-    alone = Rasteriser(world.grid, width, 400, margin=7).draw(snapshot)
-    assert (frame[:, :width] == alone).all()
-    assert (frame[:, width:] != 255).any()
-
-
 def test_the_number_of_threads_changes_nothing() -> None:
     before = runtime.start()
     try:
@@ -458,14 +326,3 @@ def test_the_number_of_threads_changes_nothing() -> None:
         assert (pictures[0] == pictures[1]).all()
     finally:
         runtime.start(before.threads, before.arch)
-
-
-@pytest.mark.parametrize("size", [(64, 64), (3840, 2160), (4096, 64)])
-def test_all_sizes(size) -> None:
-    world = paper()
-    frame = Scene(world.grid, size).draw(at_start(world))
-    assert frame.shape == (size[1], size[0], 3)
-    assert frame.dtype == np.uint8
-    # The queen is there, whatever the size.
-    least, most = frame.min(axis=2).astype(int), frame.max(axis=2)
-    assert ((frame[..., 1] == least) & (most - least > 120) & (frame[..., 2] == most)).sum() >= 3

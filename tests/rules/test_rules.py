@@ -140,7 +140,6 @@ def wrong(levl):
 evaporation: `import math`, is not allowed
 def wrong(level):
     import math
-
     return math.floor(level)
 
 evaporation: `'level'`, is not a number

@@ -10,9 +10,8 @@ from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, train, w
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
-from taichi_ants.reference import ReferenceColony
 from taichi_ants.task import Choice, Field, Noise, Pheromone
-from taichi_ants.task.constants import FORWARD, N_ACTIONS
+from taichi_ants.task.constants import N_ACTIONS
 
 N, GRID = 6_000, AxialGrid((10, 10, 2))
 PLAIN = TrainingConfig("q_learning", 0.5, 0.9, 0.0, 1.0)
@@ -85,44 +84,6 @@ def test_ants_with_food_follow_another_pheromone(followed, levels):
     assert colony.carrying.all()
     weights = (20.0 + np.array(levels)) ** 2
     assert_counts(colony.actions[:, 0], weights / weights.sum())
-
-
-@pytest.mark.parametrize(
-    ("homing", "outbound", "allowed"),
-    [
-        ("compass", "trail", [0, 1, 0]),
-        ("trail", "trail", [1600, 400, 6400]),
-        ("trail", "calm", [1600, 400, 6400]),
-        ("calm", "trail", [1, 1, 1]),
-    ],
-)
-def test_ants_with_food_and_without_a_compass_weigh_all_open_cells(homing, outbound, allowed):
-    """An ant picks up food and turns around; the queen is two cells ahead, behind a free cell."""
-    here = GRID.index((5, 5, 0))
-    forward, *rooms = (tuple(c) for c in GRID.cells(here + GRID.offsets[[0, 2, 3, 4]]).tolist())
-    (queen,) = GRID.cells([here + 2 * GRID.offsets[3]]).tolist()
-    trails = [(rooms[0], 20), (rooms[2], 60)]
-    world = World((10, 10, 2), queen, [forward], trails=trails, ants=[((5, 5, 0), 0)])
-    rules = Task(
-        pheromone=Pheromone(evaporation="none"),
-        fields={"calm": Field(deposited_when="never")},
-        choice=Choice("deneubourg", k=20, exponent=2),
-        outbound_cue=outbound,
-        homing_cue=homing,
-    )
-    colony = Colony(world, rules, None, range(N), sharing="frozen")
-    colony.begin_episode()
-    colony.tick(2)
-    assert colony.carrying.all()
-    if homing == "compass":
-        assert (colony.actions[:, 0] == FORWARD).all()
-    else:
-        assert_counts(colony.actions[:, 0], allowed)
-    plain = ReferenceColony(world, rules, None, 0, sharing="frozen")
-    plain.begin_episode()
-    for _ in range(2):
-        plain.tick()
-    assert GRID.index(plain.ants[0].cell) == colony.cells[0, 0]
 
 
 def test_slips():

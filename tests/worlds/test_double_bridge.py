@@ -67,20 +67,6 @@ def test_a_mirrored_bridge_is_the_mirror_image(short: int, long: int, aside: int
     assert (unnamed[0] == unnamed[1]) == (short == long and not aside)
 
 
-@pytest.mark.parametrize("flip", [False, True])
-def test_with_food_aside_the_short_branch_alone_leads_nearer_to_the_queen(flip: bool) -> None:
-    for aside in (1, 2, 3):
-        world = double_bridge(mirrored=flip, aside=aside)
-        _, food = listed_cells(junction_cells(mirrored=flip, aside=aside))
-        far, grid = world.distances(), world.grid
-        found = []
-        for branch in branch_cells(mirrored=flip, aside=aside):
-            cells = set(listed_cells(branch))
-            first = [one for one in (neighbour(food, h) for h in range(6)) if one in cells]
-            found.append(int(min(far[grid.index(one)] for one in first) - far[grid.index(food)]))
-        assert found == [-1, 0]
-
-
 def test_the_way_to_the_food_and_who_starts_where() -> None:
     world = double_bridge()
     assert world.reachable_foods().any()

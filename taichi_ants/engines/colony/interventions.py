@@ -35,7 +35,6 @@ from taichi_ants.engines.colony.layout import (
     NestRow,
     Stage,
     WorldRow,
-    array_of,
 )
 from taichi_ants.engines.colony.ticking import TickingColony
 from taichi_ants.engines.layout import note_best_actions
@@ -227,8 +226,7 @@ class _World:
 
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
-        array = self.colony.arrays[name]
-        return array.reshape(len(self.colony.worlds), -1)[self.w]
+        return self.colony.part(name, self.w)
 
     @property
     def cells(self) -> np.ndarray:
@@ -240,14 +238,6 @@ class _World:
         """A view of the cell of each nest's queen, (nests,)."""
         n = self.colony.n_nests
         return self.colony.arrays["nests"][NestRow.QUEEN_CELL, self.w * n : (self.w + 1) * n]
-
-    def stored(self, number: int = 0) -> np.ndarray:
-        """Return a view of a pheromone as kernels store it; see `ColonyState.stored_trail`."""
-        return self.view(array_of(number, self.colony.pheromones[number].dense))
-
-    def clock(self, number: int = 0) -> int:
-        """Return the clock of a pheromone."""
-        return self.colony.trail_clock(self.w, number)
 
     def _living_slots(self, nest: int | None = None) -> np.ndarray:
         """Return the slots of the living ants, or those of a nest, in the order of numbers."""
@@ -332,7 +322,8 @@ class _World:
 
     def _lay(self, cells: np.ndarray, level: int, number: int) -> None:
         """Set the levels of a pheromone in cells; 0 is the trail."""
-        self.stored(number)[cells] = level + self.clock(number) if level else 0
+        clock = self.colony.trail_clock(self.w, number)
+        self.colony.stored_pheromone(self.w, number)[cells] = level + clock if level else 0
 
     def _add(self, cells: np.ndarray, nests: np.ndarray, heading: int | None) -> Change:
         """Put newborn ants of some nests on those of the cells that are empty."""
@@ -511,15 +502,17 @@ class Interventions:
         self._check_all("the task")
         colony = self.colony
         check_same_kernels(colony.task, task, colony.learns)
-        whole = [n for n, pheromone in enumerate(colony.pheromones) if not pheromone.dense]
-        levels = {
-            (one, number): np.maximum(one.stored(number) - one.clock(number), 0)
-            for one in (_World(self, w) for w in range(len(colony.worlds)))
-            for number in whole
-        }
+        levels = [
+            (world, number, np.maximum(colony.stored_pheromone(world, number) - clock, 0))
+            for world in range(len(colony.worlds))
+            for number, pheromone in enumerate(colony.pheromones)
+            if not pheromone.dense
+            for clock in [colony.trail_clock(world, number)]
+        ]
         colony.set_task(task)
-        for (one, number), level in levels.items():
-            one.stored(number)[:] = np.where(level > 0, level + one.clock(number), 0)
+        for world, number, level in levels:
+            clock = colony.trail_clock(world, number)
+            colony.stored_pheromone(world, number)[:] = np.where(level > 0, level + clock, 0)
 
     def set_epsilon(self, epsilon: float) -> None:
         """Set epsilon, which no longer decays."""

@@ -107,31 +107,23 @@ def cues_of(features: Features, outbound: int, homing: int) -> Cues:
 
 
 class Variant:
-    """The compile-time properties of a kernel: `v` in the functions of the colony."""
+    """The compile-time properties of a kernel, `v` in functions: features and what follows."""
 
     def __init__(self, features: Features) -> None:
+        vars(self).update(features._asdict())
         learner, observation = features.learner, features.observation
-        self.own_tables, self.dense = features.own_tables, any(features.dense)
-        self.is_given_actions = features.is_given_actions
+        self.dense = any(features.dense)
         self.pheromones = tuple(zip(features.dense, features.views, strict=True))
         pairs = features.cues or ((features.outbound, features.homing),)
         self.cues = tuple(cues_of(features, *pair) for pair in pairs)
         cues = {number for cue in self.cues for number in (cue.outbound, cue.followed)}
-        self.reads = features.reads
-        self.traffic = features.traffic
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if self.traffic.shared else 0
-        self.n_nests, self.n_kinds = features.n_nests, features.n_kinds
-        self.n_castes, self.has_labour = features.n_castes, features.has_labour
-        self.epsilon_varies = features.epsilon_varies
         self.n_groups = self.n_nests * max(1, self.n_castes)  # in a world: nests by castes
-        self.has_foods, self.has_loads = features.has_foods, features.has_loads
         # Whether deliveries are counted by nest and kind.
         self.counts_by_nest_and_kind = self.n_nests > 1 or self.n_kinds > 1
         # Only then can slots before the last ant be vacant; see `ColonyState.slots_matter`.
         self.slots_matter = features.ants_change or features.own_tables or features.is_given_actions
-        self.ants_change, self.food_changes = features.ants_change, features.food_changes
-        self.choice, self.slips, self.misreads = features.choice, features.slips, features.misreads
         named, none = partial(own_rule, features.rules), ("",) * len(features.dense)
         self.own_choice = own_inputs.choice(named(features.choice))
         self.own_reward = own_inputs.reward(named(features.reward))
@@ -155,7 +147,6 @@ class Variant:
             self.read_rates = read_rates(learner.hyperparameters)
         if self.together:
             self.td_error = guarded(learner.td_error)
-        self.observation = observation
         self.n_numbers = observation.n_states * ROW  # of a table: state-action pairs, and unused
         self.n_pairs = self.n_numbers * self.n_groups  # of all tables that ants of a world share
         self.is_papers = observation.name == "paper"

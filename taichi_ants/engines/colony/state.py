@@ -266,10 +266,14 @@ class ColonyState:
         """Deliveries of the present episode, int32 (W,); a view."""
         return self.arrays["worlds"][WorldRow.DELIVERIES]
 
+    def part(self, name: str, world: int) -> np.ndarray:
+        """Return a view of a world's part of an array that has only parts of worlds."""
+        return self.arrays[name].reshape(len(self.seeds), -1)[world]
+
     # Arrays (W, capacity) by slot: the number of its last ant, int32, -1 for none; the flat index
-    # of its cell, int32; its heading 0 to 5, percept (see `task.states`), last action (-1 before
-    # the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1; and the
-    # state of its random stream, uint64. If actions slip, `actions` are those that ants chose.
+    # of its cell, int32; its heading 0 to 5, paper_state (see `task.states`), last action (-1
+    # before the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1;
+    # and the state of its random stream, uint64. If actions slip, `actions` are those that ants chose.
     numbers, cells, headings = column("number"), column("cell"), column("heading")
     paper_states, actions, events = column("paper_state"), column("action"), column("event")
     next_actions, streams = column("next_action"), column("streams")
@@ -422,17 +426,16 @@ class ColonyState:
         """Return the present state of world number `world`; arrays are copies."""
         self.check_begun()
         world = checked_whole("world", world, most=len(self.seeds) - 1, least=0)
-        cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
         living = self.living[world]
         ant_cells = self.cells[world, living]
-        ground = self.arrays["ground"][cells].copy()
+        ground = self.part("ground", world).copy()
         ground[ant_cells] = EMPTY
         carries = self.carrying[world, living]
         fields = {name: self._levels(world, name) for name in (TRAIL, *self.fields)}
         of_ants, of_cells = np.zeros(len(ant_cells), np.int32), np.zeros(self.grid.size, np.uint8)
         if self.n_kinds > 1:
             of_ants = self._kinds[world, living].astype(np.int32)
-            of_cells = np.where(ground == FOOD, self.arrays["kind_of"][cells], np.uint8(0))
+            of_cells = np.where(ground == FOOD, self.part("kind_of", world), np.uint8(0))
         queens = self.arrays["nests"][NestRow.QUEEN_CELL].reshape(len(self.seeds), -1)[world]
         counts: dict[str, Any] = {n: int(array[world]) for n, array in self._counts().items()}
         apart = self._deliveries_apart()
@@ -476,10 +479,12 @@ class ColonyState:
         the clock is 0. The level of a cell is max(stored - clock, 0).
         """
         check_one_of("field", field, (TRAIL, *self.fields))
-        cells = slice(world * self.grid.size, (world + 1) * self.grid.size)
         number = self.task.number_of(field)
-        stored = self.arrays[array_of(number, self.pheromones[number].dense)][cells].copy()
-        return stored, self.trail_clock(world, number)
+        return self.stored_pheromone(world, number).copy(), self.trail_clock(world, number)
+
+    def stored_pheromone(self, world: int, number: int) -> np.ndarray:
+        """Return a view of a pheromone as kernels store it, by its number."""
+        return self.part(array_of(number, self.pheromones[number].dense), world)
 
     def trail_clock(self, world: int, number: int = 0) -> int:
         """Return the amount by which a pheromone in whole numbers has evaporated this episode."""

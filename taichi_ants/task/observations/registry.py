@@ -28,17 +28,8 @@ get, names = OBSERVATIONS.get, OBSERVATIONS.names
 MAX_STATES = 1 << 20
 # Names of a view, and of the methods of a view in kernels.
 _OF_VIEWS = (
-    *(
-        "carries",
-        "paper_state",
-        "codes",
-        "levels",
-        "ants",
-        "other_nest_ants",
-        "nearer",
-        "strongest",
-    ),
-    *("own_level", "entries", "keys", "items"),
+    *("carries", "paper_state", "codes", "levels", "ants", "other_nest_ants", "nearer"),
+    *("strongest", "own_level", "entries", "keys", "items"),
 )
 
 

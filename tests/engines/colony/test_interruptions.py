@@ -8,11 +8,9 @@ from typing import Any
 import pytest
 from interrupts import interrupted_after_launch
 
-from taichi_ants import AntsError, Colony, Interventions, TrainingConfig, task, worlds
+from taichi_ants import AntsError, Colony, TrainingConfig, task, worlds
 from taichi_ants.engines.colony import stepping
 from taichi_ants.engines.colony.stepping import ThreadChoice
-from taichi_ants.interventions import AddAnts, Place
-from taichi_ants.task.constants import FOOD
 
 LEARNER = TrainingConfig("sarsa", 0.1, 0.9, 0.3, 0.97)
 
@@ -75,23 +73,3 @@ def test_an_episode_that_did_not_begin_completely_is_refused(tmp_path: Any) -> N
     made.begin_episode(100)
     made.tick()
     assert made.ticks == 1
-
-
-def test_what_one_world_refuses_changes_none() -> None:
-    """Cells, queens, ants and the start of later episodes."""
-    made = colony()
-    Interventions(made, worlds=[1]).put(made.grid.index([(2, 2, 0)]), FOOD)
-    some, (food,) = Interventions(made), made.worlds[0].foods.tolist()
-    Place("rock", [food]).apply(Interventions(made, worlds=[0], lasting=False))
-    full = Interventions(made, worlds=[1])
-    full.add_some(made.capacity - full.living, None)
-    before = some.state()
-    for refused in (
-        Place("queen", [(2, 2, 0)]),  # free in world 0
-        AddAnts(number=1),  # world 1 is full
-        Place("rock", [food, (2, 2, 0)]),  # both worlds would start without food
-    ):
-        with pytest.raises(AntsError):
-            refused.apply(some)
-        assert some.state() == before, refused
-    made.tick()

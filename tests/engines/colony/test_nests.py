@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from taichi_ants.interventions import AddAnts, Place, RemoveAnts
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.protocol import At, When
 from taichi_ants.reference import ReferenceColony
-from taichi_ants.task import Caste, Food
+from taichi_ants.task import Food
 from taichi_ants.task.constants import FOOD
 from taichi_ants.task.events import Event
 
@@ -161,29 +160,6 @@ def test_each_nest_learns_into_its_own_table():
     frozen = Colony(WORLD, Task(foods=KINDS), TRAINING, [1, 2, 3], ants=12, sharing="frozen",
                     q_values=tables)  # fmt: skip
     assert np.array_equal(frozen.q_values, tables)
-
-
-CASTES = {"a": Caste(share=0.5), "b": Caste(share=0.5)}
-
-
-@pytest.mark.parametrize(
-    ("castes", "sharing", "allowed"),
-    [
-        ({}, "shared", "or (3, 2, 128, 5) for one table per nest."),
-        (CASTES, "shared", "or (3, 2, 2, 128, 5) for one table per nest and caste."),
-        (CASTES, "frozen", "or (3, 2, 2, 128, 5) for one table per nest and caste."),
-        ({}, "independent", "or (3, 20, 128, 5) for one table per slot."),
-        ({}, "frozen", "nest, or (3, 20, 128, 5) for one table per slot."),
-    ],
-)
-def test_tables_of_another_shape_are_refused(castes, sharing, allowed):
-    options = {"ants": 12, "capacity": 20, "sharing": sharing, "q_values": np.zeros((3, 5, 128, 5))}
-    with pytest.raises(AntsError, match=r"^q_values has shape \(3, 5, 128, 5\); give") as raised:
-        Colony(WORLD, Task(foods=KINDS, castes=castes), TRAINING, [1, 2, 3], **options)
-    assert str(raised.value).endswith(allowed)
-    shape = tuple(map(int, re.findall(r"\d+", allowed)))
-    options["q_values"] = np.ones(shape, np.float32)
-    Colony(WORLD, Task(foods=KINDS, castes=castes), TRAINING, [1, 2, 3], **options)
 
 
 def test_changes_by_hand_keep_nests_and_kinds_in_later_episodes():

@@ -8,7 +8,7 @@ from colonies import act, training
 from random_rewards import random_rewards
 from random_worlds import random_world
 
-from taichi_ants import Life, Pheromone, Task, runtime
+from taichi_ants import Life, Pheromone, Task
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.reference import ReferenceColony
@@ -167,32 +167,3 @@ def test_reasons_say_why_nothing_happened(drawing, actions, reasons):
         ants.step(np.array([action]))
         told.append(Reason(ants.arrays["reasons"][0]).name)
     assert told == reasons
-
-
-def test_ants_of_different_worlds_and_threads_do_not_meet():
-    worlds = [random_world(seed, 4) for seed in range(400)]
-    ranges = max({world.ranges for world in worlds}, key=[w.ranges for w in worlds].count)
-    worlds = [world for world in worlds if world.ranges == ranges][:3]
-    assert len(worlds) == 3
-    n, rng = 700, np.random.default_rng(0)
-    actions = rng.integers(0, 5, (60, n))
-    seen = []
-    for threads in (1, 2):
-        runtime.start(threads)
-        ants = BatchedEnvironments(worlds, Task(), n, 20, "terminates", falls=True)
-        ants.seed(range(n), np.arange(n))
-        ants.begin(np.ones(n, bool))
-        for row in actions:
-            ants.step(row, same_step=True)
-        seen.append({k: v for k, v in ants.arrays.items() if isinstance(v, np.ndarray)})
-    for name, array in seen[0].items():
-        np.testing.assert_array_equal(array, seen[1][name], err_msg=name)
-    for k, world in enumerate(worlds):
-        alone = BatchedEnvironments([world], Task(), 5, 20, "terminates", falls=True)
-        mine = np.arange(k, 15, 3)
-        alone.seed(mine.tolist(), np.arange(5))
-        alone.begin(np.ones(5, bool))
-        for row in actions:
-            alone.step(row[mine], same_step=True)
-        for name in ("states", "rewards_of", "steps", "ant_cells", "random_states"):
-            np.testing.assert_array_equal(alone.arrays[name], seen[1][name][mine], err_msg=name)
