@@ -273,7 +273,8 @@ class ColonyState:
     # Arrays (W, capacity) by slot: the number of its last ant, int32, -1 for none; the flat index
     # of its cell, int32; its heading 0 to 5, paper_state (see `task.states`), last action (-1
     # before the first) and `Event`, int8; the action drawn ahead for the next tick, int8, or -1;
-    # and the state of its random stream, uint64. If actions slip, `actions` are those that ants chose.
+    # and the state of its random stream, uint64. If actions slip, `actions` are those that ants
+    # chose.
     numbers, cells, headings = column("number"), column("cell"), column("heading")
     paper_states, actions, events = column("paper_state"), column("action"), column("event")
     next_actions, streams = column("next_action"), column("streams")
