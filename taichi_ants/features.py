@@ -16,8 +16,8 @@ LONE = frozenset(
     {
         *("observation", "rewards", "traffic", "turns_at_queen", "delivery"),
         *("evaporation_in_training", "evaporation_in_evaluation", "pheromone.evaporation=none"),
-        *("pheromone.deposit=add", "pheromone.deposit=fading", "pheromone.level"),
-        *("pheromone.cap", "pheromone.slope", "pheromone.view"),
+        *("pheromone.deposit=none", "pheromone.deposit=add", "pheromone.deposit=fading"),
+        *("pheromone.level", "pheromone.cap", "pheromone.slope", "pheromone.view"),
         *("choice.rule=softmax", "choice.temperature", "noise.slip", "noise.misread"),
     }
 )

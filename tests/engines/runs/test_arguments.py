@@ -54,7 +54,7 @@ BAD_SEEDS = [
     ([], "seeds is empty"),
     (0.5, "a seed is 0.5"),
     ([[0, 1]], "a seed is [0, 1]"),
-    (2**64, f"seeds contains {2**64}; a seed must fit into 64 bits"),
+    (2**64, f"a seed is {2**64}; it must lie between"),
     ([4, 5, 4], "seeds contains 4 more than once"),
 ]
 
