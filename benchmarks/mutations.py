@@ -56,6 +56,7 @@ NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
 DESIGN = "tests/studies/test_design.py"
 SENSITIVITY = "tests/analysis/test_sensitivity.py"
+FEATURES = "tests/test_features.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
@@ -379,6 +380,9 @@ MUTATIONS = [
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "changed[setting.name] = setting.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
+    # Features, and what supports them.
+    ("features.py", ".intersection(supports):", ":", FEATURES),
+    ("settings.py", "if value == one.default:", "if True:", FEATURES),
     # Designs.
     ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),

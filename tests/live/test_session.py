@@ -246,7 +246,7 @@ def test_exports_are_files_of_the_project(edited, tmp_path):
     policy = load_policy(tmp_path / "x")
     assert np.array_equal(policy.q_values, session.colony.q_values[0])
     assert policy.task == session.colony.task
-    with pytest.raises(AntsError, match="has its own table"):
+    with pytest.raises(AntsError, match="several tables"):
         edited("paper").policy_bytes()
     for name in ("foraging", "paper", "nests"):
         one = edited(name)
