@@ -17,7 +17,7 @@ COMMANDS = {  # modules of this package with their help
     "tables": "write the tables of the runs that a folder of results has",
     "archive": "pack a finished study, with all that repeats it, into one file",
     "reproduce": "repeat the study in an archive, and compare all of its files",
-    "render": "draw an episode, a colony, learning, or a policy",
+    "render": "draw an episode or a colony",
     "check": "try the rules, observations and learners of a file",
     "watch": "watch and change ants in a browser while they run",
 }
