@@ -225,7 +225,7 @@ def is_finished(folder: Path, asked: Mapping[str, Any], figures: bool, parquet: 
     manifest = manifest_in(folder)
     return bool(
         manifest
-        and manifest["study"] == files.checksum_of_json(asked)
+        and manifest.get("study") == files.checksum_of_json(asked)
         and (manifest["figures"] or not figures)
         and (manifest["parquet"] or not parquet)
         and all(
@@ -278,7 +278,7 @@ def status(folder: Path) -> Iterator[str]:
     store, sessions = Store(folder), sessions_in(folder)
     places, held = store.where(asked["points"], asked["seeds"], asked["arrays"])
     done, manifest = places >= 0, manifest_in(folder)
-    if done.all() and manifest and manifest["study"] == files.checksum_of_json(asked):
+    if done.all() and manifest and manifest.get("study") == files.checksum_of_json(asked):
         yield f"finished: results with {count(done.size, 'run')}, since {manifest['finished']}"
         return
     seconds = np.broadcast_to(np.array(asked["seconds"])[:, None], done.shape)
