@@ -21,7 +21,7 @@ from command_lines import (
     start,
 )
 
-from taichi_ants.studies.folder import sessions_in, status
+from taichi_ants.studies.folder import sessions_in, status, write_json
 from taichi_ants.studies.points import ColonyPoint, RunPoint
 
 RUNS = """
@@ -176,6 +176,16 @@ def test_results_of_other_physics_are_refused(sweep, monkeypatch):
     status, _, err = sweep(RUNS, "a")
     assert status == 2
     assert "contains results of other settings (physics is 1 instead of 99); choose another" in err
+
+
+def test_a_folder_of_something_else_is_left_alone(sweep):
+    Path("a").mkdir()
+    write_json(Path("a/manifest.json"), {"made": "by another program"})
+    Path("a/runs.csv").write_text("1\n")
+    status, _, err = sweep(RUNS, "a")
+    assert (status, err.count("\n")) == (2, 1)
+    assert "a contains files, but no results; choose another --out" in err.replace("'", "")
+    assert sorted(path.name for path in Path("a").iterdir()) == ["manifest.json", "runs.csv"]
 
 
 def test_a_table_that_was_changed_or_removed_is_written_again(sweep, monkeypatch):
