@@ -173,7 +173,7 @@ def test_while_a_command_is_imported(module, start, tmp_path):
 
 SCRIPTS = (
     *("ant_system", "bridge", "colony", "compare", "findings", "fixed_rules", "gallery", "goss"),
-    *("hero", "offline", "utility"),
+    *("hero", "learning", "offline", "policy_sheet", "utility"),
 )
 COUNTING = """
 import runpy, signal, sys
