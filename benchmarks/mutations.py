@@ -56,6 +56,7 @@ NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
 DESIGN = "tests/studies/test_design.py"
 SENSITIVITY = "tests/analysis/test_sensitivity.py"
+FEATURES = "tests/test_features.py"
 
 # (file in taichi_ants/, old text, new text, tests that must notice)
 MUTATIONS = [
@@ -198,7 +199,6 @@ MUTATIONS = [
     ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),
     ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", ROLLOUT),
     ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
-    ("envs/vector.py", "else rows.any(0)", "else rows[-1]", ROLLOUT),
     ("engines/runs/kernels.py", "= paper_state, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
     ("engines/colony/life.py", "c.age[ant] >= lifespan", "c.age[ant] > lifespan", COLONY),
@@ -321,7 +321,7 @@ MUTATIONS = [
         RECORDING,
     ),
     ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
-    ("viewer/recorder.py", "self._before = self.ticks", "self._before = 0", SESSION),
+    ("viewer/recorder.py", "self._ended = numbers[1],", "self._ended = 0,", SESSION),
     # Server.
     ("live/server.py", "self.in_flight >= _MOST_IN_FLIGHT", "self.in_flight < 0", SERVER),
     ("live/server.py", "not (knows or (", "not (True or (", SERVER),
@@ -380,6 +380,9 @@ MUTATIONS = [
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "changed[setting.name] = setting.default", "pass", SETTINGS),
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
+    # Features, and what supports them.
+    ("features.py", ".intersection(supports):", ":", FEATURES),
+    ("settings.py", "if value == one.default:", "if True:", FEATURES),
     # Designs.
     ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),
@@ -396,7 +399,7 @@ MUTATIONS = [
     ("commands/reproduce.py", "if not settings.trust_code:", "if False:", ARCHIVE),
     ("files/inputs.py", "return copy or path", "return path", ARCHIVE),
     ("report/odd.py", 'return row.get(f"{group}.{other}") in needed', "return True", ODD),
-    ("report/odd.py", "one[n] if name in varies", "one[0] if name in varies", ODD),
+    ("report/odd.py", "value[n] if name in varies", "value[0] if name in varies", ODD),
     ("report/odd.py", 'and not row["episodes"]', "and False", ODD),
 ]
 

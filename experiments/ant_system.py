@@ -18,7 +18,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     import taichi as ti
 
     from taichi_ants import AntsError, World, runtime, worlds
-    from taichi_ants.checks import checked_world
+    from taichi_ants.arguments import checked_world
     from taichi_ants.grid.constants import N_HEADINGS, STREAM_TOUR
     from taichi_ants.grid.randomness import stream_state
     from taichi_ants.settings import Count, Seed, Setting, checked_arguments
@@ -147,7 +147,7 @@ def open_cells(world: World) -> tuple[np.ndarray, np.ndarray, np.ndarray, int, i
     Raises:
         AntsError: `world` is not a World, or no food is reachable.
     """
-    ground = checked_world(world, learns=True).ground()
+    ground = checked_world(world, True, "the ant system", ()).ground()
     cells = np.flatnonzero(np.isin(ground, (EMPTY, FOOD, QUEEN)))
     number = np.full(ground.size, -1, np.int32)
     number[cells] = np.arange(len(cells), dtype=np.int32)

@@ -101,9 +101,8 @@ class Plan:
 def plan(options: Mapping[str, Any]) -> Plan:
     """Return the study."""
     seeds = tuple(range(options["seed"], options["seed"] + options["seeds"]))
-    lengths = options["episodes"], options["ticks"]
+    ticks, lengths = options["evaluation_ticks"], (options["episodes"], options["ticks"])
     points = {design: point(design, *lengths) for design in DESIGNS}
-    ticks = options["evaluation_ticks"]
     followed = partial(crossed, {one: design for design, one in points.items()}, ticks)
     array = f"crossings_{ticks}"
     return Plan(Study(tuple(points.values()), seeds, (array,), followed), points, ticks)
@@ -128,7 +127,7 @@ def crossed(
         each = [slice(s, s + 1) for s in range(len(seeds))] if late else [slice(None)]
         for some in each:
             colony = learned.colony(world, seeds[some], q_values[some], False, schedule="by_world")
-            parts.append(crossings(colony, bridge, shown.length(name, ticks), ticks if late else 0))
+            parts.append(crossings(colony, bridge, *((2 * ticks, ticks) if late else (ticks, 0))))
         array = np.moveaxis(np.concatenate(parts, axis=-1), -1, 0)[None]
         found[f"crossings_{ticks}.{BRIDGES.index(name)}"] = array
     return found

@@ -81,11 +81,6 @@ def bridges(design: Design) -> dict[str, dict[str, Any]]:
     return found
 
 
-def length(bridge: str, ticks: int) -> int:
-    """Return the length in ticks of the evaluation on a bridge; `LATE` takes twice as long."""
-    return 2 * ticks if bridge == LATE else ticks
-
-
 def late_shares(crossed: np.ndarray) -> np.ndarray:
     """Return the short branch's share in the second half, float64 (loads, seeds), nan if none."""
     return _shares(crossed[len(crossed) // 2 :].sum(axis=0))
@@ -97,7 +92,7 @@ def rows(found: Crossings, seeds: Sequence[int], ticks: int) -> list[dict[str, A
         {
             **asdict(design),
             **{"bridge": bridge, "seed": seed, "load": load},
-            "from_tick": w * length(bridge, ticks) // WINDOWS,
+            "from_tick": w * (2 * ticks if bridge == LATE else ticks) // WINDOWS,
             **{"short": int(crossed[w, k, 0, s]), "long": int(crossed[w, k, 1, s])},
         }
         for design, bridges in found.items()

@@ -394,16 +394,11 @@ def at_work(
     conditions: Conditions, policies: Mapping[Condition, np.ndarray], seed: int
 ) -> list[page.Player]:
     """Return recordings of the largest colony under each of the compared rules, in one world."""
-    shown = [one for one in policies if one.ants <= MOST_SHOWN]
-    if not shown:
-        return []
-    world_kind = max((one.world_kind for one in shown), key=list(WORLD_KINDS).index)
-    ants = max(one.ants for one in shown)
-    players = []
-    for condition in (Condition(world_kind, rules, JOINT, ants) for rules in COMPARED):
-        if condition not in policies:  # its runs are missing
-            continue
-        point, world = conditions[condition], world_of(world_kind)
+    kinds, players = [*WORLD_KINDS], []
+    small = [(kinds.index(one.world_kind), one.ants) for one in policies if one.ants <= MOST_SHOWN]
+    kind, ants = max(small, default=(0, 0))
+    for condition in [one for one in policies if (one.world_kind, one.ants) == (kinds[kind], ants)]:
+        point, world = conditions[condition], world_of(kinds[kind])
         colony = Colony(
             *(world.of(seed) if isinstance(world, Drawn) else world, point.task),
             replace(point.training, epsilon=point.training.least_epsilon),
@@ -415,7 +410,8 @@ def at_work(
         rules = study.RULES[condition.rules]
         recording = record_colony(colony, SHOWN_TICKS, title=rules)
         done = count(int(colony.outcome().deliveries.sum()), "delivery")
-        words = f"{count(ants, 'ant')} in {WORLD_KINDS[world_kind]}: {done} in {SHOWN_TICKS} ticks."
+        where = WORLD_KINDS[kinds[kind]]
+        words = f"{count(ants, 'ant')} in {where}: {done} in {SHOWN_TICKS} ticks."
         players.append(page.Player(sentence(rules), words, recording))
     return players
 

@@ -181,11 +181,6 @@ class ConditionRow(NamedTuple):
         """Its rules and training regime."""
         return Design(self.condition.rules, self.condition.regime)
 
-    @property
-    def delivered(self) -> float:
-        """The mean deliveries."""
-        return self.estimates["deliveries"].mean
-
     def columns(self) -> dict[str, Any]:
         """Return the columns of conditions.csv."""
         ends = {
@@ -249,7 +244,8 @@ def means(rows: Sequence[ConditionRow]) -> list[Table]:
         sizes = sorted({n for by_size in by_design.values() for n in by_size})
         cells = []
         for design, by_size in by_design.items():
-            delivered = (figure(by_size[n].delivered if n in by_size else None) for n in sizes)
+            mean_of = {n: one.estimates["deliveries"].mean for n, one in by_size.items()}
+            delivered = (figure(mean_of.get(n)) for n in sizes)
             *_, largest = by_size.values()
             share, bound = (largest.estimates[name].mean for name in ("bound_share", "bound"))
             cells.append([design.words, *delivered, percent(share), figure(bound)])
@@ -290,8 +286,8 @@ def glance(rows: Sequence[ConditionRow]) -> Table:
         if one.condition.ants == largest and one.condition.world_kind in shown:
             shown[one.condition.world_kind][one.design] = one
     shown = {world_kind: by_design for world_kind, by_design in shown.items() if by_design}
-    most = max((one.delivered for by in shown.values() for one in by.values()), default=0)
-    digits = 0 if most >= 100 else 1
+    every = [one.estimates["deliveries"].mean for by in shown.values() for one in by.values()]
+    digits = 0 if max(every, default=0) >= 100 else 1
 
     def cell(row: ConditionRow | None) -> str:
         if row is None:

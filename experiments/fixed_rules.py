@@ -94,11 +94,8 @@ def print_table(settings: argparse.Namespace) -> None:
     with progress_bar("Ants with a fixed rule") as progress:
         for kind, name, epsilon in choices:
             ants = LARGE_SIZE if kind == "large" else settings.ants
-            world = world_of(kind)
-            places = [
-                world.of(seed) if isinstance(world, Drawn) else world
-                for seed in range(settings.seeds)
-            ]
+            world, seeds = world_of(kind), range(settings.seeds)
+            places = [world.of(one) if isinstance(world, Drawn) else world for one in seeds]
             outcome = evaluate(settings, places, task_in(kind, TASKS[name]), epsilon, ants)
             taught = learned.get((kind, name, ants, MEASURES.get(epsilon, "")), {})
             rows.append(f"{kind:8} {name:18} {epsilon:7g} {row(outcome, taught)}")

@@ -16,10 +16,10 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     import numpy as np
 
-    from taichi_ants.checks import checked_table, checked_task
     from taichi_ants.commands import render
     from taichi_ants.grid.constants import HEADING_STEPS, N_HEADINGS
     from taichi_ants.grid.hexgrid import centre_of
+    from taichi_ants.learners.policies import checked_table
     from taichi_ants.rendering import check_picture, colours, save_picture, text
     from taichi_ants.rendering.colours import Mark
     from taichi_ants.rendering.rasteriser import (
@@ -97,7 +97,7 @@ def policy_sheet(
             run, or a `Policy`.
         task: The task of the policy, which defines its states; None is the paper's.
     """
-    task = checked_task(Task() if task is None else task)
+    task = Task() if task is None else task
     table = checked_table(q_values, task)
     observation, spread = task.sees, usual_spread(table, task.sees)
     picture = StateDrawing(observation)

@@ -144,23 +144,52 @@ def entries_of(values: object) -> list | None:
         return None
 
 
-def array_of(name: str, values: object) -> np.ndarray:
-    """Return `values` as an array of any type; AntsError if they are ragged."""
+def as_array(
+    name: str,
+    values: object,
+    dtype: Any = "",
+    shape: tuple[int | None, ...] | None = None,
+    low: float | None = None,
+    high: float | None = None,
+) -> np.ndarray:
+    """Return values as an array; AntsError unless it has the type, the shape and the bounds.
+
+    `dtype` is a type, or letters of NumPy's kinds of types: "iu", "fiu" or "b". None in a shape
+    stands for any length.
+    """
     import numpy as np
 
     try:
-        return np.asarray(values)
-    except ValueError:
-        raise AntsError(
-            f"{name} is {shown(values)}; it must be an array whose rows have equal lengths."
-        ) from None
+        array = np.asarray(values)
+    except ValueError:  # rows of different lengths
+        array = np.empty(0, object)
+    is_kind = isinstance(dtype, str) and dtype in _ARRAYS
+    fits = array.dtype.kind in dtype if is_kind else array.dtype == dtype
+    if shape is not None:
+        fits &= len(shape) == array.ndim
+        fits &= all(a in (b, None) for a, b in zip(shape, array.shape, strict=False))
+    if not fits:
+        form = _ARRAYS[dtype] if is_kind else f"type {np.dtype(dtype)}"
+        lengths = ", ".join("n" if length is None else str(length) for length in shape or ())
+        of = "" if shape is None else f" and of shape ({lengths}{',' * (len(shape) == 1)})"
+        raise AntsError(f"{name} is {shown(values)}; it must be an array of {form}{of}.")
+    if low is not None:
+        outside = ~((array >= low) & (array <= high))
+        if outside.any():
+            wrong = array[outside][0]
+            raise AntsError(f"{name} contains {wrong}; all must lie between {low} and {high}.")
+    return array
 
 
-def check_array(name: str, value: Any, dtype: str | np.dtype, shape: tuple[int, ...]) -> None:
-    """Raise AntsError unless the value called `name` is an array of this type and shape."""
-    if (getattr(value, "dtype", None), getattr(value, "shape", None)) != (dtype, shape):
+_ARRAYS = {"iu": "whole numbers", "fiu": "real numbers", "b": "True and False"}
+
+
+def check_word(name: str, value: object) -> None:
+    """Raise AntsError unless the value called `name` can be a name in Python."""
+    if not isinstance(value, str) or not value.isidentifier():
         raise AntsError(
-            f"{name} is {shown(value)}; it must be an array of shape {shape} and type {dtype}."
+            f"{name} is {shown(value)}; it must be a word of letters, digits and _ that does not "
+            "start with a digit."
         )
 
 
@@ -173,3 +202,5 @@ def expect(name: str, value: object, *kinds: type) -> None:
 
 
 _PLAIN = {"str": "text", "NoneType": "None", "ndarray": "an array", "PathLike": "a path"}
+_PLAIN |= {"Mapping": "a mapping of names to values"}
+_PLAIN |= {"Callable": "a function", "Tidy": "a result of Colony.run, train or evaluate"}

@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from taichi_ants.checks import check_follows, check_learns, check_same_kernels
 from taichi_ants.errors import AntsError, check_one_of, count, entries_of, is_flag, shown, whole
 from taichi_ants.files.inputs import place_of
 from taichi_ants.grid.constants import N_HEADINGS
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
 
 One = TypeVar("One", bound="ShorthandSettings")
 _GROUNDS = {"rock": OBSTACLE, "food": FOOD}
-_MOST = 2**24  # ants, see `checks.MAX_ANTS`
+_MOST = 2**24  # ants, see `arguments.MAX_ANTS`
 _CELLS = Setting("cells, each [x, y, z], or the name of a region", or_region=True)
 _NAMED = {group.name: group for group in named_groups(Task)}
 
@@ -72,13 +71,9 @@ class ShorthandSettings(Settings):
         values = value if isinstance(value, Mapping) else cls.short(value)
         if values is None:
             return value
-        known = {setting.name: setting for setting in declared(cls)}
-        for name in values:
-            if name not in known:
-                raise AntsError(f"`{cls.path}.{name}` {not_a_setting(name, known)}")
-        for name, setting in known.items():
-            if setting.default is MISSING and name not in values:
-                raise AntsError(f"`{cls.path}.{name}` is missing; add it.")
+        for setting in declared(cls):
+            if setting.default is MISSING and setting.name not in values:
+                raise AntsError(f"`{cls.path}.{setting.name}` is missing; add it.")
         return cls(**values)
 
     @classmethod
@@ -141,6 +136,12 @@ class OfCells(Intervention):
         super().check()
         if not isinstance(getattr(self, "cells", None), str | None):
             object.__setattr__(self, "cells", _checked_cells(f"{self.path}.cells", self.cells))  # type: ignore[attr-defined]
+
+    def _check_count(self, n: int, form: str) -> None:
+        """Raise AntsError unless there are n cells; `form` says which."""
+        cells: Any = self.cells  # type: ignore[attr-defined]
+        if isinstance(cells, str) or len(cells) != n:
+            raise AntsError(f"`{self.path}.cells` is {shown(cells)}; give {form}.")
 
     @classmethod
     def short(cls, value: Any) -> dict[str, Any] | None:
@@ -228,21 +229,17 @@ class Place(OfCells, path="place"):
 
     what: Annotated[Literal["rock", "food", "queen"], Setting("thing to place")]
     cells: Annotated[Sequence, _CELLS]
-    nest: Annotated[int | None, Setting("nest of the queen, by default 0", least=0)] = None
-    kind: Annotated[str | None, Setting("kind of food; the first if left out")] = None
+    nest: Annotated[
+        int | None, Setting("nest of the queen, by default 0", least=0, only=("what", "queen"))
+    ] = None
+    kind: Annotated[
+        str | None, Setting("kind of food; the first if left out", only=("what", "food"))
+    ] = None
 
     def check(self) -> None:
         super().check()
-        if self.what == "queen" and (isinstance(self.cells, str) or len(self.cells) != 1):
-            has = f"is {self.cells!r}"
-            if not isinstance(self.cells, str):
-                has = f"has {len(self.cells)} cells"
-            raise AntsError(f"`place.cells` {has}; give a list of a single cell for the queen.")
-        for name, of in (("nest", "queen"), ("kind", "food")):
-            if getattr(self, name) is not None and self.what != of:
-                raise AntsError(
-                    f"`place.{name}` is for what = {of!r}, not {self.what!r}; leave it out."
-                )
+        if self.what == "queen":
+            self._check_count(1, "a list of a single cell for the queen")
 
     def check_in(self, world: World, task: Task, learns: bool) -> None:
         super().check_in(world, task, learns)
@@ -275,13 +272,7 @@ class Move(OfCells, path="move"):
 
     def check(self) -> None:
         super().check()
-        if isinstance(self.cells, str) or len(self.cells) != 2:
-            has = f"is {self.cells!r}"
-            if not isinstance(self.cells, str):
-                has = f"has {len(self.cells)} cells"
-            raise AntsError(
-                f"`move.cells` {has}; give the cell to move from, then the cell to move to."
-            )
+        self._check_count(2, "the cell to move from, then the cell to move to")
 
     def apply(self, to: Any) -> None:
         cell, target = (int(to.index([cell])[0]) for cell in self.cells)
@@ -497,6 +488,41 @@ INTERVENTIONS: dict[str, type[Intervention]] = {
         *(SetTask, SetEpsilon, SetLearningRate, SetPolicy, Episode),
     )
 }
+
+
+def check_learns(learns: bool) -> None:
+    """Raise AntsError unless ants learn, so that they have a learning rate."""
+    if not learns:
+        raise AntsError("the ants do not learn, so they have no learning rate; leave it out.")
+
+
+def check_follows(learns: bool, task: Task) -> None:
+    """Raise AntsError unless ants follow a policy and do not learn."""
+    if learns or not task.choice.needs_table:
+        raise AntsError(
+            f"the ants of this colony learn, are given actions, or choose without action values "
+            f"(`task.choice.rule` is {task.choice.rule!r}), so they follow no policy; make a "
+            'colony with sharing="frozen" and q_values.'
+        )
+
+
+def check_same_kernels(task: Task, changed: Task, learns: bool) -> None:
+    """Raise AntsError if a changed task needs other kernels; `learns` says whether ants learn."""
+    castes = {name: caste.fixed for name, caste in task.castes.items()}
+    if castes != {name: caste.fixed for name, caste in changed.castes.items()}:
+        raise AntsError(
+            "the task cannot change the share, ants, nest or policy of a caste in an episode, or "
+            "whether it has thresholds; change its other numbers."
+        )
+    if task.compiled(learns) != changed.compiled(learns):
+        old, new = flat(task.as_dict()), flat(changed.as_dict())
+        names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
+        changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)
+        raise AntsError(
+            f"the task cannot change {' and '.join(changes)} in an episode, because that requires "
+            "other kernels; change settings that kernels read as numbers, for example "
+            "pheromone.level."
+        )
 
 
 def from_dict(facts: Any) -> Intervention:

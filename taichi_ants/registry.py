@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, Generic, TypeVar
 
-from taichi_ants.errors import AntsError, shown
+from taichi_ants.errors import AntsError, check_word, shown
 
 T = TypeVar("T")
 
@@ -59,12 +59,10 @@ class Registry(Generic[T]):
 
     def check_new(self, name: object) -> None:
         """Raise AntsError unless you can register an entry by this name."""
-        if not isinstance(name, str) or not (
-            name.strip() if self._any_text else name.isidentifier()
-        ):
-            form = "a word of letters, digits and _ that does not start with a digit"
-            form = "text" if self._any_text else form
-            raise AntsError(f"the name of the {self.kind} is {shown(name)}; it must be {form}.")
+        if not self._any_text:
+            check_word(f"the name of the {self.kind}", name)
+        elif not isinstance(name, str) or not name.strip():
+            raise AntsError(f"the name of the {self.kind} is {shown(name)}; it must be text.")
         if name in self.built_in or name in self._reserved:
             raise AntsError(
                 f"{name!r} is the name of a built-in {self.kind}, which cannot be replaced; choose "

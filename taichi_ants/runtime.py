@@ -38,8 +38,6 @@ _QUOTAS = (
 # A lock for environments in several threads, because Taichi compiles and launches for one thread.
 alone = threading.RLock()
 
-_kept: list[object] = []  # see start_for_plugin_check
-
 
 @dataclass(frozen=True)
 class Runtime:
@@ -126,14 +124,10 @@ def refresh() -> None:
         ti.reset()
 
 
-def start_for_plugin_check() -> None:
-    """Start Taichi with checks of array bounds, in a forked process.
-
-    The process must end by `os._exit`, because it cannot destroy the Taichi of its parent.
-    """
+def start_with_checks() -> None:
+    """Restart Taichi on one thread, with checks of the bounds of arrays."""
     import taichi as ti
 
-    _kept.append(ti.lang.impl.get_runtime().prog)
     _init(ti, Runtime("cpu", 1), debug=True, offline_cache=False)
 
 

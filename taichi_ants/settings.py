@@ -45,7 +45,7 @@ from typing import (
     get_type_hints,
 )
 
-from taichi_ants.errors import AntsError, entries_of, is_flag, shown
+from taichi_ants.errors import AntsError, check_word, entries_of, is_flag, shown
 
 Self = TypeVar("Self", bound="Settings")
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -199,16 +199,14 @@ class DeclaredSetting(NamedTuple):
         """Return named settings in which `value` replaces or changes those of `start`."""
         entry, entries = self.entry, dict(start)
         for name, new in value.items():
-            if not isinstance(name, str) or not name.isidentifier():
-                raise AntsError(
-                    f"`{self.path}` has the name {shown(name)}; a name has letters, digits and "
-                    "underscores, and does not begin with a digit."
-                )
+            check_word(f"a name in `{self.path}`", name)
             try:
                 kind = entry.entry_named(name)  # type: ignore[attr-defined]
                 entries[name] = new if isinstance(new, kind) else _entry(kind, new, start, name)
             except AntsError as error:
                 raise AntsError(_placed(str(error), entry, f"{self.path}.{name}")) from None
+        if len(entries) > (most := entry.most_entries):  # type: ignore[attr-defined]
+            self._refuse(list(entries), f"{self.allowed}, at most {most}")
         return Named(entries)
 
     def _in_range(self, value: float) -> bool:
@@ -270,7 +268,7 @@ class _Checked(type):
         path = cls.path  # type: ignore[attr-defined]
         try:
             for name in named:
-                if known and name not in known:
+                if known is not None and name not in known:
                     raise AntsError(f"`{_below(path, name)}` {not_a_setting(name, known)}")
             return super().__call__(*values, **named)
         except AntsError as error:
@@ -281,11 +279,11 @@ class _Checked(type):
 
 
 @cache
-def _arguments(cls: type) -> tuple[str, ...]:
-    """Return the names of the arguments of a class; none if it takes any name."""
+def _arguments(cls: type) -> tuple[str, ...] | None:
+    """Return the names of the arguments of a class; None if it takes any name."""
     parameters = signature(cls.__init__).parameters.values()  # type: ignore[misc]
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
-        return ()
+        return None
     return tuple(parameter.name for parameter in parameters)[1:]
 
 
@@ -298,6 +296,7 @@ class Settings(metaclass=_Checked):
     """
 
     path: ClassVar[str] = ""
+    most_entries: ClassVar[float] = math.inf  # of this class in a `Named`
     form: ClassVar[str] = ""  # the values that stand for these settings, in the words of messages
 
     def __init_subclass__(cls, path: str = "", **more: Any) -> None:
@@ -343,6 +342,27 @@ class Settings(metaclass=_Checked):
                 f"`{setting.path}` is {shown(value)}; leave it out unless `{other}` is "
                 f"{_either(map(repr, values))}."
             )
+
+    def uses(self) -> dict[str, str]:
+        """Return the features in use, each with the words of messages about it.
+
+        A feature is a setting that differs from its default, by its name below these settings, for
+        example `noise.slip`. If its values are words, it includes the value: `choice.rule=softmax`.
+        A mapping of named settings is one feature.
+        """
+        found: dict[str, str] = {}
+        for one in declared(type(self)):
+            value = getattr(self, one.name)
+            if value == one.default:
+                continue
+            if isinstance(value, Settings):
+                found |= {f"{one.name}.{name}": words for name, words in value.uses().items()}
+            elif isinstance(value, Named):
+                found[one.name] = f"`{one.path}` has {', '.join(value)}"
+            else:
+                word = f"={value}" if one.allowed_words else ""
+                found[one.name + word] = f"`{one.path}` is {shown(value)}"
+        return found
 
     def replace(self: Self, **changes: Any) -> Self:
         """Return the settings with changes; settings that lose their effect get their defaults.

@@ -1,4 +1,4 @@
-"""Checks of rules and observations that you wrote: the kernels against the plain reference."""
+"""Checks of rules, observations and learners that you wrote."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from taichi_ants import rules, runtime, worlds
+from taichi_ants import learners, rules, runtime, worlds
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.errors import AntsError, checked_whole, listing
 from taichi_ants.grid.hexgrid import AxialGrid
@@ -22,7 +22,7 @@ from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds import World
 
 SEEDS, TICKS = 6, 60
-__all__ = ["RuleCheck", "check_observation", "check_rule"]
+__all__ = ["RuleCheck", "check_learner", "check_observation", "check_rule"]
 __dir__ = __all__.copy  # completion lists only public names
 _LAID = ("with_food", "without_food", "always", "dead_end", "failed_pick_up")
 
@@ -93,6 +93,20 @@ def check_observation(name: str) -> RuleCheck:
     runtime.start()
     ticks, fault = _compared(lambda seed: _task_of(observation, seed))
     return RuleCheck(name, 0, ticks, fault, observation.reads)
+
+
+def check_learner(name: str) -> str:
+    """Return the fault of a learner that learns from drawn steps, or an empty string.
+
+    This finds indices outside an array, and learners that write into the memory of other runs. It
+    restarts Taichi; an index that Taichi cannot check can end the process.
+
+    Raises:
+        AntsError: There is no learner of this name.
+    """
+    from taichi_ants.engines.learner_check import fault_of
+
+    return fault_of(learners.get(name))
 
 
 def _compared(task_of: Callable[[int], Task]) -> tuple[int, str]:

@@ -183,7 +183,7 @@ def test_messages_of_named_settings_name_the_entry():
     assert refused(lambda: Kitchen({"first": {"salt": -1}})) == says
     says = "`kitchen.soups` is 3; it must be a table of names, each with a NamedSoup."
     assert refused(lambda: Kitchen(3)) == says
-    assert "`kitchen.soups` has the name 'two words'" in refused(lambda: Kitchen({"two words": {}}))
+    assert "a name in `kitchen.soups` is 'two words'" in refused(lambda: Kitchen({"two words": {}}))
     says = "`kitchen.soups.first` is 3; it must be a table of settings."
     assert refused(lambda: Kitchen({"first": 3})) == says
     says = "`kitchen.soups.first.flower` is not a setting; choose flour."
@@ -209,10 +209,7 @@ def test_cues_are_fields_of_the_task():
     task = Task(fields=home, homing_cue="home")
     assert task == Task().replace(fields=home, homing_cue="home") == Task.from_dict(task.as_dict())
     assert task.fields["home"] == Field(deposited_when="without_food")
-    end = (
-        "or the name of a field that you add to `task.fields` (for no cue, one with "
-        "deposited_when = 'never')."
-    )
+    end = "or the name of a field that you add to `task.fields`."
     for wrong, cues in (("hoem", "compass, trail, home"), ("", "compass, trail, home")):
         says = f"`task.homing_cue` is {wrong!r}; it must be one of {cues}, {end}"
         assert refused(lambda wrong=wrong: task.replace(homing_cue=wrong)) == says

@@ -109,7 +109,7 @@ def begin(
 
     def wait() -> Seen:
         with progress_bar("pictures") as progress:
-            process.results_of(calls, progress)
+            process.wait_for(calls, progress)
         players = [Player(title, words, one()) for title, words, one in recorded]
         sheet = next((Picture(words, one()) for words, one in sheets), None)
         return Seen(drawn(), players, sheet)

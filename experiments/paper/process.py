@@ -37,15 +37,14 @@ def begin(call: Callable[..., Any], *given: Any, **named: Any) -> Begun:
     return _process.submit(here).result if _process else here
 
 
-def results_of(calls: Sequence[Begun], progress: Callable[[float], None]) -> list[Any]:
-    """Return the results of calls that have begun; raises an error after all have ended."""
-    found, errors = [], []
+def wait_for(calls: Sequence[Begun], progress: Callable[[float], None]) -> None:
+    """Wait for calls that have begun; raises an error of one after all have ended."""
+    errors = []
     for number, call in enumerate(calls):
         progress(number / len(calls))
         try:
-            found.append(call())
+            call()
         except Exception as error:
             errors.append(error)
     if errors:
         raise errors[0]
-    return found

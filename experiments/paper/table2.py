@@ -53,8 +53,7 @@ def summarise(comparison: Comparison) -> list[Summary]:
     values = {name: comparison.measures[name] for name in _MEASURES}
     estimates = centres_of(values, [name for name in values if LONE[name].uses_iqm])
     rows = zip(comparison.rows, estimates, comparison.behaviours, strict=True)
-    seeds = len(comparison.seeds)
-    return [Summary(row, seeds, found, counts(done)) for row, found, done in rows]
+    return [Summary(row, len(done), found, counts(done)) for row, found, done in rows]
 
 
 def summarise_behaviours(comparison: Comparison) -> list[dict[str, Any]]:
@@ -77,18 +76,13 @@ def summarise_behaviours(comparison: Comparison) -> list[dict[str, Any]]:
     ]
 
 
-def paper_row(comparison: Comparison, variant: Variant) -> PaperRow | None:
-    """Return a learner's row of the paper's table 2; None without one and in other worlds."""
-    return TABLE_2.get(variant) if comparison.in_paper_world else None
-
-
 def shown_position(comparison: Comparison, delivery: str, variant: Variant) -> int:
     """Return the index of the row with the paper's configuration of a learner.
 
     Without one, return its best row by the IQM of the return, which outliers do not decide. That
     row is chosen and reported on the same seeds, which flatters the learner.
     """
-    paper = paper_row(comparison, variant)
+    paper = TABLE_2.get(variant) if comparison.in_paper_world else None
     same = comparison.position(delivery, variant, paper.point) if paper else None
     if same is not None:
         return same
@@ -128,7 +122,7 @@ class Line(NamedTuple):
     """A row of table2.csv: a learner in one delivery setting."""
 
     summary: Summary  # of the configuration that `shown_position` chooses
-    paper: PaperRow | None  # see `paper_row`
+    paper: PaperRow | None  # None without one, and in other worlds
     best_run_of: int  # number of configurations
     best_run: Mapping[str, Mapping[str, float]]  # by the names of `FIGURES`, see `best_run`
 
@@ -171,7 +165,7 @@ def table2(comparison: Comparison, summaries: Sequence[Summary], draws: int = DR
     """Return a line for each delivery setting and learner, from `summarise`."""
     lines = []
     for learner in comparison.learners:
-        paper = paper_row(comparison, learner[1])
+        paper = TABLE_2.get(learner[1]) if comparison.in_paper_world else None
         best = {
             name: best_run(values, paper.figure(name) if paper else math.nan)
             for name, values in best_of(comparison, *learner, draws).items()

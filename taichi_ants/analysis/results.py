@@ -150,10 +150,7 @@ def compare(
 
 def _check_results(results: Mapping[str, object]) -> None:
     for name, result in results.items():
-        if not isinstance(result, Tidy):
-            raise AntsError(
-                f"{name} is {shown(result)}; give a result of Colony.run, train or evaluate."
-            )
+        expect(name, result, Tidy)
 
 
 def summary(result: Tidy, last: int | None = None) -> Summary:

@@ -18,7 +18,7 @@ COMMANDS = {  # modules of this package with their help
     "archive": "pack a finished study, with all that repeats it, into one file",
     "reproduce": "repeat the study in an archive, and compare all of its files",
     "render": "draw an episode, a colony, learning, or a policy",
-    "check-rule": "compare the rules of a file with the plain reference",
+    "check": "try the rules, observations and learners of a file",
     "watch": "watch and change ants in a browser while they run",
 }
 

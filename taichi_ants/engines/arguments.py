@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import cache
 from itertools import accumulate
 from typing import Any
@@ -14,6 +16,7 @@ from taichi.lang.argpack import ArgPack
 from taichi.types import ndarray_type
 
 from taichi_ants import runtime
+from taichi_ants.errors import AntsError
 from taichi_ants.subnormals import Flushing
 
 
@@ -62,7 +65,7 @@ class Launch:
         self._pack = pack = _Pack(kind, dict(values))
         memory = pack._ArgPack__argpack
         finalize(pack, _delete, ref(taichi), memory).atexit = False
-        with runtime.quiet():
+        with runtime.quiet(), _naming_plugins():
             lowered = kernel.compiled_kernels[kernel.ensure_compiled(pack)]
             compiled = program.compile_kernel(program.config(), program.get_device_caps(), lowered)
         self._context = lowered.make_launch_context()
@@ -86,6 +89,32 @@ class Launch:
                 self._places[name], value.ctypes.data, value.nbytes, value.shape, 0
             )
         self._known[name] = value
+
+
+@contextmanager
+def _naming_plugins() -> Iterator[None]:
+    """Turn errors of Taichi's compiler, which only code of plugins causes, into AntsError."""
+    try:
+        yield
+    except ti.TaichiCompilationError as error:
+        raise AntsError(
+            f"Taichi cannot compile a kernel with your code: {last_line(error)}; try it with "
+            "`taichi-ants check FILE`."
+        ) from error
+
+
+def last_line(error: Exception) -> str:
+    """Return Taichi's error message in one line, without the place in the source."""
+    lines = [line for line in str(error).splitlines() if line.strip()] or [type(error).__name__]
+    for line in lines:
+        outside = re.search(
+            r"Out of bound access to a \[(\d+)\] matrix with index \[(-?\d+)\]", line
+        )
+        if outside:
+            return "it uses index {1} of a vector of length {0}".format(*outside.groups())
+        if "Out of bound" in line:
+            return "it uses an index outside an array"
+    return lines[-1].strip().rstrip(".?").rsplit("Error: ", 1)[-1]
 
 
 class _Pack(ArgPack):

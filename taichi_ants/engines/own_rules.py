@@ -1,7 +1,6 @@
 """Rules that you wrote, as Taichi functions, and their comparison with their Python functions.
 
-Each rule is compiled, and compared with its Python function for many inputs, in a forked process
-before a kernel includes it. See `taichi_ants.rules`.
+See `taichi_ants.rules`.
 """
 
 import linecache
@@ -13,8 +12,7 @@ import numpy as np
 import taichi as ti
 
 from taichi_ants import runtime
-from taichi_ants.engines.plugin_check import fault_apart, last_line
-from taichi_ants.errors import unusable
+from taichi_ants.engines.arguments import last_line
 from taichi_ants.rules.inputs import KINDS, values_shown
 from taichi_ants.rules.rule import TRIES, Rule, tries
 from taichi_ants.task.rules.numbers import exponential, logarithm, power
@@ -83,9 +81,8 @@ def bounded_function(rule: Rule) -> Callable[..., Any]:
     """Return a `ti.func` as `plain_function`, whose results are in the range of the rule's kind.
 
     A result that is not a number becomes the smallest one. Results of kinds with whole numbers are
-    rounded down, as i32; others are f64. AntsError if the rule does not equal its Python function.
+    rounded down, as i32; others are f64.
     """
-    _check(rule)
     kind, function = KINDS[rule.kind], plain_function(rule)
     least, most, is_whole = float(kind.least), float(kind.most), kind.is_whole
 
@@ -106,13 +103,6 @@ def for_kernels(function: Callable[..., Any]) -> Callable[..., Any]:
     # Taichi requires this attribute, with any value.
     function._is_taichi_function = False
     return function
-
-
-@cache
-def _check(rule: Rule) -> None:
-    fault = fault_apart(lambda: difference(rule))
-    if fault:
-        raise unusable(rule, fault)
 
 
 def difference(rule: Rule, n: int = TRIES) -> str:

@@ -6,9 +6,6 @@ from typing import Any
 
 import taichi as ti
 
-from taichi_ants import runtime
-from taichi_ants.engines.plugin_check import last_line
-from taichi_ants.errors import unusable
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.rules.vision import see_by_level, see_carrying, see_foraging, state_index
@@ -68,17 +65,5 @@ def fill_codes(
 
 @cache
 def encode_function(observation: Observation) -> Callable[..., Any]:
-    """Return an observation's `encode` for kernels; AntsError if Taichi cannot compile it."""
-    encode, view_of = ti.func(observation.encode), view_type(observation, False)
-
-    @ti.kernel
-    def encode_nothing() -> ti.i32:
-        return encode(view_of(strongest=1))
-
-    if not observation.encode.__module__.startswith("taichi_ants."):
-        try:
-            with runtime.quiet():
-                encode_nothing()
-        except Exception as error:
-            raise unusable(observation, last_line(error)) from None
-    return encode
+    """Return an observation's `encode` for kernels."""
+    return ti.func(observation.encode)

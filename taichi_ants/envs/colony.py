@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any, NoReturn
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants import checks
+from taichi_ants.arguments import checked_task
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.envs.formats import ObservationFormat
 from taichi_ants.envs.rollout import Rollout, TablePolicy
@@ -23,11 +23,13 @@ from taichi_ants.envs.vector import (
     task_of,
 )
 from taichi_ants.errors import AntsError, checked_whole
+from taichi_ants.features import CASTES, CHOICE, COLONY
 from taichi_ants.task.constants import N_ACTIONS, RIGHT
 from taichi_ants.task.events import Event
 
 # The default length of a colony's episode, in ticks.
 MAX_STEPS = 1000
+SUPPORTS = COLONY - CHOICE - CASTES - {"choice.rule=softmax"}  # actions are given
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 10}
 
 
@@ -42,8 +44,6 @@ class ColonyWorlds(Ants):
         deliveries: The deliveries of the ant in this episode, int64.
     """
 
-    colonies = True
-
     def __init__(
         self,
         n_worlds: int,
@@ -52,10 +52,10 @@ class ColonyWorlds(Ants):
         ants: int,
         start: str,
         capacity: int | None = None,
+        supports: Collection[str] = SUPPORTS,
     ) -> None:
-        task = task_of(task)
-        checks.check_given_actions(task)
-        super().__init__(n_worlds, task, arguments, METADATA["render_modes"])
+        task = checked_task(task_of(task), "this environment", supports)
+        super().__init__(n_worlds, task, arguments, supports, METADATA["render_modes"])
         self.colony = Colony(
             [self.worlds[w % len(self.worlds)] for w in range(n_worlds)],
             replace(task, evaporation_in_evaluation=self.evaporates),
@@ -274,16 +274,12 @@ class HexColonyVectorEnv(AntVectorEnv, VectorEnv):  # skrl looks only at direct 
         arguments = Arguments(
             world, max_steps, observation_format, evaporation, render_mode, max_episode_steps
         )
-        worlds = ColonyWorlds(n // ants, task, arguments, ants, start)
+        # The number of ants is fixed.
+        supports = SUPPORTS - {"life.births", "life.lifespan"}
+        worlds = ColonyWorlds(n // ants, task, arguments, ants, start, supports=supports)
         super().__init__(worlds, n // ants, n, autoreset_mode, render_mode)
-        rules = worlds.task
-        if rules.life.births or rules.life.lifespan is not None:
-            raise AntsError(
-                f"life of the task is {rules.life}; a vector environment has a fixed number of "
-                "ants, so leave out births and lifespan, or use the parallel_env of colony_v0."
-            )
         same_step = self.autoreset_mode is AutoresetMode.SAME_STEP
-        if rules.delivery == "terminates" and not same_step:
+        if worlds.task.delivery == "terminates" and not same_step:
             raise AntsError(
                 f"autoreset_mode is {self.autoreset_mode.value!r}, but the next episode of an ant "
                 'begins in the step of its delivery; use "SameStep", or a task with delivery '

@@ -11,7 +11,7 @@ from gymnasium.error import InvalidAction, ResetNeeded
 from gymnasium.spaces import Discrete
 from gymnasium.vector import AutoresetMode, VectorEnv
 
-from taichi_ants import checks
+from taichi_ants.arguments import checked_task
 from taichi_ants.engines.layout import TERMINATED, TRUNCATED, Command
 from taichi_ants.engines.runs.batched import BatchedEnvironments
 from taichi_ants.envs.formats import ObservationFormat
@@ -29,10 +29,12 @@ from taichi_ants.envs.vector import (
     task_of,
 )
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown
+from taichi_ants.features import CHOICE, LONE
 from taichi_ants.records import Snapshot
 from taichi_ants.task.constants import EMPTY, EPISODE_STEPS, FOOD, N_ACTIONS, OBSTACLE, QUEEN
 from taichi_ants.worlds import text_map
 
+SUPPORTS = LONE - CHOICE - {"choice.rule=softmax"}  # actions are given
 DELIVERIES = ("terminates", "truncates", "continues")
 METADATA: dict[str, Any] = {"render_modes": ["rgb_array", "ansi"], "render_fps": 10}
 _GROUNDS = {
@@ -59,9 +61,10 @@ class LoneAnts(Ants):
     def __init__(
         self, n: int, task: Rules | None, delivery: str | None, arguments: Arguments
     ) -> None:
-        task = checks.checked_runs_task(task_of(task))
-        checks.check_given_actions(task)
-        super().__init__(n, task, arguments, METADATA["render_modes"])
+        task = checked_task(
+            task_of(task), "an environment of one ant", SUPPORTS, "leave it out, or use a Colony"
+        )
+        super().__init__(n, task, arguments, SUPPORTS, METADATA["render_modes"])
         delivery = task.delivery if delivery is None else delivery
         check_one_of("delivery", delivery, DELIVERIES)
         most = _MOST_CELLS // self.worlds[0].grid.size

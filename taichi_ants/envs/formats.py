@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from taichi_ants.errors import AntsError, check_one_of, shown
+from taichi_ants.errors import AntsError, as_array, check_one_of
 from taichi_ants.learners.policies import finite
 from taichi_ants.task import Observation, observations
 from taichi_ants.task.constants import N_ACTIONS
@@ -102,25 +102,10 @@ def tabulate(
     Returns:
         Action values, float32 (n_states, 5). For actions, 1 for the action and 0 for all others.
     """
-    if not callable(function):
-        raise AntsError(f"function is {shown(function)}; it must be a function of observations.")
     seen = Shown(observations.get(observation), observation_format).table
-    n_states, returned = len(seen), function(seen)
-    try:
-        values = np.asarray(returned)
-    except (TypeError, ValueError, RuntimeError) as error:  # NumPy and torch raise these
-        raise AntsError(
-            f"function returned {shown(returned)}, which is not an array ({shown(str(error))}); "
-            "return only one array, detached from gradients."
-        ) from error
-    if values.shape == (n_states,) and values.dtype.kind in "iu":
-        if values.min() < 0 or values.max() >= N_ACTIONS:
-            wrong = values[(values < 0) | (values >= N_ACTIONS)][0]
-            raise AntsError(f"function returned the action {wrong}; it must be 0, 1, 2, 3 or 4.")
-        return np.eye(N_ACTIONS, dtype=np.float32)[values]
-    if values.shape != (n_states, N_ACTIONS) or values.dtype.kind not in "fiu":
-        raise AntsError(
-            f"function returned an array of shape {values.shape} and type {values.dtype}; it must "
-            f"be real numbers ({n_states}, {N_ACTIONS}), or integer actions ({n_states},)."
-        )
-    return finite("function returned", values)
+    n_states, given = len(seen), np.asarray(function(seen))
+    what = "the array that the function returned"
+    if given.ndim == 1:
+        actions = as_array(what, given, "iu", (n_states,), 0, N_ACTIONS - 1)
+        return np.eye(N_ACTIONS, dtype=np.float32)[actions]
+    return finite("function returned", as_array(what, given, "fiu", (n_states, N_ACTIONS)))

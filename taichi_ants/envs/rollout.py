@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from gymnasium.error import InvalidAction
 
-from taichi_ants import checks
-from taichi_ants.errors import AntsError, check_array, checked_whole, shown
+from taichi_ants.errors import AntsError, as_array, checked_whole, shown
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import GAMMA, mix, stream_state
-from taichi_ants.learners.policies import frozen_policy
+from taichi_ants.learners.policies import checked_table, frozen_policy
 from taichi_ants.task import Task
 from taichi_ants.task.constants import N_ACTIONS
 
@@ -62,7 +61,7 @@ class Rollout(NamedTuple):
     def check_like(self, other: Rollout) -> None:
         """Raise AntsError unless the arrays of this `out` have the shapes and types of another."""
         for name, mine, wanted in zip(self._fields[:-1], self, other, strict=False):
-            check_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
+            as_array(f"out.{name}", mine, wanted.dtype, wanted.shape)
             if not mine.flags.carray:
                 raise AntsError(
                     f"out.{name} is not contiguous or not writeable; give a rollout that "
@@ -170,7 +169,7 @@ def checked_plan(
                 f"policy: action values of shape ({task.n_states}, {N_ACTIONS}), a name, or the "
                 "path of a policy file."
             )
-        table = checks.checked_table(policy, task)
+        table = checked_table(policy, task)
     if steps is None:
         raise AntsError("steps is None; give the number of steps in which ants follow the policy.")
     return checked_whole("steps", steps), None, table

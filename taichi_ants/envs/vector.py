@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +16,7 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from taichi_ants import checks
+from taichi_ants.arguments import check_ranges, checked_max_steps, checked_share, checked_world
 from taichi_ants.envs.formats import ObservationFormat, Shown
 from taichi_ants.envs.rollout import Rollout, TablePolicy, checked_actions, checked_plan
 from taichi_ants.errors import (
@@ -24,7 +24,6 @@ from taichi_ants.errors import (
     check_one_of,
     checked_flag,
     checked_whole,
-    count,
     expect,
     shown,
     whole,
@@ -76,21 +75,23 @@ class Ants(ABC):
         evaporates: Whether trails evaporate.
         max_steps: The step limit of an episode.
         shown: The format of observations.
-        colonies: Whether worlds can have several nests and kinds of food.
     """
 
-    colonies = False
-
     def __init__(
-        self, n_worlds: int, task: Task, arguments: Arguments, render_modes: Sequence[str]
+        self,
+        n_worlds: int,
+        task: Task,
+        arguments: Arguments,
+        supports: Collection[str],
+        render_modes: Sequence[str],
     ) -> None:
-        self.task, self.worlds = task, _worlds_of(arguments.world, n_worlds, self.colonies)
+        self.task, self.worlds = task, _worlds_of(arguments.world, n_worlds, supports)
         self.evaporates = task.evaporation_in_training
         if arguments.evaporation is not None:
             self.evaporates = checked_flag("evaporation", arguments.evaporation)
         if arguments.render_mode is not None:
             check_one_of("render_mode", arguments.render_mode, render_modes)
-        self.max_steps = checks.checked_max_steps(arguments.max_steps, task)
+        self.max_steps = checked_max_steps(arguments.max_steps, task)
         if arguments.max_episode_steps is not None:
             limit = checked_whole("max_episode_steps", arguments.max_episode_steps)
             self.max_steps = min(self.max_steps, limit)
@@ -149,7 +150,7 @@ class Ants(ABC):
         return {**vars(self), "_scene": None}  # `draw` creates it again
 
 
-def _worlds_of(world: Any, most: int, colonies: bool) -> tuple[World, ...]:
+def _worlds_of(world: Any, most: int, supports: Collection[str]) -> tuple[World, ...]:
     single = isinstance(world, (str, os.PathLike, Mapping, World))
     entries = [world] if single else world
     if not isinstance(entries, (list, tuple)) or not entries:
@@ -157,11 +158,12 @@ def _worlds_of(world: Any, most: int, colonies: bool) -> tuple[World, ...]:
             f"world is {shown(world)}; give the name of a world, a World, or a list of them."
         )
     if len(entries) > most:
-        raise AntsError(f"world lists {count(len(entries), 'world')}; it must list at most {most}.")
-    checked = tuple(checks.checked_world(_world_of(entry), several=colonies) for entry in entries)
-    ranges = {checked_one.ranges for checked_one in checked}
-    if len(ranges) > 1:
-        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; all must be the same.")
+        raise AntsError(f"world lists {len(entries)} worlds; it must list at most {most}.")
+    checked = tuple(
+        checked_world(_world_of(entry), what="the environment", supports=supports)
+        for entry in entries
+    )
+    check_ranges(checked)
     return checked
 
 
@@ -184,7 +186,7 @@ def task_of(task: Rules | None) -> Task:
     if isinstance(task, str):
         check_one_of("task", task, tuple(Task.named()))
         return Task.named()[task]
-    return checks.checked_task(Task() if task is None else task)
+    return Task() if task is None else task
 
 
 def check_options(options: Any, *allowed: str) -> dict[str, Any]:
@@ -396,7 +398,7 @@ class AntVectorEnv(StepLimit, VectorEnv[Any, Any, Any]):
         """
         waiting, ants, n = self._waiting("rollout"), self._ants, self.num_envs
         length, actions, q_values = checked_plan(policy, steps, n, ants.task)
-        epsilon, choices = checks.checked_share("epsilon", epsilon), None
+        epsilon, choices = checked_share("epsilon", epsilon), None
         if q_values is None and (epsilon or seed is not None):
             raise AntsError(
                 f"epsilon is {epsilon} and seed is {seed}, but the actions are given; leave both "

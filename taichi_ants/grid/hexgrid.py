@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, array_of, shown
+from taichi_ants.errors import AntsError, as_array
 from taichi_ants.grid.constants import HEADING_STEPS
 
 # Arrays cover the whole grid; at four bytes a cell, this many cells take one gibibyte.
@@ -26,17 +26,8 @@ _SQRT_3 = math.sqrt(3.0)
 
 
 def _cells(values: object) -> np.ndarray:
-    array = array_of("cells", values)
-    if array.dtype.kind not in "iu" or array.ndim == 0 or array.shape[-1] != 3:
-        raise AntsError(
-            f"cells have shape {array.shape} and type {array.dtype}; they must be whole numbers of "
-            "shape (..., 3)."
-        )
-    if (too_far := (array > FAR) | (array < -FAR)).any():
-        raise AntsError(
-            f"a coordinate is {array[too_far][0]}; it must be between -2**40 and 2**40."
-        )
-    return array.astype(np.int64)
+    array = as_array("cells", values, "iu", None, -FAR, FAR)
+    return as_array("cells", array, "iu", (*array.shape[:-1], 3)).astype(np.int64)
 
 
 def normal_form(cells: object) -> np.ndarray:
@@ -152,11 +143,7 @@ class AxialGrid:
 
     def cells(self, index: object) -> np.ndarray:
         """Return the normal forms, int32 (..., 3), of flat indices (...)."""
-        flat = array_of("index", index)
-        if flat.dtype.kind not in "iu" or ((flat < 0) | (flat >= self.size)).any():
-            raise AntsError(
-                f"index is {shown(index)}; it must be whole numbers from 0 to {self.size - 1}."
-            )
+        flat = as_array("index", index, "iu", None, 0, self.size - 1)
         # int32 throughout saves memory: worlds often have millions of cells.
         r, q = np.divmod(flat.astype(np.int32), np.int32(self.width))
         r -= self.ranges[2]

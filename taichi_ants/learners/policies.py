@@ -6,6 +6,7 @@ An ant takes an action with the largest value; ties are broken at random with eq
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,9 +15,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, check_one_of, expect, shown
+from taichi_ants.errors import AntsError, as_array, check_one_of, expect, shown
 from taichi_ants.files import PathLike, to_json
 from taichi_ants.files.archives import Kind
+from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task import Choice, Task, observations
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, N_ACTIONS, PICK_UP, RIGHT
 from taichi_ants.task.states import TASK_NAMES
@@ -57,12 +59,7 @@ class Policy(NamedTuple):
         States are an integer or integers of any shape; AntsError if a state does not exist.
         """
         expect("rng", rng, np.random.Generator)
-        states = np.asarray(states)
-        if states.dtype.kind not in "iu" or ((states < 0) | (states >= len(self.q_values))).any():
-            raise AntsError(
-                f"states is {shown(states)}; they must be integers from 0 to "
-                f"{len(self.q_values) - 1}."
-            )
+        states = as_array("states", states, "iu", None, 0, len(self.q_values) - 1)
         values = self.q_values[states]
         best = values == values.max(axis=-1, keepdims=True)
         return np.where(best, rng.random(values.shape), -1.0).argmax(axis=-1)
@@ -164,25 +161,29 @@ def _choices(rule: Rule, carries: bool, view: Sequence[str]) -> list[int]:
 WITHOUT_LEARNING = {"trail_follower": trail_follower, "random": random_policy}
 
 
-def frozen_policy(name_or_path: PathLike, observation: str = "paper") -> ActionValues:
+def frozen_policy(
+    name_or_path: PathLike, observation: str = "paper", name: str = "policy"
+) -> ActionValues:
     """Return a policy without learning by its name, or the policy in a file (.npz).
+
+    Messages call it `name`.
 
     Raises:
         AntsError: There is no such policy for this observation, or the file cannot be used.
     """
-    expect("policy", name_or_path, str, os.PathLike)
+    expect(name, name_or_path, str, os.PathLike)
     name_or_path = os.fspath(name_or_path)
     if name_or_path in WITHOUT_LEARNING:
         return WITHOUT_LEARNING[name_or_path](observation)
     if not name_or_path.endswith(".npz"):
         raise AntsError(
-            f"policy is {shown(name_or_path)}; it must be one of {', '.join(WITHOUT_LEARNING)}, or "
+            f"{name} is {shown(name_or_path)}; it must be one of {', '.join(WITHOUT_LEARNING)}, or "
             "the path of a policy file (.npz)."
         )
     policy = load_policy(name_or_path)
     if policy.observation != observation:
         raise AntsError(
-            f"policy is {shown(name_or_path)}, which is for the observation "
+            f"{name} is {shown(name_or_path)}, which is for the observation "
             f"{policy.observation!r}, but task.observation is {observation!r}; set the observation "
             "of the policy."
         )
@@ -201,16 +202,8 @@ def save_policy(
         observation: Name of the registered observation whose states index the rows.
     """
     table = _checked(q_values, observation)
-    if not isinstance(metadata, Mapping):
-        raise AntsError(f"metadata is {shown(metadata)}; it must be a mapping of names to values.")
-    try:
-        to_json(metadata)
-    except (TypeError, ValueError, RecursionError) as error:
-        reason = str(error) or type(error).__name__
-        raise AntsError(
-            f"metadata is {shown(metadata)}, which JSON cannot represent ({reason}); use numbers, "
-            "text, lists and mappings."
-        ) from error
+    expect("metadata", metadata, Mapping)
+    to_json(metadata)  # raises TypeError
     _KIND.write(path, {"observation": observation, "metadata": metadata}, {"q_values": table})
 
 
@@ -224,31 +217,51 @@ def load_policy(path: PathLike) -> Policy:
 
 
 def _checked(q_values: npt.ArrayLike, observation: str) -> ActionValues:
-    table = checked_values(q_values, Task(observations.get(observation).name))
-    if table.ndim != 2:
-        indices = ", ".join("0" * (table.ndim - 2))
-        raise AntsError(
-            f"q_values has shape {table.shape}, but a policy file has one table, "
-            f"{table.shape[-2:]}; give one of them, for example q_values[{indices}]."
-        )
-    return table
+    return checked_table(q_values, Task(observations.get(observation).name))
 
 
 def checked_values(q_values: Any, task: Task) -> np.ndarray:
-    """Return action values as float32 (..., n_states, 5); AntsError unless they are finite."""
+    """Return action values as float32 (..., n_states, 5); AntsError unless they are finite.
+
+    Also accepts an object with `q_values`: a `TrainingResult`, a `Policy` or a `Colony`.
+    """
     shape = (task.n_states, N_ACTIONS)
-    try:
-        values = np.asarray(q_values)
-    except ValueError:  # rows of different lengths
-        values = np.empty(0, object)
-    if values.dtype.kind not in "fiu":
-        raise AntsError(f"q_values is {shown(q_values)}; it must be an array of real numbers.")
+    values = as_array("q_values", getattr(q_values, "q_values", q_values), "fiu")
     if values.shape[-2:] != shape or values.size == 0:
         raise AntsError(
             f"q_values has shape {values.shape}; for the observation {task.observation!r} it must "
             f"end in {shape}."
         )
     return finite("q_values is", values)
+
+
+def checked_table(q_values: Any, task: Task) -> np.ndarray:
+    """Return the one table of `q_values`, float32 (n_states, 5); AntsError if it has several."""
+    tables = checked_values(q_values, task)
+    if math.prod(tables.shape[:-2]) > 1:
+        whose = "its " if hasattr(q_values, "q_values") else ""
+        places = ", ".join("0" * (tables.ndim - 2))
+        raise AntsError(
+            f"q_values has shape {tables.shape}, which is {math.prod(tables.shape[:-2])} tables; "
+            f"give one of them, for example {whose}q_values[{places}]."
+        )
+    return tables.reshape(tables.shape[-2:])
+
+
+def check_finite(
+    tables: np.ndarray, configs: Sequence[TrainingConfig], seeds: Sequence[int]
+) -> None:
+    """Raise AntsError if learnt tables (configurations * seeds, ...) are not finite."""
+    with np.errstate(all="ignore"):
+        if np.isfinite(tables.sum()):  # a copy of a colony's tables could take much memory
+            return
+    finite = np.isfinite(tables).reshape(len(configs), len(seeds), -1).all(axis=-1)
+    for c, s in np.argwhere(~finite)[:1]:
+        raise AntsError(
+            f"learner {configs[c].learner!r} computed action values that are not finite, with "
+            f"{configs[c]} and seed {seeds[s]}; try your own learner with "
+            "`taichi-ants check FILE`, or use smaller rewards and action values."
+        )
 
 
 def finite(what: str, values: np.ndarray) -> np.ndarray:

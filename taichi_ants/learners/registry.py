@@ -41,9 +41,9 @@ get, names = LEARNERS.get, LEARNERS.names
 def register(learner: Learner) -> Learner:
     """Return a learner after registering it; it replaces your own learner of the same name.
 
-    Existing results, colonies and kernels do not change. The first use of a learner tries its
-    functions. Raises AntsError if the name is not an identifier or belongs to a built-in learner,
-    or a field does not have the form that `Learner` describes.
+    Existing results, colonies and kernels do not change. `taichi-ants check FILE` tries the
+    functions of your learners. Raises AntsError if the name is not an identifier or belongs to a
+    built-in learner, or a field does not have the form that `Learner` describes.
     """
     expect("learner", learner, Learner)
     name = learner.name
@@ -53,7 +53,7 @@ def register(learner: Learner) -> Learner:
     if learner.begin is not None:
         check_arguments(f"the function begin of {name!r}", learner.begin, arguments[:2])
     if learner.td_error is not None:
-        check_td_error(name, learner.td_error, learner.draws_next_action and not learner.plans)
+        check_td_error(name, learner.td_error)
     _try_sizes(learner)
     for setting in declared(learner.hyperparameters):
         if setting.name in {common.name for common in declared(TrainingConfig)}:

@@ -15,9 +15,10 @@ import numpy as np
 
 from taichi_ants import learners, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
+from taichi_ants.features import refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.learners.policies import FOLLOWED, Policy, trail_follower
-from taichi_ants.live.setup import MOST_ANTS, MOST_TEXT, Setup, check_cues
+from taichi_ants.live.setup import FORM_SUPPORTS, MOST_ANTS, MOST_TEXT, Setup
 from taichi_ants.settings import MISSING, DeclaredSetting, Named, all_of, declared, flat, nested
 from taichi_ants.task import Labour, Task, observations
 
@@ -83,7 +84,12 @@ class Choices:
 
     def __post_init__(self) -> None:
         for policy in self.policies.values():
-            check_cues(policy.task)
+            refuse_unsupported(
+                "the form of the live page",
+                policy.task.uses(),
+                FORM_SUPPORTS,
+                "make a Session in Python, and open its file with --session",
+            )
 
     def as_dict(self) -> dict[str, Any]:
         """Return all choices, JSON-compatible."""

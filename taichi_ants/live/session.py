@@ -385,23 +385,16 @@ class Session:
     def policy_bytes(self) -> bytes:
         """Return the bytes of a policy file; raise AntsError if ants have several tables."""
         colony, table = self.colony, self.colony.q_values[0]
-        if not colony.task.choice.needs_table:
-            rule = colony.task.choice.rule
-            raise AntsError(f"the rule {rule} has no policy; export the colony instead.")
-        if colony.one_a_slot:
+        no_table, learns = not colony.task.choice.needs_table, self.setup.learns
+        if no_table or colony.one_a_slot or (colony.n_nests > 1 and learns):
             raise AntsError(
-                "each ant has its own table, but a policy file holds a single one; begin a session "
-                "in which ants share a table."
+                f"ants have {'no table' if no_table else 'several tables'}, but a policy file "
+                "holds a single one; export the colony instead."
             )
         if colony.n_nests > 1:
-            if self.setup.learns:
-                raise AntsError(
-                    "each nest has its own table, but a policy file holds a single one; export the "
-                    "colony instead."
-                )
             table = table[0]  # all nests follow the same policy
         metadata = {"seed": self.setup.seed, "task": colony.task.as_dict(), "ticks": self.ticks}
-        if self.setup.learns:
+        if learns:
             metadata["training"] = colony.training.as_dict()
         arguments = (table, metadata, colony.task.observation)
         return bytes_of("policy.npz", lambda path: save_policy(path, *arguments))

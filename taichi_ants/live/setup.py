@@ -10,20 +10,16 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files, learners, worlds
-from taichi_ants.checks import (
-    check_own_rules,
-    checked_seeds,
-    checked_share,
-    checked_table,
-)
+from taichi_ants.arguments import checked_seeds, checked_share, checked_task
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, listing, shown
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
+from taichi_ants.features import CASTES, COLONY, FIELDS, FOODS, OWN_RULES
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.policies import WITHOUT_LEARNING
+from taichi_ants.learners.policies import WITHOUT_LEARNING, checked_table
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, ROW
-from taichi_ants.task.field import COMPASS, TRAIL
+from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds import text_map
 from taichi_ants.worlds.double_bridge import bridge_ranges
 from taichi_ants.worlds.validation import parse_ranges
@@ -36,21 +32,8 @@ MOST_TEXT = 50_000  # characters of a map
 _MOST_NUMBERS = 1 << 27  # elements of independent tables
 
 
-def check_cues(task: Task) -> None:
-    """Raise AntsError if a task has pheromones or rules that the form of the page lacks."""
-    check_own_rules(task, "the live page")
-    for name, entries in (("castes", task.castes), ("foods", task.foods)):
-        if entries:
-            raise AntsError(
-                f"the task has {listing(entries, name[:-1])}, which the form of the live page "
-                "lacks; make a Session in Python, and open its file with --session."
-            )
-    if task.fields or (task.outbound_cue, task.homing_cue) != (TRAIL, COMPASS):
-        raise AntsError(
-            f"the task has {listing(task.fields, 'further field')}, and its cues are "
-            f"{task.outbound_cue} and {task.homing_cue}; the form of the live page has only the "
-            "trail and the compass. Make a Session in Python, and open its file with --session."
-        )
+SUPPORTS = COLONY - OWN_RULES
+FORM_SUPPORTS = SUPPORTS - CASTES - FOODS - FIELDS  # of the form of the page
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +60,7 @@ class Setup:
 
     def __post_init__(self) -> None:
         expect("world", self.world, str)
-        expect("task", self.task, Task)
-        check_own_rules(self.task, "the live page")
+        checked_task(self.task, "the live page", SUPPORTS)
         check_one_of("pheromone", self.pheromone, (TRAIL, *self.task.fields))
         for name, caste in self.task.castes.items():
             if caste.policy not in (None, *WITHOUT_LEARNING):  # pages must not name files

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants.checks import checked_seeds, checked_share
-from taichi_ants.errors import AntsError, check_array, checked_whole, expect
+from taichi_ants.arguments import checked_seeds, checked_share
+from taichi_ants.errors import AntsError, as_array, checked_whole, expect
 from taichi_ants.files import PathLike, smallest
 from taichi_ants.files.archives import Kind
 from taichi_ants.records import Record
@@ -78,20 +78,14 @@ class Dataset(Record):
         if not n:
             raise AntsError("the data set has no transitions; it must have at least one.")
         for name, dtype in COLUMNS.items():
-            array = getattr(self, name)
-            check_array(f"{name} of a data set", array, dtype, (n,))
+            array = as_array(f"{name} of a data set", getattr(self, name), dtype, (n,))
             array = np.ascontiguousarray(array).view()
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         most = {"run": len(self.seeds), "action": N_ACTIONS}
         most |= dict.fromkeys(("state", "next_state"), self.task.n_states)
         for name, size in most.items():
-            array = getattr(self, name)
-            if array.min() < 0 or array.max() >= size:
-                raise AntsError(
-                    f"{name} of a data set runs from {array.min()} to {array.max()}; all values "
-                    f"must be from 0 to {size - 1}."
-                )
+            as_array(f"{name} of a data set", getattr(self, name), "iu", None, 0, size - 1)
         chance = self.behaviour_probability
         wrong = ~(np.isnan(chance) | ((chance > 0) & (chance <= 1)))
         if wrong.any():

@@ -14,10 +14,9 @@ import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.analysis.statistics import resampling_counts
-from taichi_ants.checks import checked_q_values
 from taichi_ants.errors import AntsError, expect
 from taichi_ants.learners.config import InitialValue
-from taichi_ants.learners.policies import action_probabilities
+from taichi_ants.learners.policies import action_probabilities, checked_values
 from taichi_ants.offline.dataset import Dataset
 from taichi_ants.offline.learners import Discount, EmpiricalModel
 from taichi_ants.records import Record
@@ -151,7 +150,7 @@ def _values(
 def _policies(data: Dataset, q_values: np.ndarray, epsilon: float) -> tuple[np.ndarray, tuple]:
     """Return action probabilities (policies, n_states, 5) and the leading shape of the tables."""
     expect("data", data, Dataset)
-    tables = checked_q_values(q_values, data.task)
+    tables = checked_values(q_values, data.task)
     probabilities = action_probabilities(tables, epsilon)
     return probabilities.reshape(-1, *tables.shape[-2:]), tables.shape[:-2]
 

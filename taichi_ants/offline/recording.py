@@ -7,20 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import checks, runtime
+from taichi_ants import arguments, runtime
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.engine import Progress, Runs
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.engines.runs.traces import record_steps
 from taichi_ants.errors import AntsError, checked_whole, expect
+from taichi_ants.features import CASTES, CHOICE, COLONY, FOODS, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.policies import action_probabilities, random_policy
+from taichi_ants.learners.policies import action_probabilities, checked_values, random_policy
 from taichi_ants.offline.dataset import COLUMNS, Dataset
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, MAX_STEPS
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
+# Of colonies: probabilities and rewards of actions must follow from action values and events.
+SUPPORTS = COLONY - CHOICE - CASTES - FOODS - {"nests", "reward"}
+SUPPORTS |= {"choice.rule=softmax", "choice.temperature"}
 _FROM_TRACE = {"step": "steps", "state": "states", "action": "actions", "reward": "rewards"}
 _FROM_TRACE |= {"next_state": "next_states", "terminated": "terminated", "episode": "episodes"}
 
@@ -55,23 +59,22 @@ def record(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    checks.checked_world(world, learns=isinstance(behaviour, TrainingConfig))
-    task, numbers = checks.checked_runs_task(task), checks.checked_seeds(seeds)
+    arguments.checked_world(world, learns=isinstance(behaviour, TrainingConfig))
+    task, numbers = arguments.checked_lone_task(task), arguments.checked_seeds(seeds)
     episodes = checked_whole("episodes", episodes)
-    epsilon = checks.checked_share("epsilon", epsilon)
-    max_steps = checks.checked_max_steps(max_steps, task)
+    epsilon = arguments.checked_share("epsilon", epsilon)
+    max_steps = arguments.checked_max_steps(max_steps, task)
     runtime.start(threads, arch)
     facts: dict[str, Any]
     if isinstance(behaviour, TrainingConfig):
-        configs = checks.checked_configs(behaviour)
-        checks.check_choices(configs, task)
+        configs = arguments.checked_configs(behaviour, task)
         state = RunState.initial(configs, numbers, task.n_states).part([0])
         runs = Runs.learning(configs, numbers, state)
         facts = {"policy": "learner", **configs[0].as_dict()}
     else:
         facts = {"policy": "random" if behaviour is None else "table", "epsilon": epsilon}
         table = random_policy(task.observation) if behaviour is None else behaviour
-        tables = checks.checked_q_values(table, task)
+        tables = checked_values(table, task)
         if tables.ndim == 4 and len(tables) == 1:  # as `train` returns for one configuration
             tables = tables[0]
         if tables.shape[:-2] not in ((), (len(numbers),)):
@@ -110,13 +113,11 @@ def record_colony(
         AntsError: An argument is not allowed, or the colony has different worlds.
     """
     expect("colony", colony, Colony)
-    checks.check_one_nest(colony, "record_colony")
-    checks.refuse_castes(colony.task, "record_colony")
+    uses = colony.worlds[0].uses() | colony.task.uses()
+    refuse_unsupported("record_colony", uses, SUPPORTS, "record another colony")
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
-    checks.check_progress(progress)
-    checks.check_table(colony.task)
-    checks.check_rewards(colony.task, "record_colony")
+    arguments.check_progress(progress)
     if len(dict.fromkeys(colony.worlds)) > 1:
         raise AntsError("the worlds of the colony differ; record a separate colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.errors import check_one_of
+from taichi_ants.features import COLONY, refuse_unsupported
 from taichi_ants.grid.constants import (
     N_HEADINGS,
     STREAM_ANT,
@@ -52,6 +53,7 @@ from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.worlds.world import World
 
+SUPPORTS = COLONY
 NO_CASTE = Caste()  # that of all ants if there are no castes
 
 
@@ -117,6 +119,7 @@ class ReferenceColony:
         q_values: np.ndarray | None = None,
     ) -> None:
         self.task = task = task or Task()
+        refuse_unsupported("the reference", task.uses(), SUPPORTS)
         if training is None:  # ants choose without action values
             training = TrainingConfig("q_learning", 1.0, 1.0, 0.0, 1.0)
         check_one_of("sharing", sharing, tuple(SHARING))

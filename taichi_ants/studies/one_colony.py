@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from taichi_ants import files
 from taichi_ants.analysis import style
-from taichi_ants.checks import checked_capacity
+from taichi_ants.arguments import checked_capacity
 from taichi_ants.errors import AntsError, count
 
 if TYPE_CHECKING:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from taichi_ants import PHYSICS, __version__, checks, files, learners, measures, worlds
+from taichi_ants import PHYSICS, __version__, arguments, files, learners, measures, worlds
 from taichi_ants.errors import AntsError, check_one_of, checked_whole
+from taichi_ants.features import COLONY
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures.series import Recorder
@@ -108,13 +109,13 @@ class RunPoint:
     after: ClassVar[None] = None
 
     def __post_init__(self) -> None:
-        (config,) = checks.checked_configs(self.training)
+        (config,) = arguments.checked_configs(self.training)
         object.__setattr__(self, "training", config)
-        checks.checked_runs_task(checks.checked_task(self.task))
+        arguments.checked_lone_task(self.task)
         _check_policy(self.policy, self.episodes)
         more = "" if self.policy else "; 0 requires a policy"
         checked_whole("episodes", self.episodes, 0 if self.policy else 1, otherwise=more)
-        checks.checked_max_steps(self.max_steps, self.task)
+        arguments.checked_max_steps(self.max_steps, self.task)
         checked_whole("rollouts", self.rollouts)
 
     @property
@@ -240,12 +241,12 @@ class ColonyPoint:
     kind: ClassVar[str] = "colony"
 
     def __post_init__(self) -> None:
-        (config,) = checks.checked_configs(self.training)
+        (config,) = arguments.checked_configs(self.training)
         object.__setattr__(self, "training", config)
-        checks.checked_task(self.task)
-        checks.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
+        arguments.checked_task(self.task, "a colony", COLONY)
+        arguments.checked_capacity(self.task, self.ants, self.capacity, self.start, False)
         check_one_of("sharing", self.sharing, ("shared", "independent"))
-        checks.check_sharing(learners.get(config.learner), self.sharing)
+        arguments.check_learner(config, self.task, self.sharing)
         _check_policy(self.policy, self.episodes)
         rule = self.task.choice
         if not rule.needs_table and (self.episodes or self.policy or self.after):
@@ -255,7 +256,7 @@ class ColonyPoint:
                 "set episodes = 0 and leave out policy."
             )
         if self.evaluation_epsilon is not None:
-            checks.checked_share("evaluation_epsilon", self.evaluation_epsilon)
+            arguments.checked_share("evaluation_epsilon", self.evaluation_epsilon)
             if not rule.needs_table:
                 raise AntsError(
                     f"evaluation_epsilon is {self.evaluation_epsilon}, but `task.choice.rule` is "
@@ -295,7 +296,7 @@ class ColonyPoint:
     def _check_event(self, event: ProtocolEvent, learns: bool) -> None:
         places = self.pool if learns and self.pool else self.places_of_evaluation
         of, start = self.events(learns), (self.ants, self.capacity, self.start, False)
-        capacity = checks.checked_capacity(self.task, *start)
+        capacity = arguments.checked_capacity(self.task, *start)
         check_room(event, of, self.task, self.ants, capacity, self.ticks)
         for one in event.interventions:
             one.check_in(places[0], self.task, learns)

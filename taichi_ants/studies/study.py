@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taichi_ants import checks
+from taichi_ants import arguments
 from taichi_ants.errors import AntsError, count, shown
+from taichi_ants.features import COLONY, LONE
 from taichi_ants.studies.executors import completed
 from taichi_ants.studies.plugins import Code
 from taichi_ants.studies.points import ColonyPoint, Drawn, Point, Progress, facts_of, key_of
@@ -61,7 +62,7 @@ class Study:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", tuple(dict.fromkeys(self.points)))
-        object.__setattr__(self, "seeds", checks.checked_seeds(self.seeds))
+        object.__setattr__(self, "seeds", arguments.checked_seeds(self.seeds))
         object.__setattr__(self, "arrays", tuple(self.arrays))
         if not self.points:
             raise AntsError("`points` is empty; give at least one point.")
@@ -70,7 +71,8 @@ class Study:
             several: Any = map(world.of, self.seeds) if isinstance(world, Drawn) else [world]
             starts = [*zip(several, self.seeds, strict=False), *((one, 0) for one in pool or ())]
             for one, seed in starts:
-                checks.checked_world(one, learns=True, several=of_colony).start(seed, ants)
+                who = ("a colony", COLONY) if of_colony else ("a run of one ant", LONE)
+                arguments.checked_world(one, True, *who).start(seed, ants)
         for point in self.points:
             if isinstance(point.world, Drawn):
                 point.check_worlds(map(point.world.of, self.seeds))

@@ -11,7 +11,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from taichi_ants import checks, files, interventions, learners, measures, protocol, rules, worlds
+from taichi_ants import (
+    arguments,
+    files,
+    interventions,
+    learners,
+    measures,
+    protocol,
+    rules,
+    worlds,
+)
 from taichi_ants.errors import AntsError, check_one_of, checked_flag, checked_whole, shown
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.measures import finished
@@ -110,7 +119,7 @@ class Base(NamedTuple):
         seeds = file.get("seeds", 10)
         if not isinstance(seeds, list):
             seeds = range(checked_whole("seeds", seeds, 1, 100_000, ", or a list of seeds"))
-        return cls(kind, tuple(wanted), checks.checked_seeds(seeds), fixed, reading)
+        return cls(kind, tuple(wanted), arguments.checked_seeds(seeds), fixed, reading)
 
     def point(self, row: Settings, built: dict[str, Any]) -> Point:
         """Return the point of the fixed settings and a row of others.

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from taichi_ants.errors import AntsError, is_flag
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.constants import MAX_NESTS, MAX_STEPS
+from taichi_ants.task.constants import MAX_CASTES, MAX_NESTS, MAX_STEPS
 
 Distribution = Literal["none", "fixed", "uniform", "normal", "lognormal"]
 DISTRIBUTIONS: tuple[str, ...] = get_args(Distribution)
@@ -83,6 +83,8 @@ class Caste(Settings, path="task.castes.NAME"):
     the ants of the caste follow it and do not learn. `lays` can also be a list of names, and
     `threshold` a number, which is a fixed threshold.
     """
+
+    most_entries = MAX_CASTES
 
     share: Annotated[
         float | None, Setting("share of the ants of a nest that `ants` does not give to castes"),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from taichi_ants.settings import Setting, Settings
-from taichi_ants.task.constants import MAX_STEPS
+from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_STEPS
 from taichi_ants.task.rewards import Reward
 
 MAX_LOADS = 1_000_000
@@ -19,6 +19,8 @@ class Food(Settings, path="task.foods.NAME"):
     A cell with food has a number of loads, of which an ant takes one. The cell is food until its
     last load is taken; `regrowth` ticks later, it has all its loads again.
     """
+
+    most_entries = MAX_FOOD_KINDS
 
     pick_up: Annotated[Reward, Setting("reward for picking up this food")] = 3
     deliver: Annotated[Reward, Setting("reward for giving this food to the queen")] = 10

@@ -17,7 +17,7 @@ from taichi_ants.settings import Named, Setting, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
-from taichi_ants.task.constants import MAX_CASTES, MAX_FOOD_KINDS, MAX_STEPS
+from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL, Field
 from taichi_ants.task.food import Food
 from taichi_ants.task.labour import Labour
@@ -27,6 +27,7 @@ from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
+_CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not pheromones
 Ticks = Annotated[int | None, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 
 
@@ -167,7 +168,8 @@ class Task(Settings, path="task"):
         Setting("kinds of food, in the order of their numbers in worlds; colonies only"),
     ] = field(default_factory=Named)
     castes: Annotated[
-        Named[Caste], Setting("castes of ants, in the order of their numbers; colonies only")
+        Named[Caste],
+        Setting("castes of ants, in the order of their numbers; colonies only"),
     ] = field(default_factory=Named)
     labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = field(
         default_factory=Labour
@@ -192,10 +194,6 @@ class Task(Settings, path="task"):
         self._check_rules()
 
     def _check_foods(self) -> None:
-        if len(self.foods) > MAX_FOOD_KINDS:
-            raise AntsError(
-                f"`task.foods` has {len(self.foods)} kinds; at most {MAX_FOOD_KINDS} are allowed."
-            )
         if self.foods and self.life.regrowth is not None:
             raise AntsError(
                 f"`task.life.regrowth` is {self.life.regrowth}; with `task.foods`, set the "
@@ -235,20 +233,12 @@ class Task(Settings, path="task"):
         object.__setattr__(self, "rules", Named(used))
         for name, rule in rules.items():
             for read in rule.fields:
-                if read not in (TRAIL, *self.fields):
-                    raise AntsError(
-                        f"the rule {name!r} reads the field {read!r}; add `task.fields.{read}`."
-                    )
+                self._check_field(f"a field that the rule {name!r} reads", read)
             needs = [read for read in LABOUR if read in rule.inputs]
             if needs and not self.labour.divides:
                 raise AntsError(
                     f"the rule {name!r} reads `{needs[0]}`; set `task.labour.rule` to 'thresholds'."
                 )
-        if self.choice.own_rule and self.noise.misread and self.observation != "paper":
-            raise AntsError(
-                f"`task.noise.misread` is {self.noise.misread}; with your rule of choice "
-                f"{self.choice.rule!r}, it requires the observation 'paper'."
-            )
 
     def _changed(self, changes: Mapping[str, Any]) -> Task:
         # Rules that are no longer used lose their parameters.
@@ -281,10 +271,6 @@ class Task(Settings, path="task"):
         return self.life.births or any(span is not None for span in spans)
 
     def _check_castes(self) -> None:
-        if len(self.castes) > MAX_CASTES:
-            raise AntsError(
-                f"`task.castes` has {len(self.castes)} castes; at most {MAX_CASTES} are allowed."
-            )
         for name, caste in self.castes.items():
             self._check_caste(f"`task.castes.{name}", caste)
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
@@ -318,26 +304,23 @@ class Task(Settings, path="task"):
                     f"{path}.{name}` is {shown(value)}; leave it out, because `task.choice.rule` "
                     f"is {self.choice.rule!r}."
                 )
-        pheromones = (TRAIL, *self.fields)
-        for name in caste.pheromones_laid(pheromones):
-            if name not in pheromones:
-                raise AntsError(
-                    f"{path}.lays` is {shown(caste.lays)}; it must be all, none, or names of "
-                    f"{', '.join(pheromones)}, separated by commas."
-                )
-        for setting, cues in self._cues().items():
-            cue = getattr(caste, setting)
-            if cue is not None and cue not in cues:
-                raise AntsError(
-                    f"{path}.{setting}` is {shown(cue)}; it must be one of {', '.join(cues)}, or "
-                    "the name of a field that you add to `task.fields`."
-                )
+        for name in caste.pheromones_laid((TRAIL, *self.fields)):
+            self._check_field(f"a name in {path}.lays`", name, ALL, NOTHING)
+        for setting, more in _CUES.items():
+            self._check_field(f"{path}.{setting}`", getattr(caste, setting), *more)
+
+    def _check_field(self, what: str, name: str | None, *more: str) -> None:
+        """Raise AntsError unless a name is None, a pheromone's, or one of `more`."""
+        known = (*more, TRAIL, *self.fields)
+        if name is not None and name not in known:
+            raise AntsError(
+                f"{what} is {shown(name)}; it must be one of {', '.join(known)}, or the name of a "
+                "field that you add to `task.fields`."
+            )
 
     def cues_of(self, caste: Caste | None) -> tuple[int, int]:
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
-        names = [
-            getattr(caste, setting, None) or getattr(self, setting) for setting in self._cues()
-        ]
+        names = [getattr(caste, setting, None) or getattr(self, setting) for setting in _CUES]
         return self.number_of(names[0]), self.number_of(names[1])
 
     def with_policies(self, policy: str) -> Task:
@@ -358,17 +341,16 @@ class Task(Settings, path="task"):
         return _named()
 
     def _check_choice(self) -> None:
-        if self.choice.rule == "deneubourg" and self.observation != "paper":
+        without_states = self.choice.rule == "deneubourg"
+        without_states |= bool(self.choice.own_rule and self.noise.misread)
+        if without_states and self.observation != "paper":
             raise AntsError(
                 f"`task.observation` is {self.observation!r}; it must be 'paper' if "
-                f"`task.choice.rule` is {self.choice.rule!r}, which chooses without states."
+                f"`task.choice.rule` is {self.choice.rule!r} and `task.noise.misread` "
+                f"{self.noise.misread}."
             )
-        followed, pheromones = self.choice.carriers_follow, (TRAIL, *self.fields)
-        if followed is not None and followed not in pheromones:
-            raise AntsError(
-                f"`task.choice.carriers_follow` is {shown(followed)}; it must be one of "
-                f"{', '.join(pheromones)}, or the name of a field that you add to `task.fields`."
-            )
+        followed = self.choice.carriers_follow
+        self._check_field("`task.choice.carriers_follow`", followed)
         if followed is not None and self.homing_cue != COMPASS:
             raise AntsError(
                 f"`task.choice.carriers_follow` is {shown(followed)}, but `task.homing_cue` is "
@@ -383,26 +365,10 @@ class Task(Settings, path="task"):
                     f"`task.fields` has a field {name!r}, but that name is taken; choose another "
                     "name."
                 )
-        pheromones = (TRAIL, *self.fields)
-        for setting, cues in self._cues().items():
-            cue = getattr(self, setting)
-            if cue not in cues:
-                raise AntsError(
-                    f"`task.{setting}` is {shown(cue)}; it must be one of {', '.join(cues)}, or "
-                    "the name of a field that you add to `task.fields` (for no cue, one with "
-                    "deposited_when = 'never')."
-                )
+        for setting, more in _CUES.items():
+            self._check_field(f"`task.{setting}`", getattr(self, setting), *more)
         for name in self.sees.reads:
-            if name not in pheromones:
-                raise AntsError(
-                    f"`task.observation` is {self.observation!r}, which reads the field {name!r}; "
-                    f"add `task.fields.{name}`."
-                )
-
-    def _cues(self) -> dict[str, tuple[str, ...]]:
-        """Return the names of the cues that each setting allows."""
-        pheromones = (TRAIL, *self.fields)
-        return {"outbound_cue": pheromones, "homing_cue": (COMPASS, *pheromones)}
+            self._check_field(f"a field that the observation {self.observation!r} reads", name)
 
     def __repr__(self) -> str:
         """Return the settings that differ from the paper's."""
@@ -414,6 +380,12 @@ class Task(Settings, path="task"):
     def sees(self) -> Observation:
         """The registered observation."""
         return observations.get(self.observation)
+
+    def uses(self) -> dict[str, str]:
+        """Return the features in use; one is `reads`, fields that the observation reads."""
+        reads = ", ".join(self.sees.reads)
+        words = f"the observation {self.observation!r} reads {reads}"
+        return super().uses() | ({"reads": words} if reads else {})
 
     @property
     def n_states(self) -> int:

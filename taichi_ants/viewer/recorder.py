@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.checks import check_progress
+from taichi_ants.arguments import check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, check_one_of, count, expect

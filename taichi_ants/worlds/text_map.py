@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.errors import AntsError, count, expect, shown
+from taichi_ants.errors import AntsError, check_word, count, expect, shown
 from taichi_ants.grid.hexgrid import AxialGrid, cube
 from taichi_ants.task.constants import MAX_TRAIL_LEVEL
 from taichi_ants.worlds.world import World
@@ -61,8 +61,7 @@ def from_text(text: str, source: str = "the map") -> World:
     It is the smallest world that contains all drawn cells; its other cells become obstacles. Raises
     AntsError, which calls the text `source`, if the map is damaged.
     """
-    if not isinstance(text, str):
-        raise AntsError(f"{source} is {type(text).__name__}; it must be text.")
+    expect(source, text, str)
     text = text.removeprefix("\ufeff")  # the byte-order mark, which some editors write
     level, drawn, regions = _read(text, source)
     axials = _axials(drawn, source)
@@ -189,11 +188,7 @@ def _read_region(where: str, line: str, regions: dict[str, _Mark]) -> None:
         raise AntsError(f"{where} draws cells as {cell!r}; use only {_ALLOWED}.")
     region_names = tuple(name.strip() for name in names.split(","))
     for name in region_names:
-        if not name.isidentifier():
-            raise AntsError(
-                f"{where} has a region {name!r}; a name has letters, digits and _, and does not "
-                "begin with a digit."
-            )
+        check_word(f"the name of a region in {where}", name)
     regions[mark] = _Mark(cell or EMPTY, region_names)
 
 

@@ -7,7 +7,16 @@ from types import MappingProxyType
 
 import numpy as np
 
-from taichi_ants.errors import AntsError, count, entries_of, shown, whole
+from taichi_ants.errors import (
+    AntsError,
+    check_word,
+    checked_whole,
+    count,
+    entries_of,
+    expect,
+    shown,
+    whole,
+)
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.grid.hexgrid import FAR, MAX_ARRAY_CELLS, AxialGrid
 from taichi_ants.task.constants import MAX_FOOD_KINDS, MAX_NESTS, MAX_TRAIL_LEVEL
@@ -78,17 +87,11 @@ def parse_regions(grid: AxialGrid, regions: object) -> Mapping[str, np.ndarray]:
 
     A region is a sequence of cells, or a mapping with a `centre` and a `radius`.
     """
-    if not isinstance(regions, Mapping):
-        raise AntsError(
-            f"regions are {shown(regions)}; they must be cells by the names of regions."
-        )
+    expect("regions", regions, Mapping)
+    assert isinstance(regions, Mapping)
     cells_of: dict[str, np.ndarray] = {}
     for name, cells in regions.items():
-        if not isinstance(name, str) or not name.isidentifier():
-            raise AntsError(
-                f"regions has the name {shown(name)}; it must be a word of letters, digits and _, "
-                "and not begin with a digit."
-            )
+        check_word("the name of a region", name)
         path = f"regions.{name}"
         rows = _disc(path, cells, grid) if isinstance(cells, Mapping) else _parse(path, cells, grid)
         if not len(rows):
@@ -105,9 +108,7 @@ def _disc(path: str, disc: Mapping, grid: AxialGrid) -> np.ndarray:
             f"{path} has the settings {', '.join(map(str, disc)) or 'of nothing'}; give centre "
             "(x, y, z) and radius, or a list of cells."
         )
-    radius = whole(f"{path}.radius", disc["radius"])
-    if radius < 0:
-        raise AntsError(f"{path}.radius is {radius}; it must be at least 0.")
+    radius = checked_whole(f"{path}.radius", disc["radius"], 0)
     row = np.array([_row(f"{path}.centre", disc["centre"], "(x, y, z)", 3)])
     ((x, y, z),) = _inside(f"{path}.centre", row, grid).tolist()
     return grid.cells(np.flatnonzero(grid.exists & (grid.distances((x, y, z)) <= radius)))
@@ -153,12 +154,8 @@ def _kinds(values: object, foods: np.ndarray) -> np.ndarray:
             f"food_kinds has {count(len(entries), 'entry')} for {count(len(foods), 'food item')}; "
             "give one kind for each."
         )
-    kinds = [whole(f"food_kinds[{i}]", kind) for i, kind in enumerate(entries)]
-    wrong = [kind for kind in kinds if not 0 <= kind < MAX_FOOD_KINDS]
-    if wrong:
-        raise AntsError(
-            f"food_kinds contain {wrong[0]}; a kind must lie between 0 and {MAX_FOOD_KINDS - 1}."
-        )
+    most = MAX_FOOD_KINDS - 1
+    kinds = [checked_whole(f"food_kinds[{i}]", kind, 0, most) for i, kind in enumerate(entries)]
     return np.array(kinds, dtype=np.int32).reshape(-1, 1)
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from taichi_ants.errors import AntsError, check_one_of, shown, whole
+from taichi_ants.errors import AntsError, check_one_of, checked_whole, shown, whole
 from taichi_ants.grid.constants import N_HEADINGS, STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import choose, stream_state
@@ -119,6 +119,11 @@ class World:
         """The number of kinds of food, at least 1."""
         return int(self.food_kinds.max(initial=0)) + 1
 
+    def uses(self) -> dict[str, str]:
+        """Return the features in use, each with the words of messages about it; see `Task.uses`."""
+        counts = {"nests": self.n_nests, "kinds of food": self.n_food_kinds}
+        return {name: f"the world has {n} {name}" for name, n in counts.items() if n > 1}
+
     def with_regions(self, regions: Mapping[str, Any]) -> World:
         """Return the world with more regions, which replace those of the same names."""
         by_name = validation.parse_regions(self.grid, regions)
@@ -196,9 +201,7 @@ class World:
             where: "nest" for the free cells nearest to the ant's queen, "spread" for any free
                 cells. With several nests, ants choose in the order of their numbers.
         """
-        seed, n = whole("seed", seed), whole("n", n)
-        if n < 1:
-            raise AntsError(f"n is {shown(n)}; there must be at least 1 ant.")
+        seed, n = whole("seed", seed), checked_whole("n", n)
         check_one_of("where", where, STARTS)
         cells, headings = self.grid.index(self.ants[:n, :3]), self.ants[:n, 3]
         if len(cells) < n:

@@ -150,9 +150,9 @@ def test_a_field_that_the_task_lacks_cannot_be_read():
     with pytest.raises(AntsError, match=r"reads the field 'home'; add `task\.fields\.home`\.$"):
         Task("homely")
     task = Task("homely", fields={"home": Field(), "other": Field(), "third": Field()})
-    message = r"^`task\.fields` has the fields home, other and third; runs .* so use a Colony\.$"
+    message = r"^`task\.fields` has home, other, third, which a run of .*, or use a Colony\.$"
     with pytest.raises(AntsError, match=message):
         train(paper(), CONFIG, 0, task=task)
     observations.register(Observation("trails", 128, of_trails, reads=("trail",)))
-    with pytest.raises(AntsError, match=r"^the observation 'trails' reads the field trail; runs"):
+    with pytest.raises(AntsError, match=r"^the observation 'trails' reads trail, which a run"):
         train(paper(), CONFIG, 0, task=Task("trails"))

@@ -11,7 +11,6 @@ from gymnasium.vector import AutoresetMode
 from taichi_ants import AntsError, Task, worlds
 from taichi_ants.envs.colony import HexColonyVectorEnv
 from taichi_ants.envs.colony_v0 import parallel_env
-from taichi_ants.task import Life
 from taichi_ants.task.task import foraging
 
 ANTS = 6
@@ -132,7 +131,6 @@ def test_the_autoreset_modes_differ_in_when_they_begin_alone():
     ("options", "said"),
     [
         ({"num_envs": 7}, "num_envs is 7; .* a multiple of ants, 6"),
-        ({"task": Task(life=Life(births=True))}, "life of the task is Life.*leave out births"),
         ({"autoreset_mode": "never"}, "autoreset_mode is 'never'; it must be one of NextStep"),
         (
             {"task": Task(), "autoreset_mode": NEXT},

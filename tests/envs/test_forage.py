@@ -203,11 +203,10 @@ def test_wrong_steps_raise_what_gymnasium_raises():
     ("arguments", "told"),
     [
         ({"world": "nowhere"}, "there is no world 'nowhere'"),
-        ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "all must be the same"),
+        ({"world": [SMALL[0], worlds.paper()], "num_envs": 2}, "give worlds of one size"),
         ({"world": SMALL, "num_envs": 2}, "world lists 3 worlds; it must list at most 2"),
         ({"task": "maze"}, "task is 'maze'; it must be one of paper, fetching,"),
         ({"world": {"ranges": (3, 3, 3)}}, "give a World or its `as_dict()`"),
-        ({"task": Task(pheromone=Pheromone(diffusion=0.5))}, "use a Colony"),
         ({"delivery": "never"}, "delivery is 'never'"),
         ({"max_steps": 0}, "max_steps is 0"),
         ({"num_envs": 0}, "num_envs is 0"),

@@ -248,3 +248,27 @@ def test_colonies_equal_steps(mode, form, before, lengths, seed, rules):
         return colony(task=COLONY_TASKS[rules], autoreset_mode=mode, observation_format=form)
 
     compare(make, before, lengths, seed)
+
+
+@pytest.mark.parametrize("mode", [SAME, NEXT])
+def test_many_ants_and_steps(mode):
+    """Several chunks of ants, several blocks of steps, episodes that end with a delivery."""
+    ours = lone(1100, max_steps=12, autoreset_mode=mode)
+    theirs = lone(1100, max_steps=12, autoreset_mode=mode)
+    for env in (ours, theirs):
+        env.reset(seed=4)
+    made = ours.rollout("trail_follower", 150, epsilon=0.2)
+    assert made.terminated.sum() > 100
+    assert made.truncated.sum() > 100
+    assert_steps(theirs, made)
+
+
+def test_a_seed_determines_the_actions():
+    made = []
+    for seed, its in ((5, None), (5, None), (6, None), (5, 1), (6, 1)):
+        env = lone(40)
+        env.reset(seed=seed)
+        made.append(env.rollout("random", 10, seed=its).actions)
+    assert np.array_equal(made[0], made[1])
+    assert not np.array_equal(made[0], made[2])
+    assert np.array_equal(made[3], made[4])

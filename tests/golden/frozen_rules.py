@@ -1,9 +1,13 @@
-"""Own rules of each kind for golden hashes, frozen like `drawing`."""
+"""Own rules of each kind for golden hashes, frozen like `drawing`; other tests do not see them."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from taichi_ants import rules
 from taichi_ants.rules import exp, log, power
+from taichi_ants.rules.rule import RULES
 from taichi_ants.task.events import Event
 
 
@@ -85,3 +89,17 @@ def golden_demanded(reward, event, threshold, stimulus):
     if event == Event.DELIVERED and stimulus > threshold:
         more = 4
     return min(max(reward + more + min(stimulus, 9) // 1, -1000), 1000)
+
+
+FROZEN = {name: RULES.yours.pop(name) for name in rules.names() if name.startswith("golden_")}
+
+
+@contextmanager
+def registered() -> Iterator[None]:
+    """Register the rules until the end of the `with` block."""
+    RULES.yours.update(FROZEN)
+    try:
+        yield
+    finally:
+        for name in FROZEN:
+            del RULES.yours[name]

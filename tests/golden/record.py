@@ -31,7 +31,7 @@ sys.path[:0] = [path for path in map(str, (ROOT, HERE)) if path not in sys.path]
 os.environ.setdefault("TI_ADVANCED_OPTIMIZATION", "0")  # compiles faster, with equal results
 
 import drawing  # noqa: E402
-import frozen_rules  # noqa: E402, F401  registers rules
+import frozen_rules  # noqa: E402
 import numpy as np  # noqa: E402
 
 from taichi_ants import (  # noqa: E402
@@ -301,7 +301,8 @@ def section(name: str, most: int | None = None) -> dict[str, str]:
         found = frames()
     else:
         raise SystemExit(f"there is no section {name!r}; see the head of {Path(__file__).name}.")
-    return dict(found)
+    with frozen_rules.registered():
+        return dict(found)
 
 
 def recorded() -> tuple[int, dict[str, str]]:

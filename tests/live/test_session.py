@@ -246,7 +246,7 @@ def test_exports_are_files_of_the_project(edited, tmp_path):
     policy = load_policy(tmp_path / "x")
     assert np.array_equal(policy.q_values, session.colony.q_values[0])
     assert policy.task == session.colony.task
-    with pytest.raises(AntsError, match="has its own table"):
+    with pytest.raises(AntsError, match="several tables"):
         edited("paper").policy_bytes()
     for name in ("foraging", "paper", "nests"):
         one = edited(name)
@@ -446,3 +446,19 @@ def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
     ]
     assert told == [counted, counted]
     assert counted > 0
+
+
+def test_what_a_hand_has_set_stays_in_later_episodes():
+    session = Session(SETUPS["foraging"])
+    session.apply({"epsilon": 0.25})
+    for _ in range(3):
+        session.apply({"episode": {}})
+    assert session.colony.epsilon == 0.25  # though it decays if nobody sets it
+    assert session.colony.learning_rate < LEARNS.learning_rate  # which nobody has set
+    session.apply({"learning_rate": 0.0})
+    tables = session.colony.q_values
+    session.advance(25)
+    session.advance(25)
+    session.advance(25)
+    assert session.colony.episode == 4
+    assert np.array_equal(session.colony.q_values, tables)

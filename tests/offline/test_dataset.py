@@ -29,7 +29,7 @@ def test_other_files_are_refused_in_one_sentence(data, tmp_path):
     data.save(path)
     arrays = archives.read(path)
     archives.write(path, {**arrays, "action": arrays["action"] + np.int8(9)})
-    with pytest.raises(AntsError, match="action of a data set runs from 9"):
+    with pytest.raises(AntsError, match="action of a data set contains"):
         Dataset.load(path)
     archives.write(path, {"facts": "{}"})
     with pytest.raises(AntsError, match="does not contain a data set"):
@@ -66,9 +66,9 @@ def changed(data, name, row, value):
 @pytest.mark.parametrize(
     ("name", "row", "value", "says"),
     [
-        ("state", 3, 128, "state of a data set runs from 0 to 128"),
-        ("action", 3, -1, "action of a data set runs from -1"),
-        ("run", -1, 3, "run of a data set runs from 0 to 3"),
+        ("state", 3, 128, "state of a data set contains 128; all must lie between 0 and 127"),
+        ("action", 3, -1, "action of a data set contains -1"),
+        ("run", -1, 3, "run of a data set contains 3"),
         ("behaviour_probability", 3, 0.0, "behaviour_probability of a data set"),
         ("next_state", 3, 90, "are not in order"),
         ("truncated", -1, False, "are not in order"),

@@ -129,7 +129,6 @@ def test_ants_of_a_colony_that_appear_and_die(learner, sharing, delivery, life):
         ({"behaviour": np.zeros((128, 4))}, "q_values has shape"),
         ({"episodes": 0}, "episodes is 0"),
         ({"epsilon": 2}, "epsilon is 2"),
-        ({"task": Task(life=Life(births=True))}, "use a Colony"),
     ],
 )
 def test_what_cannot_be_recorded(change, says):

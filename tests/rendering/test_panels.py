@@ -10,7 +10,7 @@ from named_states import parse_state
 
 from taichi_ants import AntsError
 from taichi_ants.grid.hexgrid import AxialGrid
-from taichi_ants.rendering import Scene, Status, at_start, frames, text
+from taichi_ants.rendering import Scene, Status, at_start, frames
 from taichi_ants.rendering.colours import CHOSEN
 from taichi_ants.rendering.rasteriser import Rasteriser
 from taichi_ants.task import observations
@@ -47,17 +47,6 @@ def test_the_bar_of_the_chosen_action_is_as_long_as_its_value() -> None:
     # Numbers in blue have columns as well, the same few for all.
     assert length(1) > 3 * length(4) > 0
     assert length(1) - length(4) == pytest.approx(2.5 * (length(4) - length(0)) * 4 / 3, abs=12)
-
-
-def test_bars_of_negative_values_lie_on_the_other_side_of_the_axis() -> None:
-    # Of eleven parts from -1 to 10, seven lie to the right of the axis and one to its left.
-    right, left = (
-        np.flatnonzero(blue_columns(picture(status=status(action))) >= 8) for action in (1, 2)
-    )
-    assert left.max() < right.min() <= left.max() + 3
-    assert len(right) == pytest.approx(7 * (len(left) + 1), abs=8)  # 1: the axis
-    panel_width = 15 * 11 + 7
-    assert left.min() > 640 - panel_width + text.width("forward", 11)
 
 
 @pytest.mark.parametrize("size", [(640, 400), (400, 700), (500, 500), (342, 1200), (1280, 720)])
@@ -102,17 +91,6 @@ def test_no_cell_in_view_is_cut_off_by_the_edge(size) -> None:
             assert (edge == 255).all()
     (drawn,) = frames([(start, status)], size)
     assert (drawn == scene.draw(start, status)).all()
-
-
-def test_text_in_place() -> None:
-    for align, low, high in (("left", 50, 90), ("middle", 30, 70), ("right", 10, 51)):
-        frame = np.full((40, 100, 3), 255, dtype=np.uint8)
-        text.write(frame, "Hxg", 50, 25, 14, align=align)
-        columns = np.flatnonzero((frame != 255).any(axis=(0, 2)))
-        rows = np.flatnonzero((frame != 255).any(axis=(1, 2)))
-        assert low <= columns[0] <= columns[-1] <= high
-        assert 10 <= rows[0] <= 18  # the top of a capital letter
-        assert rows[-1] > 25  # the g reaches below the baseline
 
 
 def test_ants_of_the_legend_look_as_those_of_the_world() -> None:

@@ -350,8 +350,6 @@ def test_an_interruption_loses_one_block_at_most(study, tmp_path):
         ({"training": TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99)}, "'td_zero'"),
         ({"training": None}, "configs is None"),
         ({"task": "paper"}, "task is 'paper'"),
-        ({"task": Task(life=Life(regrowth=0))}, "use a Colony"),
-        ({"task": Task(pheromone=Pheromone(diffusion=0.1))}, "use a Colony"),
         ({"episodes": 0}, "episodes is 0"),
         ({"max_steps": 10**8}, "max_steps is 100000000"),
         ({"rollouts": 0}, "rollouts is 0"),
@@ -367,7 +365,10 @@ def test_bad_points_of_runs_are_named(change, says):
     ("change", "says"),
     [
         ({"ants": 0}, "ants is 0"),
-        ({"capacity": 3, "ants": 9}, "capacity is 3, but 9 ants start"),
+        (
+            {"capacity": 3, "ants": 9},
+            "because 9 ants start",
+        ),
         ({"start": "there"}, "start is 'there'"),
         ({"sharing": "frozen"}, "sharing is 'frozen'"),
         ({"episodes": 0}, "episodes is 0"),

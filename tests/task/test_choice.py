@@ -7,12 +7,9 @@ import pytest
 from scipy.stats import chisquare
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, World, train, worlds
-from taichi_ants.analysis.bounds.episodes import EpisodeBounds
-from taichi_ants.envs.forage import LoneAnts
 from taichi_ants.envs.vector import Arguments
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.policies import action_probabilities
-from taichi_ants.offline import record_colony
 from taichi_ants.task import Choice, Field, Noise, Pheromone
 from taichi_ants.task.constants import N_ACTIONS
 
@@ -137,7 +134,6 @@ REFUSED = [
         lambda: Colony(worlds.paper(), CELLS, PLAIN, sharing="frozen", q_values=GREEDY_VALUES),
         'set sharing to "frozen" and training to None, and leave out q_values',
     ),
-    (lambda: train(worlds.paper(), PLAIN, 0, 1, task=CELLS), "only colonies support it"),
     (
         lambda: train(
             worlds.paper(),
@@ -149,13 +145,12 @@ REFUSED = [
         "learner 'expected_sarsa' takes the mean over epsilon-greedy actions",
     ),
     (
-        lambda: LoneAnts(1, Task(choice="softmax"), None, GIVEN),
-        "the actions of an environment are given; leave `task.choice` out",
-    ),
-    (lambda: EpisodeBounds(worlds.paper(), Task(noise=Noise(slip=0.1))), "a task without noise"),
-    (
-        lambda: record_colony(Colony(worlds.paper(), CELLS, None, sharing="frozen")),
-        "probabilities of actions do not follow",
+        lambda: Colony(
+            worlds.paper(),
+            Task(choice="softmax"),
+            TrainingConfig("expected_sarsa", 0.1, 0.9, 0.1, 1.0),
+        ),
+        "learner 'expected_sarsa'",
     ),
 ]
 

@@ -89,7 +89,7 @@ def test_notebooks_show_worlds_traces_and_colonies(monkeypatch):
     inner = html.unescape(re.search(r'srcdoc="([^"]*)"', shown)[1])
     assert inner.startswith("<!doctype html>")
     assert inner.endswith("</html>\n")
-    object.__setattr__(trace, "made", None)
+    object.__setattr__(trace, "arguments", None)
     assert html_of(trace) is None
     config = TrainingConfig("q_learning", 0.1, 0.9, 0.2, 1.0)
     colony = Colony(worlds.paper(), None, config, ants=3)

@@ -222,6 +222,6 @@ def test_what_cannot_be_recorded_says_why():
     with pytest.raises(AntsError, match="episode is None"):
         record_episode(None)
     trace = rollout(worlds.paper(), trail_follower())
-    object.__setattr__(trace, "made", None)
+    object.__setattr__(trace, "arguments", None)
     with pytest.raises(AntsError, match="does not contain its world and settings"):
         record_trace(trace)

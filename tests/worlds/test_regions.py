@@ -54,7 +54,7 @@ def test_a_text_map_draws_regions():
         ("region a = %\nQ", "has no cell '%' of the region a; draw one, or leave"),
         ("Q\nregion a = %", "names a region; move it above the drawing"),
         ("region a = % Q\n%\n\n%", "a second time; draw the queen of each nest once"),
-        ("region 1a = %\n%\n\nQ", "line 1 of the map has a region '1a'; a name has letters"),
+        ("region 1a = %\n%\n\nQ", "a region in line 1 of the map is '1a'; it must be a word"),
     ],
 )
 def test_a_wrong_line_of_a_region_is_named(text, says):
@@ -65,10 +65,10 @@ def test_a_wrong_line_of_a_region_is_named(text, says):
 @pytest.mark.parametrize(
     ("regions", "says"),
     [
-        ([1], r"^regions are \[1\]; they must be cells by the names of regions\.$"),
+        ([1], r"^regions is \[1\]; it must be a mapping of names to values\.$"),
         ({"a": []}, r"^regions\.a is empty; give at least one cell\.$"),
         ({"a": {"centre": (0, 0, 0)}}, r"^regions\.a has the settings centre; give centre"),
-        ({"a": {"centre": (0, 0, 0), "radius": -1}}, r"^regions\.a\.radius is -1; it must be at"),
+        ({"a": {"centre": (0, 0, 0), "radius": -1}}, r"^regions\.a\.radius is -1; it must lie"),
         ({"a": {"centre": (50, 0, 0), "radius": 1}}, r"^regions\.a\.centre is \(50, 0, 0\), outs"),
         ({"a": [(50, 0, 0)]}, r"^regions\.a\[0\] is \(50, 0, 0\), outside the world"),
         ({"a": 3}, r"^regions\.a is 3; it must be a sequence of \(x, y, z\)\.$"),

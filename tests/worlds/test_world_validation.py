@@ -53,7 +53,7 @@ def test_several_nests_and_kinds_of_food() -> None:
         ({"queen": [(0, 0, 0), (0, 0, 0)]}, "queens contain (0, 0, 0) more than once"),
         ({"queen": [(0, i, 0) for i in range(8)]}, "queen has 8 cells; a world has at most 7"),
         ({"queen": [(0, 0, 0), (1, 0)]}, "queen[1] is (1, 0); it must be (x, y, z)"),
-        ({"foods": [((1, 0, 0), 8)]}, "food_kinds contain 8; a kind must lie between 0 and 7"),
+        ({"foods": [((1, 0, 0), 8)]}, "food_kinds[0] is 8; it must lie between 0 and 7"),
         ({"foods": [((1, 0, 0), 0.5)]}, "food_kinds[0] is 0.5"),
         ({"foods": [(1, 0, 0)], "food_kinds": [0, 1]}, "food_kinds has 2 entries for 1 food item"),
     ],

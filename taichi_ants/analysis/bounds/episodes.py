@@ -17,6 +17,7 @@ import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, in_view, look_around
 from taichi_ants.errors import AntsError, shown
+from taichi_ants.features import LONE, refuse_unsupported
 from taichi_ants.task import Rewards, Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, PICK_UP
 from taichi_ants.worlds.world import World
@@ -29,6 +30,7 @@ MAX_STATES = 2_000_000
 # The cost of a step in the search for the shortest delivery. It is above twice the rewards of any
 # shortest delivery, and small enough for exact sums.
 _STEP = 1 << 32
+SUPPORTS = LONE - {"noise.slip", "noise.misread"}
 # Differences of action values up to these count as rounding errors: relative to the value of the
 # state and, for sums that cancel, relative to the largest value. With a discount of 0.9, a reward
 # of 10 that is 300 steps away is therefore ignored.
@@ -55,15 +57,13 @@ class EpisodeBounds:
     """
 
     def __init__(self, world: World, task: Task) -> None:
+        what = "an exact bound"
+        refuse_unsupported(what, world.uses() | task.uses(), SUPPORTS)
         changes = task.evaporation_in_training and task.pheromone.evaporation != "none"
-        if changes or task.pheromone.diffusion:
+        if changes:
             raise AntsError(
-                "trails evaporate or spread in training, but exact bounds require constant trails; "
-                "set `task.evaporation_in_training` to False and `task.pheromone.diffusion` to 0."
-            )
-        if task.noise.slip or task.noise.misread:
-            raise AntsError(
-                f"noise of the task is {task.noise}; exact bounds require a task without noise."
+                "trails evaporate in training, but exact bounds require constant trails; set "
+                "`task.evaporation_in_training` to False."
             )
         around = look_around(world)
         cells, headings = world.start(seed=0)

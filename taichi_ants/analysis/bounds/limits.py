@@ -21,11 +21,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from taichi_ants.analysis.bounds.surroundings import Surroundings, look_around
-from taichi_ants.checks import checked_world, refuse_castes, refuse_foods
+from taichi_ants.arguments import checked_task, checked_world
+from taichi_ants.features import CASTES, COLONY, FOODS
 from taichi_ants.grid.constants import N_HEADINGS
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds.world import World
+
+SUPPORTS = (
+    COLONY - CASTES - FOODS - {"nests", "life.births", "life.lifespan", "life.pile_move_interval"}
+)
 
 
 @dataclass(frozen=True)
@@ -47,10 +52,9 @@ class Limits:
 
 def limits_of(world: World, task: Task | None = None) -> Limits:
     """Return the bounds of a world with the traffic rules of a task; None is the paper's."""
-    task = task or Task()
-    checked_world(world)
-    refuse_foods(task, "a bound on deliveries")
-    refuse_castes(task, "a bound on deliveries")
+    what = "a bound on deliveries"
+    task = checked_task(task, what, SUPPORTS)
+    checked_world(world, False, what, SUPPORTS)
     around = world.grid.index(world.queen) + world.grid.offsets
     cells = world.walkable(around)[around]
     ticks = 2 if task.traffic.shared or task.turns_at_queen else 3

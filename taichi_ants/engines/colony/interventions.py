@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.checks import check_follows, check_learns, check_same_kernels
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.layout import (
     ANT_STANDS,
@@ -48,7 +47,7 @@ from taichi_ants.grid.constants import (
 )
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
-from taichi_ants.interventions import indices
+from taichi_ants.interventions import check_follows, check_learns, check_same_kernels, indices
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL

@@ -18,7 +18,6 @@ from taichi_ants.engines import views
 from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
 from taichi_ants.engines.colony.own_rules import own_rule
-from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import guarded, read_rates
 from taichi_ants.rules import Rule
@@ -137,7 +136,7 @@ class Variant:
         lay = [rule for rule in features.rules if rule.kind == "deposit"]
         self.lays_in_turn = any(rule.fields for rule in lay)
         self.reads_stimulus = any("stimulus" in rule.inputs for rule in features.rules)
-        self.learner = None if learner is None else checked_plugin(learner)
+        self.learner = learner
         self.draws_next_action = learner is not None and learner.draws_next_action
         # Each ant learns into its own table, or all ants of a world into one table.
         self.independent = learner is not None and self.own_tables

@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
-from taichi_ants import checks, files, learners, runtime
+from taichi_ants import arguments, files, learners, runtime
 from taichi_ants.engines.colony import food_sources
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import (
@@ -35,18 +35,21 @@ from taichi_ants.engines.colony.layout import (
 from taichi_ants.engines.layout import compass_of, note_best_actions, padded
 from taichi_ants.errors import (
     AntsError,
-    check_array,
+    as_array,
     check_one_of,
     checked_whole,
     count,
     entries_of,
+    expect,
     shown,
 )
+from taichi_ants.features import CASTES, COLONY, refuse_unsupported
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
 from taichi_ants.learners.learner import Learner, Memory
+from taichi_ants.learners.policies import check_finite, checked_values, frozen_policy
 from taichi_ants.records import Snapshot, same
 from taichi_ants.task import Pheromone, Task
 from taichi_ants.task.caste import chances_in, numbers_in
@@ -56,6 +59,7 @@ from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import Start, World
 
 State = TypeVar("State", bound="ColonyState")
+SUPPORTS = COLONY
 Sharing = Literal["shared", "independent", "frozen"]
 SHARINGS: tuple[str, ...] = get_args(Sharing)
 Arrays = dict[str, np.ndarray]
@@ -134,8 +138,10 @@ class ColonyState:
         arch: str | None = None,
         schedule: str | None = None,
     ) -> None:
-        self.task = checks.checked_task(Task() if task is None else task)
-        self.capacity = checks.checked_capacity(self.task, ants, capacity, start, ends_at_delivery)
+        self.task = arguments.checked_task(task, "a colony", SUPPORTS)
+        self.capacity = arguments.checked_capacity(
+            self.task, ants, capacity, start, ends_at_delivery
+        )
         self.ants, self.start, self.ends_at_delivery = int(ants), start, bool(ends_at_delivery)
         check_one_of("sharing", sharing, SHARINGS)
         self.sharing, self.learns = sharing, sharing != "frozen"
@@ -145,25 +151,34 @@ class ColonyState:
         if not self.has_training:
             training = _NO_TRAINING
         elif not needs_table:
-            checks.refuse_table(self.task, sharing)
-        if not isinstance(training, TrainingConfig):
             raise AntsError(
-                f"training is {shown(training)}; it must be one TrainingConfig, or None with "
-                'sharing="frozen" and without q_values.'
+                f"`task.choice.rule` is {self.task.choice.rule!r}, so ants choose without action "
+                f"values, but sharing is {shown(sharing)} and there is a training or q_values; set "
+                'sharing to "frozen" and training to None, and leave out q_values.'
             )
-        (self.training,) = checks.checked_configs(training)
+        expect("training", training, TrainingConfig)
+        assert training is not None
+        (self.training,) = arguments.checked_configs(training)
         follows = bool(self.task.castes) and all(one.policy for one in self.task.castes.values())
         if not self.learns and q_values is None and self.has_training and not follows:
             raise AntsError(
                 "sharing is 'frozen', but q_values is None; give the action values that the ants "
                 "follow, because they do not learn."
             )
-        if self.learner:
-            checks.check_sharing(self.learner, sharing)
-            checks.check_choice(self.learner, self.task)
-        checks.check_castes(self.task, sharing, self.is_given_actions)
-        table = None if q_values is None else checks.checked_q_values(q_values, self.task)
-        self.seeds = checks.checked_seeds(seeds)
+        if self.learns:
+            arguments.check_learner(self.training, self.task, sharing)
+        if self.is_given_actions:
+            others = SUPPORTS - CASTES
+            refuse_unsupported("a colony with given actions", self.task.uses(), others)
+        follow = [name for name, caste in self.task.castes.items() if caste.policy is not None]
+        if follow and sharing == "independent":
+            raise AntsError(
+                f"`task.castes.{follow[0]}.policy` is {self.task.castes[follow[0]].policy!r}, but "
+                'sharing is "independent", so each ant learns into its own table; set sharing to '
+                '"shared" or "frozen".'
+            )
+        table = None if q_values is None else checked_values(q_values, self.task)
+        self.seeds = arguments.checked_seeds(seeds)
         running = runtime.start(threads, arch)
         runtime.check_on_cpu(running, "colonies run")
         schedule = usual_schedule(len(self.seeds), self.capacity) if schedule is None else schedule
@@ -181,7 +196,12 @@ class ColonyState:
         )
         self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(self.task.foods))
         self.n_groups = self.n_nests * max(1, len(self.task.castes))
-        checks.check_nests_of_castes(self.task, self.n_nests)
+        for name, caste in self.task.castes.items():
+            if caste.nest is not None and caste.nest >= self.n_nests:
+                raise AntsError(
+                    f"`task.castes.{name}.nest` is {caste.nest}, but the world has "
+                    f"{count(self.n_nests, 'nest')}, numbered from 0; choose one of them."
+                )
         self.take_task(self.task)
         self.memory = Memory()
         if self.learner and (self.one_a_slot or self.plans_together):
@@ -484,7 +504,7 @@ class ColonyState:
     def check_finite(self) -> None:
         """Raise an AntsError if an action value is not finite."""
         tables = self.arrays["q"].reshape(len(self.seeds), -1)
-        checks.check_finite(tables, [self.training], self.seeds)
+        check_finite(tables, [self.training], self.seeds)
 
     # Changes
 
@@ -802,9 +822,12 @@ class ColonyState:
             n_given = [] if not leading else [n_worlds, slots if leading == axes and own else 1]
             given = q_values.reshape(*n_given, 1, n_states, N_ACTIONS)
             q[..., :N_ACTIONS] = given
-        for number, table in checks.caste_policies(self.task).items():
-            of_groups = q.reshape(n_worlds, self.n_nests, -1, *q.shape[2:])
-            of_groups[:, :, number, 0, :, :N_ACTIONS] = table
+        of_groups = q.reshape(n_worlds, self.n_nests, -1, *q.shape[2:])
+        for number, (name, caste) in enumerate(self.task.castes.items()):
+            if caste.policy is not None:
+                path = f"`task.castes.{name}.policy`"
+                table = frozen_policy(caste.policy, self.task.observation, path)
+                of_groups[:, :, number, 0, :, :N_ACTIONS] = table
         note_best_actions(q)
         return q.reshape(-1)
 
@@ -920,7 +943,7 @@ class ColonyState:
         AntsError if an action value is not finite, seeds repeat, or the file cannot be written.
         """
         self.check_finite()
-        checks.checked_seeds(self.seeds)
+        arguments.checked_seeds(self.seeds)
         if self.episode >= 0:
             self.check_begun()
         facts, arrays = self.contents()
@@ -954,15 +977,17 @@ class ColonyState:
             known = task.with_policies("random")
             colony = cls([worlds[w] for w in facts["world_of"]], known, training, **options)
             colony.take_task(task)
-            colony.epsilon = checks.checked_share("epsilon", facts["epsilon"])
-            colony.set_learning_rate(checks.checked_share("learning_rate", facts["learning_rate"]))
+            colony.epsilon = arguments.checked_share("epsilon", facts["epsilon"])
+            colony.set_learning_rate(
+                arguments.checked_share("learning_rate", facts["learning_rate"])
+            )
             colony.length = checked_whole("length", facts["length"], least=0)
             colony.ticks = checked_whole("ticks", facts["ticks"], least=0)
             if facts["food_sources"] != colony.n_food_sources:
                 colony.make_room_for_food(facts["food_sources"])
             for name in colony.stored:
                 array, kept = colony.arrays[name], arrays[f"array_{name}"]
-                check_array(name, kept, array.dtype, array.shape)
+                as_array(name, kept, array.dtype, array.shape)
                 array[:] = kept
             colony.ready = colony.arrays["episodes"] >= 0
         return colony
@@ -1030,14 +1055,10 @@ def _caste_numbers(task: Task, discount: float) -> np.ndarray:
 def checked_worlds(world: World | Sequence[World], n_seeds: int, learns: bool) -> tuple[World, ...]:
     """Return one world per seed; AntsError if their number is wrong or their ranges differ."""
     given = entries_of(world) or [world] * n_seeds
-    worlds = tuple(checks.checked_world(one, learns, several=True) for one in given)
+    worlds = tuple(arguments.checked_world(w, learns, "a colony", SUPPORTS) for w in given)
     if len(worlds) != n_seeds:
         raise AntsError(
             f"there are {len(worlds)} worlds for {n_seeds} seeds; give one world per seed."
         )
-    ranges = {world.ranges for world in worlds}
-    if len(ranges) > 1:
-        raise AntsError(
-            f"the worlds have the ranges {sorted(ranges)}; give worlds of equal ranges."
-        )
+    arguments.check_ranges(worlds)
     return worlds

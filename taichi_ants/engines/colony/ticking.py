@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import checks
+from taichi_ants.arguments import checked_seeds
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import ALL, ColonyState, Which, checked_worlds
 from taichi_ants.engines.colony.stepping import Stepper
-from taichi_ants.errors import AntsError, array_of, checked_whole, count, entries_of, shown
-from taichi_ants.task.constants import ACTION_NAMES, MAX_STEPS, N_ACTIONS
+from taichi_ants.errors import AntsError, as_array, checked_whole, count, entries_of, shown
+from taichi_ants.task.constants import MAX_STEPS, N_ACTIONS
 from taichi_ants.worlds.world import World
 
 
@@ -68,24 +68,14 @@ class TickingColony(ColonyState):
         Raises:
             AntsError: The number of worlds or seeds is wrong, or a seed is not allowed.
         """
-        which = array_of("which", which)
-        if which.dtype != bool or which.shape != (len(self.seeds),):
-            raise AntsError(
-                f"which is {shown(which)}; give a bool for each of the {len(self.seeds)} worlds."
-            )
+        which = as_array("which", which, "b", (len(self.seeds),))
         if seeds is None:
             self.keep_streams(which)
         else:
-            listed = entries_of(seeds)
-            if listed is None:
-                raise AntsError(f"seeds is {shown(seeds)}; give a list of one seed per world.")
-            checked = [seed for one in listed for seed in checks.checked_seeds(one)]
-            if len(checked) != np.count_nonzero(which):
-                n = int(np.count_nonzero(which))
-                raise AntsError(
-                    f"there are {count(len(checked), 'seed')} for {count(n, 'world')}; give "
-                    f"{count(n, 'seed')}."
-                )
+            listed, n = entries_of(seeds) or [], int(np.count_nonzero(which))
+            checked = [seed for one in listed for seed in checked_seeds(one)]
+            if len(checked) != n:
+                raise AntsError(f"seeds is {shown(seeds)}; give a list of {count(n, 'seed')}.")
             self.ready[which] = False
             self.reseed(which, checked)
         self._start(which)
@@ -127,19 +117,10 @@ class TickingColony(ColonyState):
                 "the ants of this colony choose their own actions; call tick instead, or make a "
                 'colony with training=None and sharing="frozen".'
             )
-        given, shape = array_of("actions", actions), (len(self.seeds), self.capacity)
-        if given.dtype.kind not in "iu" or given.shape != shape:
-            raise AntsError(
-                f"actions is {shown(given)}; give whole numbers of shape {shape}, one per slot."
-            )
-        if given.min() < 0 or given.max() >= N_ACTIONS:
-            given = np.where(self.living, given, 0)
-            wrong = given[(given < 0) | (given >= N_ACTIONS)]
-            if len(wrong):
-                raise AntsError(
-                    f"an action is {wrong[0]}; it must lie between 0 and {N_ACTIONS - 1}: "
-                    f"{', '.join(ACTION_NAMES)}."
-                )
+        shape, most = (len(self.seeds), self.capacity), N_ACTIONS - 1
+        given = as_array("actions", actions, "iu", shape)
+        if given.min() < 0 or given.max() > most:
+            given = as_array("actions", np.where(self.living, given, 0), "iu", shape, 0, most)
         self.actions[:] = given
         self._stepper.advance(self, 1)
 

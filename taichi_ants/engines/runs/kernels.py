@@ -21,7 +21,6 @@ from taichi_ants.engines.layout import (
     RETURNS,
     STEPS,
 )
-from taichi_ants.engines.plugin_check import checked_plugin
 from taichi_ants.engines.runs.step import EXTRA_CELLS, Ant, Rules, act, observe_function, restore
 from taichi_ants.learners.config import Hyperparameters
 from taichi_ants.learners.learner import Learner
@@ -48,7 +47,6 @@ def run_kernel(
     `n_episodes * max_steps` rows per run. `arguments` is the type of the argument pack.
     """
     learns = learner is not None
-    learner = checked_plugin(learner) if learns else None
     on_policy = learns and learner.draws_next_action
     begins = learns and learner.begin is not None
     hyperparameters = learner.hyperparameters if learns else Hyperparameters

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners, measures
-from taichi_ants.checks import checked_max_steps, checked_seeds
+from taichi_ants.arguments import checked_max_steps, checked_seeds
 from taichi_ants.engines.layout import OUTCOMES, padded
-from taichi_ants.errors import AntsError, check_array, shown
+from taichi_ants.errors import as_array, expect
 from taichi_ants.files import PathLike
 from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT
@@ -137,8 +137,7 @@ class TrainingResult(Record, Tidy):
     def __post_init__(self) -> None:
         """Check the shapes and types of arrays, because kernels rely on them."""
         runs, state = (len(self.configs), len(self.seeds)), self.state
-        if not isinstance(state, RunState):
-            raise AntsError(f"the state of a result is {shown(state)}; it must be a RunState.")
+        expect("the state of a result", state, RunState)
         forms = {
             **dict.fromkeys(OUTCOMES, ("int32", (*runs, *np.shape(self.returns)[2:3]))),
             "q": ("float32", (*runs, *np.shape(state.q)[2:3], self.task.n_states, ROW)),
@@ -152,7 +151,7 @@ class TrainingResult(Record, Tidy):
         arrays = {**vars(self), **vars(state)}
         for name, (kind, shape) in forms.items():
             array = arrays[name]
-            check_array(f"the array {name} of a result", array, kind, shape)
+            as_array(f"the array {name} of a result", array, kind, shape)
 
     def measured(self) -> Measured:
         """Return the values of the measures of each episode of each run."""

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import checks, runtime
+from taichi_ants import arguments, runtime
 from taichi_ants.engines.layout import OUTCOMES, STEPS, TRACE
 from taichi_ants.engines.runs.engine import Launcher, Progress, Runs, pieces
 from taichi_ants.engines.runs.results import RunState
 from taichi_ants.errors import AntsError, checked_whole
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.policies import checked_table, checked_values
 from taichi_ants.records import Record
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, N_ACTIONS
@@ -107,17 +108,17 @@ def rollout(
     Instead of the table, you can pass the `TrainingResult` of a single run, or a `Policy`. Other
     arguments and errors are those of `evaluate`. Numbers start at 0.
     """
-    task = checks.checked_runs_task(task)
-    max_steps = checks.checked_max_steps(max_steps, task)
-    table = checks.checked_table(q_values, task)
-    seeds = checks.checked_seeds_for(seed, ())
+    task = arguments.checked_lone_task(task)
+    max_steps = arguments.checked_max_steps(max_steps, task)
+    table = checked_table(q_values, task)
+    seeds = arguments.checked_seeds_for(seed, ())
     numbers = np.array([checked_whole("number", number, least=0)])
-    epsilon = checks.checked_share("epsilon", epsilon)
+    epsilon = arguments.checked_share("epsilon", epsilon)
     trace = _trace(world, task, Runs.following(table[None], seeds, numbers, epsilon), max_steps)
-    arguments = RolloutArguments(
+    made_by = RolloutArguments(
         world, task, int(seeds[0]), max_steps, int(numbers[0]), table.copy(), epsilon
     )
-    return replace(trace, arguments=arguments)
+    return replace(trace, arguments=made_by)
 
 
 def trace_policies(
@@ -131,11 +132,11 @@ def trace_policies(
 
     `seeds` has one seed per policy, and may repeat seeds. Other arguments are those of `evaluate`.
     """
-    task = checks.checked_runs_task(task)
-    tables = checks.checked_q_values(q_values, task)
-    checks.checked_world(world)
+    task = arguments.checked_lone_task(task)
+    tables = checked_values(q_values, task)
+    arguments.checked_world(world)
     # A step needs ten times as much memory as a cell of the world.
-    per_policy = max(checks.checked_max_steps(max_steps, task), world.grid.size // 10)
+    per_policy = max(arguments.checked_max_steps(max_steps, task), world.grid.size // 10)
     for first in range(0, len(tables), size := max(1, MAX_ROLLOUT_STEPS // per_policy)):
         some = tables[first : first + size]
         words = np.array(seeds[first : first + size], dtype=object)
@@ -157,14 +158,13 @@ def trace_training(
     Arguments and errors are those of `train`; episodes * max_steps * n_states is limited to 12.8
     million.
     """
-    checks.checked_world(world, learns=True)
-    task = checks.checked_runs_task(task)
-    max_steps = checks.checked_max_steps(max_steps, task)
-    several = checks.checked_configs(config)
+    arguments.checked_world(world, learns=True)
+    task = arguments.checked_lone_task(task)
+    max_steps = arguments.checked_max_steps(max_steps, task)
+    several = arguments.checked_configs(config, task)
     if len(several) > 1:
         raise AntsError(f"config has {len(several)} configurations; pass a single one.")
-    checks.check_choices(several, task)
-    seeds = checks.checked_seeds_for(seed, ())
+    seeds = arguments.checked_seeds_for(seed, ())
     state = RunState.initial(several, seeds.tolist(), task.n_states).part([0])
     runs = Runs.learning(several, seeds.tolist(), state)
     trace = _trace(world, task, runs, max_steps, checked_whole("episodes", episodes))
@@ -183,7 +183,7 @@ def _trace(world: World, task: Task, runs: Runs, max_steps: int, episodes: int =
             f"episodes * max_steps is {capacity}; a trace has at most {most} steps, so reduce one "
             "of them."
         )
-    checks.checked_world(world)
+    arguments.checked_world(world)
     runtime.start()
     before = runs.state.q[:, 0, :, :N_ACTIONS].copy()
     tables = np.empty((capacity if learns else 0, *runs.state.q.shape[2:]), dtype=np.float32)
@@ -215,7 +215,7 @@ def record_steps(
     A piece is the columns of a trace, with episodes numbered from 0 in each run; the probability of
     each action, float64 (n,); and the number of the run, int64 (n,). Pieces of a run are in order.
     """
-    checks.check_progress(progress)
+    arguments.check_progress(progress)
     runtime.start()
     launcher = Launcher(world, task, max_steps, runs, traced=True)
     runs_each = max(1, min(len(runs), MAX_ROLLOUT_STEPS // max_steps))

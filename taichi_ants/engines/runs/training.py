@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import checks, learners, runtime
+from taichi_ants import arguments, learners, runtime
 from taichi_ants.engines.layout import OUTCOMES
 from taichi_ants.engines.runs.engine import Progress, Runs, do_episodes
 from taichi_ants.engines.runs.results import Rollouts, RunState, TrainingResult, memory_for
-from taichi_ants.errors import AntsError, checked_whole, shown
+from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.learners.policies import check_finite, checked_values
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EPISODE_STEPS, EPISODES
 from taichi_ants.worlds.world import World
@@ -53,17 +54,16 @@ def train(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    configs = checks.checked_configs(configs)
-    seeds = checks.checked_seeds(seeds)
-    checks.checked_world(world, learns=True)
-    task = checks.checked_runs_task(task)
-    checks.check_choices(configs, task)
+    task = arguments.checked_lone_task(task)
+    configs = arguments.checked_configs(configs, task)
+    seeds = arguments.checked_seeds(seeds)
+    arguments.checked_world(world, learns=True)
     none_yet = np.zeros((len(configs), len(seeds), 0), dtype=np.int32)
     start = TrainingResult(
         world=world,
         configs=configs,
         seeds=seeds,
-        max_steps=checks.checked_max_steps(max_steps, task),
+        max_steps=arguments.checked_max_steps(max_steps, task),
         task=task,
         returns=none_yet,
         steps=none_yet,
@@ -87,9 +87,8 @@ def continue_training(
     It equals, bit for bit, the result of a single training with the sum of the episodes; `seconds`
     is the time of the new ones. Other arguments and errors are those of `train`.
     """
-    if not isinstance(result, TrainingResult):
-        raise AntsError(f"result is {shown(result)}; it must be a TrainingResult.")
-    checks.checked_configs(result.configs)
+    expect("result", result, TrainingResult)
+    arguments.checked_configs(result.configs)
     state = result.state
     given = (state.q.shape[2] - 1, state.floats.shape[2], state.integers.shape[2])
     for config in result.configs:
@@ -112,7 +111,7 @@ def _train(
 ) -> TrainingResult:
     """Return what `continue_training` returns, but change the state of the given result."""
     episodes = checked_whole("episodes", episodes)
-    checks.check_progress(progress)
+    arguments.check_progress(progress)
     runtime.start(threads, arch)
     state, shape = result.state, (len(result.configs), len(result.seeds))
     outcomes = np.zeros((3, *shape, episodes), dtype=np.int32)
@@ -136,7 +135,7 @@ def _train(
         into = outcomes[:, where].reshape(3, len(runs), episodes)  # a view, or a copy
         seconds += do_episodes(result.world, result.task, result.max_steps, runs, into, part)
         outcomes[:, where] = into.reshape(3, len(group), shape[1], episodes)
-        checks.check_finite(runs.state.q, chosen, result.seeds)
+        check_finite(runs.state.q, chosen, result.seeds)
         state.put(where, runs.state)
         done += share
     joined: dict[str, Any] = dict(zip(OUTCOMES, outcomes, strict=True))
@@ -177,21 +176,21 @@ def evaluate(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    task = checks.checked_runs_task(task)
-    tables = checks.checked_q_values(q_values, task)
-    if tables.ndim == 2 and (several := len(checks.checked_seeds(seeds))) > 1:
+    task = arguments.checked_lone_task(task)
+    tables = checked_values(q_values, task)
+    if tables.ndim == 2 and (several := len(arguments.checked_seeds(seeds))) > 1:
         tables = np.broadcast_to(tables, (several, *tables.shape))
     shape = tables.shape[:-2]
-    run_seeds = checks.checked_seeds_for(seeds, shape)
+    run_seeds = arguments.checked_seeds_for(seeds, shape)
     rollouts = checked_whole("rollouts", rollouts)
-    epsilon = checks.checked_share("epsilon", epsilon)
-    max_steps = checks.checked_max_steps(max_steps, task)
-    checks.check_progress(progress)
+    epsilon = arguments.checked_share("epsilon", epsilon)
+    max_steps = arguments.checked_max_steps(max_steps, task)
+    arguments.check_progress(progress)
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
     runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
     outcomes = np.empty((3, len(runs), rollouts), np.int32)
-    do_episodes(checks.checked_world(world), task, max_steps, runs, outcomes, progress)
+    do_episodes(arguments.checked_world(world), task, max_steps, runs, outcomes, progress)
     returns, steps, deliveries = outcomes.reshape(3, *shape, rollouts)
     of_tables = tuple(run_seeds[: shape[-1] if shape else 1].tolist())
     return Rollouts(returns, steps, deliveries, of_tables)

@@ -99,7 +99,7 @@ def test_trails_evaporate_as_in_training() -> None:
     task = Task(evaporation_in_training=True, evaporation_in_evaluation=False)
     policy_rows(paper(), task, record, [0], 1, 40)
     [row] = bound_rows(paper(), task, (0.9,), 40)
-    assert row.note.startswith("trails evaporate or spread in training, but exact bounds require")
+    assert row.note.startswith("trails evaporate in training, but exact bounds require")
     assert calls == [True, True]
 
 

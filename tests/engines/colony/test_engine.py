@@ -46,7 +46,7 @@ def test_food_is_conserved(seed, ants, births, lifespan, regrowth, pile_move_int
     [
         ({"ants": 5000}, "5000"),
         ({"ants": 0}, "ants is 0; it must lie between 1"),
-        ({"ants": 8, "capacity": 7}, "capacity is 7, but 8 ants start"),
+        ({"ants": 8, "capacity": 7}, "because 8 ants start"),
         ({"start": "queen"}, "start is 'queen'; it must be one of nest, spread"),
         ({"ends_at_delivery": True, "ants": 2}, "ends_at_delivery is True with 2 ants"),
         ({"ends_at_delivery": True, "task": Task(life=Life(births=True))}, "births True"),
@@ -56,7 +56,7 @@ def test_food_is_conserved(seed, ants, births, lifespan, regrowth, pile_move_int
         ({"seeds": [1, 1]}, "1"),
         ({"world": [worlds.paper()] * 2, "seeds": [1]}, "2 worlds"),
         ({"world": [worlds.paper(), worlds.open_world(0, (5, 5, 5))], "seeds": [1, 2]}, "ranges"),
-        ({"training": [TRAINING, TRAINING]}, "it must be one TrainingConfig"),
+        ({"training": [TRAINING, TRAINING]}, "it must be a TrainingConfig"),
         ({"training": None}, "training is None"),
     ],
 )

@@ -226,7 +226,7 @@ WRONG = [
     (lambda: At(3, remove_ants={"shar": 1}), "`remove_ants.shar` is not a setting; choose share"),
     (lambda: At(3, remove_ants={"number": 1, "share": 0.5}), "has number and share; give one of"),
     (lambda: At(3, clear=[[1, 2]]), "`clear.cells` has the cell [1, 2]; a cell is three"),
-    (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` has 1 cells; give the cell to move from"),
+    (lambda: At(3, move=[[1, 2, 0]]), "`move.cells` is ((1, 2, 0),); give the cell to move from"),
     (lambda: At(3, task="following"), "`at.task` is 'following'; it must be a table of settings"),
     (lambda: Every(5, stop=2, trail=0), "`every.stop` is 2, before the first event"),
     (lambda: When("living", trail=0), "`when` needs a bound"),
@@ -281,7 +281,7 @@ def test_wrong_protocols_are_refused_in_one_sentence():
         assert str(caught.value).endswith(".")
         assert colony.epsilon == 0.05
     learns = Colony(worlds.paper(), FORAGING, TrainingConfig("sarsa", 0.1, 0.9, 0.1, 1.0))
-    with pytest.raises(AntsError, match="do not follow a policy"):
+    with pytest.raises(AntsError, match="follow no policy"):
         learns.run(1, 100, protocol=At(3, policy="random"))
 
 

@@ -37,8 +37,8 @@ def with_more(learner, **more):
 @pytest.mark.parametrize(
     ("configs", "text"),
     [
-        ([], "configs is empty"),
-        ([CONFIG, None], "a configuration is None"),
+        ([], "configs is []"),
+        ([CONFIG, None], "the configuration is None"),
         (TrainingConfig("td_zero", 0.1, 0.9, 0.3, 0.99), "there is no learner 'td_zero'"),
         (
             [CONFIG, with_more("sarsa", n=7)],
@@ -54,7 +54,7 @@ BAD_SEEDS = [
     ([], "seeds is empty"),
     (0.5, "a seed is 0.5"),
     ([[0, 1]], "a seed is [0, 1]"),
-    (2**64, f"seeds contains {2**64}; a seed must fit into 64 bits"),
+    (2**64, f"a seed is {2**64}; it must lie between"),
     ([4, 5, 4], "seeds contains 4 more than once"),
 ]
 

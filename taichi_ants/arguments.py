@@ -1,0 +1,157 @@
+"""Arguments that several functions take, checked once; kernels assume valid input."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from numbers import Real
+
+import numpy as np
+
+from taichi_ants import learners
+from taichi_ants.errors import (
+    AntsError,
+    check_one_of,
+    checked_flag,
+    checked_whole,
+    entries_of,
+    expect,
+    shown,
+)
+from taichi_ants.features import LONE, refuse_unsupported
+from taichi_ants.learners.config import TrainingConfig
+from taichi_ants.task import Task
+from taichi_ants.task.constants import MAX_STEPS
+from taichi_ants.worlds.world import STARTS, World
+
+MAX_ANTS = 1 << 24
+_ALONE = "a run of one ant", LONE, "leave it out, or use a Colony"
+
+
+def checked_world(
+    world: World,
+    learns: bool = False,
+    what: str = _ALONE[0],
+    supports: Collection[str] = LONE,
+) -> World:
+    """Return the world; AntsError unless `what` supports it and, with `learns`, it has food."""
+    expect("world", world, World)
+    refuse_unsupported(what, world.uses(), supports, "use a Colony")
+    if learns and not len(world.foods):
+        raise AntsError("the world has no food, so ants cannot learn in it; add food.")
+    return world
+
+
+def check_ranges(worlds: Sequence[World]) -> None:
+    """Raise AntsError unless all worlds have the same ranges."""
+    ranges = {world.ranges for world in worlds}
+    if len(ranges) > 1:
+        raise AntsError(f"the worlds have the ranges {sorted(ranges)}; give worlds of one size.")
+
+
+def checked_task(
+    task: Task | None, what: str, supports: Collection[str], instead: str = "leave it out"
+) -> Task:
+    """Return the task, by default the paper's; AntsError if it has what `what` does not support."""
+    task = Task() if task is None else task
+    expect("task", task, Task)
+    refuse_unsupported(what, task.uses(), supports, instead)
+    return task
+
+
+def checked_lone_task(task: Task | None) -> Task:
+    """Return the task of a run of one ant, by default the paper's."""
+    return checked_task(task, *_ALONE)
+
+
+def checked_capacity(
+    task: Task, ants: int, capacity: int | None, start: str, ends_at_delivery: bool
+) -> int:
+    """Return the largest number of ants at once; the arguments are those of `Colony`."""
+    checked_whole("ants", ants, 1, MAX_ANTS)
+    check_one_of("start", start, STARTS)
+    births = task.life.births
+    if checked_flag("ends_at_delivery", ends_at_delivery) and (ants != 1 or births):
+        raise AntsError(
+            f"ends_at_delivery is True with {ants} ants and births {births}; it requires one ant "
+            "and no births, so leave it out."
+        )
+    if capacity is None:
+        return min(2 * ants + 64, MAX_ANTS) if births else int(ants)
+    return checked_whole("capacity", capacity, ants, MAX_ANTS, f", because {ants} ants start")
+
+
+def check_learner(config: TrainingConfig, task: Task, sharing: str = "independent") -> None:
+    """Raise AntsError if the learner does not fit the choices of ants, or sharing of its table."""
+    learner = learners.get(config.learner)
+    if learner.name == "expected_sarsa" and task.choice.rule != "greedy":
+        raise AntsError(
+            f"learner 'expected_sarsa' takes the mean over epsilon-greedy actions, but "
+            f"`task.choice.rule` is {task.choice.rule!r}; use 'sarsa', or the rule 'greedy'."
+        )
+    if sharing == "shared" and learner.td_error is None:
+        raise AntsError(
+            f"learner {learner.name!r} has no TD error that can be summed over ants, so ants "
+            'cannot share its table; set sharing to "independent".'
+        )
+
+
+def checked_configs(
+    configs: TrainingConfig | Sequence[TrainingConfig], task: Task | None = None
+) -> tuple[TrainingConfig, ...]:
+    """Return one or several configurations as a tuple, with the defaults of hyperparameters."""
+    several = [configs] if isinstance(configs, TrainingConfig) else entries_of(configs)
+    if not several:
+        raise AntsError(f"configs is {shown(configs)}; give one TrainingConfig or several.")
+    settled = tuple(learners.with_hyperparameters(config) for config in several)
+    if task is not None:
+        for config in settled:
+            check_learner(config, task)
+    return settled
+
+
+def checked_seeds(seeds: int | Sequence[int]) -> tuple[int, ...]:
+    """Return one or several seeds as a tuple; AntsError if two are equal."""
+    if isinstance(seeds, np.ndarray):
+        seeds = seeds.ravel().tolist()
+    given = entries_of(seeds)
+    listed = [seeds] if given is None else given
+    several = tuple(checked_whole("a seed", seed, -(2**63), 2**64 - 1) for seed in listed)
+    if not several:
+        raise AntsError("seeds is empty; give at least one whole number.")
+    taken: set[int] = set()
+    for seed in several:
+        if seed % 2**64 in taken:
+            raise AntsError(
+                f"seeds contains {seed} more than once; give seeds that differ modulo 2**64."
+            )
+        taken.add(seed % 2**64)
+    return several
+
+
+def checked_seeds_for(seeds: int | Sequence[int], shape: tuple[int, ...]) -> np.ndarray:
+    """Return a seed for each table of the given leading shape, as a flat object array."""
+    several = checked_seeds(seeds)
+    if len(several) != 1 and (not shape or shape[-1] != len(several)):
+        tables = f"{' x '.join(map(str, shape))} tables" if shape else "one table"
+        allowed = f"1 seed or {shape[-1]} seeds" if shape else "1 seed"
+        raise AntsError(f"there are {len(several)} seeds for {tables}; give {allowed}.")
+    return np.broadcast_to(np.array(several, dtype=object), shape or (1,)).ravel()
+
+
+def checked_max_steps(value: int, task: Task) -> int:
+    """Return the step limit; AntsError unless the return of an episode fits into 32 bits."""
+    most = (2**31 - 1) // max(1, task.rewards.largest)
+    return checked_whole("max_steps", value, most=min(MAX_STEPS, most))
+
+
+def checked_share(name: str, value: float) -> float:
+    """Return a number from 0 to 1 as a float, or raise AntsError."""
+    if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= value <= 1:
+        raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
+    return float(value)
+
+
+def check_progress(progress: object) -> None:
+    """Raise AntsError unless `progress` is None or a function."""
+    if progress is not None:
+        expect("progress", progress, Callable)  # type: ignore[arg-type]
