@@ -116,10 +116,8 @@ def unpacked(path: Path) -> Iterator[Path]:
 def _is_plain(one: zipfile.ZipInfo) -> bool:
     """Return whether a member is a file below the folder, on all operating systems."""
     name, kind = one.orig_filename, stat.S_IFMT(one.external_attr >> 16)
-    is_inside = not {"", ".", ".."}.intersection(name.split("/")) and not re.search(
-        r"[\\:\0]", name
-    )
-    return is_inside and kind in (0, stat.S_IFREG)
+    is_odd = {"", ".", ".."} & {*name.split("/")} or re.search(r"[\\:\0]", name)
+    return not is_odd and kind in (0, stat.S_IFREG)
 
 
 def lock(manifest: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import lru_cache
 from itertools import product
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -421,18 +421,16 @@ class ColonyPoint:
         if not self.episodes:
             return self.policy.q_values if self.policy else learned
         places = self.places(seeds)
-        learning = self.colony(
-            places[0] if places else self.worlds(seeds), seeds, learned, True, **where
-        )
+        first = places[0] if places else self.worlds(seeds)
+        learning = self.colony(first, seeds, learned, True, **where)
         protocol = self.events(learns=True)
         learning.run(self.episodes, self.ticks, progress, places, protocol=protocol)
         return learning.q_values
 
     def worlds(self, seeds: Sequence[int]) -> Any:
         """Return the world, or those of some seeds."""
-        return (
-            [self.world.of(one) for one in seeds] if isinstance(self.world, Drawn) else self.world
-        )
+        world = self.world
+        return [world.of(seed) for seed in seeds] if isinstance(world, Drawn) else world
 
 
 def _series_of(episodes: ColonyEpisodes, point: ColonyPoint) -> Outcome:
@@ -450,7 +448,6 @@ def _series_of(episodes: ColonyEpisodes, point: ColonyPoint) -> Outcome:
 
 
 Point = RunPoint | ColonyPoint
-PointKind = TypeVar("PointKind", bound=Point)
 
 
 def key_of(point: Point, *more: str) -> str:
@@ -509,10 +506,7 @@ def small(array: np.ndarray) -> np.ndarray:
     Signed, so that the type of joined blocks does not depend on how runs were cut into blocks.
     """
     low, high = int(array.min(initial=0)), int(array.max(initial=0))
-    kinds = (np.int8, np.int16, np.int32, np.int64)
-    return array.astype(
-        next(k for k in kinds if np.iinfo(k).min <= low and high <= np.iinfo(k).max)
-    )
+    return array.astype(np.min_scalar_type(min(low, -1 - high)))
 
 
 def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]:
@@ -520,7 +514,7 @@ def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]
 
     Settings that all points share are single values; others are lists with an entry per point.
     """
-    points = in_order(points)
+    points = tuple(dict.fromkeys(one for point in points for one in chain(point)))
     places: list[Any] = [place for one in points for place in (one.world, one.pool) if place]
     worlds = list(dict.fromkeys(places))
     numbers = {one: number for several in (points, worlds) for number, one in enumerate(several)}
@@ -574,10 +568,6 @@ def world_facts(world: World) -> dict[str, Any]:
     if world.n_nests > 1:
         where["queens"] = world.queens.tolist()
     return {**where, **numbers, "sha256": digest.hexdigest()}
-
-
-def in_order(points: Sequence[PointKind]) -> tuple[PointKind, ...]:
-    return tuple(dict.fromkeys(one for point in points for one in chain(point)))
 
 
 def chain(point: Any) -> list[Any]:

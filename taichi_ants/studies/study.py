@@ -25,7 +25,7 @@ from taichi_ants.studies.store import Arrays, Store, parts_of
 
 Q_VALUES = "q_values"
 _HOPELESS = 3  # blocks that fail, and none that succeeds: a study stops
-_NAMED = 3  # failed blocks, at most, in a message
+_NAMED = 3  # failed blocks, and values of a setting, at most, in a message
 
 # (points, seeds, arrays of their outcome) -> more arrays (points, seeds, ...)
 Measure = Callable[[Sequence[Any], Sequence[int], Arrays], Mapping[str, np.ndarray]]
@@ -122,8 +122,9 @@ class Study:
         rows = varied(self.points)
         parts = []
         for name in rows[0]:
-            values = dict.fromkeys(shown(rows[place].get(name)) for place in block.points)
-            parts.append(f"{name} {' or '.join(values)}")
+            values = [*dict.fromkeys(shown(rows[place].get(name)) for place in block.points)]
+            more = " or others" if len(values) > _NAMED else ""
+            parts.append(f"{name} {' or '.join(values[:_NAMED])}{more}")
         seeds = [self.seeds[s] for s in block.seeds]
         of_seeds = f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"
         return ", ".join([*parts, of_seeds])
@@ -269,6 +270,9 @@ def outcome_of(
     """
     found = points[0].do(points, seeds, learned, progress or (lambda share: None), where)
     found = {**found, **(measure(points, seeds, found) if measure else {})}
+    for name in arrays:
+        if not parts_of(name, found):
+            raise AntsError(f"runs have no {name!r}; choose others of {', '.join(found)}")
     return {part: found[part] for name in arrays for part in parts_of(name, found)}
 
 

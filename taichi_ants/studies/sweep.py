@@ -91,17 +91,12 @@ class Sweep:
         The value of a registered measure is its mean over rollouts, at the last tick of each.
         """
         present = results.present[self.order]
-        found = results.read(*self.measures)
-        values = {name: array[self.order] for name, array in found.items()}
-        if results.part:
-            some = np.flatnonzero(present.any(axis=1)).tolist()
-            if not some:
-                raise AntsError("no runs are finished; wait for the first ones.")
-            values = {name: array[some] for name, array in values.items()}
-            settings, present = [self.settings[n] for n in some], present[some]
-        else:
-            settings = list(self.settings)
-        self._write_runs(results, settings, values, present)
+        some = np.flatnonzero(present.any(axis=1))
+        if not len(some):
+            raise AntsError("no runs are finished; wait for the first ones.")
+        settings, rows = [self.settings[n] for n in some], np.array(self.order)[some]
+        values = {name: array[rows] for name, array in results.read(*self.measures).items()}
+        self._write_runs(results, settings, values, present[some])
         self._write_series(results)
         if results.part:
             return sweeps.report(settings, values)
@@ -122,14 +117,10 @@ class Sweep:
         tables_of.write(results.folder / RUNS, runs, results.parquet)
         with_iqm = [name for name in values if finished.of_runs(self.kind, name).uses_iqm]
         gaps = [name for name, array in values.items() if np.isnan(array).any()]
+        centres = sweeps.centres_of(values, with_iqm)
         rows = [
-            {**one, "seeds": seeds, **sweeps.centre_columns(centres, gaps)}
-            for one, seeds, centres in zip(
-                settings,
-                present.sum(axis=1).tolist(),
-                sweeps.centres_of(values, with_iqm),
-                strict=True,
-            )
+            {**one, "seeds": int(seeds), **sweeps.centre_columns(centre, gaps)}
+            for one, seeds, centre in zip(settings, present.sum(axis=1), centres, strict=True)
         ]
         tables_of.write(results.folder / SUMMARY, tables_of.table_of(rows), results.parquet)
 

@@ -356,6 +356,21 @@ def test_tables_are_written_as_parquet_too(sweep, capsys, monkeypatch):
     assert series.dtypes["tick"] == series.dtypes["seed"] == "int64"
 
 
+@pytest.mark.parametrize("kind", SWEEPS)
+def test_a_row_is_played_to_the_same_numbers(kind, sweep, capsys):
+    assert sweep(SWEEPS[kind], "a")[0] == 0
+    header, *rows = (line.split(",") for line in Path("a/runs.csv").read_text().splitlines())
+    status, out, _ = call("watch", ["a", "--row", 6], capsys)
+    assert status == 0
+    values = dict(line.split() for line in out.splitlines()[:-1])
+    row = dict(zip(header, rows[5], strict=True))
+    assert {name: float(row[name] or "nan") for name in values} == pytest.approx(
+        {name: float(value) for name, value in values.items()}, rel=1e-4, nan_ok=True
+    )
+    assert Path("a/row-6.html").stat().st_size > 50_000
+    assert call("watch", ["a", "--row", len(rows) + 1], capsys)[0] == 2
+
+
 def workers_of(pid):
     """The processes that are children of a process, or of its children."""
     found = []

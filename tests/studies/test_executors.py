@@ -139,6 +139,8 @@ class Fails(Here):
 @pytest.mark.slow
 def test_the_calls_of_a_dead_worker_are_lost_and_no_others(tmp_path):
     """And workers end when their executor does, or fails."""
+    with pytest.raises(AntsError, match=r"^workers is 0; it must lie between 1 and"):
+        Workers(0)
     with Workers(2) as workers:
         first, other = workers.submit(os.getpid), workers.submit(os.getpid)
         assert first.result() != other.result()
@@ -154,11 +156,6 @@ def test_the_calls_of_a_dead_worker_are_lost_and_no_others(tmp_path):
     while Path(f"/proc/{pid}").exists():
         assert time.monotonic() - began < promptly()
         time.sleep(0.05)
-
-
-def test_the_number_of_workers_is_checked():
-    with pytest.raises(AntsError, match=r"^workers is 0; it must lie between 1 and"):
-        Workers(0)
 
 
 def test_workers_can_be_threads_of_this_process(tmp_path, monkeypatch):

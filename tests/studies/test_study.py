@@ -264,17 +264,13 @@ def test_copies_follow_what_another_point_has_learned_and_train_nothing(tmp_path
     assert np.array_equal(outcomes[COPIES]["moves"], colony.run(2, 60).moves.T)
 
 
-def test_points_in_common_are_done_once(tmp_path):
-    study = colonies((COPIES, ALONE, replace(ALONE, ants=1)))
-    assert study.points == (COPIES, ALONE)
-    run(study, Store(tmp_path))
-    assert len(files_in(tmp_path)) == 2
-
-
 @pytest.mark.parametrize("kind", ["runs", "colonies"])
 def test_a_study_resumes_from_any_blocks(kind, study, tmp_path, monkeypatch):
     if kind == "colonies":
-        study = colonies((replace(ALONE, ants=3, after=ALONE), replace(ALONE, ants=2), ALONE))
+        study = colonies(
+            (replace(ALONE, ants=3, after=ALONE), replace(ALONE, ants=2), ALONE, ALONE)
+        )
+        assert len(study.points) == 3  # each once
     first, calls = outcomes_of(study, tmp_path), []
     blocks = files_in(tmp_path)
     stamps = {file: file.stat().st_mtime_ns for file in blocks}
@@ -303,6 +299,13 @@ def shift_an_array(path):
     content = bytearray(path.read_bytes())
     content[content.index(b"NUMPY") + 7] ^= 16
     path.write_bytes(content)
+
+
+def test_an_array_that_runs_do_not_have_is_named(tmp_path):
+    with pytest.raises(
+        AntsError, match=r"seeds 4 to -2 \(runs have no 'return'; choose others of r"
+    ):
+        run(Study(POINTS[:1], SEEDS, ("return",)), Store(tmp_path))
 
 
 DAMAGES = {
