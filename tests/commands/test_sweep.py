@@ -557,7 +557,7 @@ WRONG_EVENTS = {
     ),
     "policy": (
         *("trail = 0", 'policy = "random"'),
-        ["in [[at]] number 1, in the training, the ants of this colony do not follow a policy"],
+        ["in [[at]] number 1, in the training, the ants of this colony learn"],
     ),
     "region": ("trail = 0", 'clear = "gate"', ["in [[at]] number 1", "no region 'gate'"]),
     "kernels": (
