@@ -54,6 +54,7 @@ ARCHIVE = "tests/commands/test_archive.py"
 ODD = "tests/report/test_odd.py"
 NUMBERS = "tests/task/test_numbers.py"
 ROLLOUT = "tests/envs/test_rollout.py"
+LONE_NOISE = "tests/envs/test_noise.py"
 DESIGN = "tests/studies/test_design.py"
 SENSITIVITY = "tests/analysis/test_sensitivity.py"
 FEATURES = "tests/test_features.py"
@@ -197,7 +198,7 @@ MUTATIONS = [
     ("engines/runs/rollout_kernel.py", "base = own", "base = origin", ROLLOUT),
     ("engines/runs/step.py", "enters & ant.carries", "moves & ant.carries", BATCHED),
     ("task/rules/vision.py", "(state >> 1) & 21", "(state >> 1) & 5", BATCHED),
-    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", ROLLOUT),
+    ("engines/runs/rollout_kernel.py", "ant.random_state = stream", "pass", LONE_NOISE),
     ("envs/rollout.py", "explores = bits", "explores = bits >> np.uint64(1)", ROLLOUT),
     ("engines/runs/kernels.py", "= paper_state, taken.state", "= seen, taken.state", RUNS),
     ("engines/runs/step.py", "a.regrows == 0", "a.regrows == 1", RUNS),
