@@ -43,8 +43,6 @@ FOLDERS = ("taichi_ants", "experiments", "examples")
 FILES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 PACKAGE = [path for path in FILES if "taichi_ants" in path.relative_to(ROOT).parts]
 EXPERIMENTS = [path for path in FILES if path not in PACKAGE or "commands" in path.parts]
-# What these import for type checkers still goes round in circles.
-WITHOUT_TYPES = [ROOT / "taichi_ants" / name for name in ("checks.py", "studies/compilation.py")]
 
 
 def name(path: Path) -> str:
@@ -136,7 +134,7 @@ def test_imports_point_one_way():
         own = part_of(module_of(path))
         if not own:  # the package itself names all of its parts
             continue
-        for module in imported(path, types_too=path not in WITHOUT_TYPES):
+        for module in imported(path, types_too=True):
             # A name of the package itself, such as `taichi_ants.train`, comes from any of its
             # parts; only what stands on top of all of them may take it from there.
             owner = module if module in modules else module.rpartition(".")[0]
@@ -156,7 +154,7 @@ def test_no_imports_go_round_in_a_circle():
     files = {module_of(path): path for path in PACKAGE}
     graph = {}
     for module, path in files.items():
-        every = imported(path, types_too=path not in WITHOUT_TYPES)
+        every = imported(path, types_too=True)
         named = {full if full in files else full.rpartition(".")[0] for full in every}
         graph[module] = (named & files.keys()) - {module, "taichi_ants"}
     graph["taichi_ants"] = set()
