@@ -13,13 +13,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ant_system import Search, search
+from bridge import crossings
 from command_lines import EXPERIMENTS
+from goss import choices
 from matplotlib.figure import Figure
+from utility import Foraging
 
-from taichi_ants import World
+from taichi_ants import Colony, TrainingConfig, World, task, train
 from taichi_ants.learners import registry as learners
-from taichi_ants.task import Caste, Threshold
-from taichi_ants.worlds import double_bridge
+from taichi_ants.learners.policies import trail_follower
+from taichi_ants.task import Caste, Noise, Threshold
+from taichi_ants.worlds import double_bridge, paper
 
 # The centre of a world and the six cells around it, in order.
 CENTRE, RING = (0, 0, 0), [(1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1), (1, 0, 1)]
@@ -71,6 +76,22 @@ def test_home_trail_averages_the_last_five_episodes(script):
     assert len(rows) == 3 * 2 * 6
 
 
+@pytest.mark.slow
+def test_a_home_trail_that_nobody_follows_does_not_matter(script):
+    found = script("models/home_trail")
+    models = {
+        "compass": found["COMPASS"],
+        "deposited_when": found["HOME_TRAIL"].replace(homing_cue="compass"),
+        "followed": found["HOME_TRAIL"],
+    }
+    found.update(MODELS=models, EPISODES=2, TICKS=200)
+    delivered = np.array([row["deliveries"] for row in found["measure"]([0, 1, 2]).numbers])
+    compass, laid, followed = delivered.reshape(3, -1)
+    assert compass.sum() > 0
+    assert np.array_equal(laid, compass)
+    assert not np.array_equal(followed, compass)
+
+
 # experiments/models/two_nests.py
 
 
@@ -92,6 +113,20 @@ def test_shares_of_two_nests_by_hand(script):
     assert (x, y) == (40, 1.25 / 3)
 
 
+@pytest.mark.slow
+def test_the_order_of_two_nests_does_not_matter_and_their_distance_does(script):
+    over_time = script("models/two_nests", TICKS=300)["deliveries_over_time"]
+    near, far = (over_time(range(20), *one)[:, -1] for one in ((6, 14), (14, 6)))
+    first, second = (one[:, 0] / one.sum(axis=1) for one in (near, far))
+    error = np.sqrt((first.var(ddof=1) + second.var(ddof=1)) / 20)
+    assert abs(first.mean() + second.mean() - 1) < 4 * error
+    assert first.mean() - second.mean() > 8 * error
+    # A nest cannot deliver before an ant has walked to the pile and back.
+    early = over_time(range(4), 4, 20)[:, 0]
+    assert early[:, 0].all()
+    assert not early[:, 1].any()
+
+
 # experiments/models/recovery.py
 
 
@@ -109,6 +144,18 @@ def test_times_to_recover_by_hand(script):
     assert results.numbers[-1] == {"removed": 0.5, "seed": 2, "tick": 250, "ants": 95}
 
 
+def test_removing_no_ants_does_not_matter_and_removing_them_does(script):
+    found = script("models/recovery", REMOVAL=100, TICKS=250)
+    none, half, all_of_them = (found["ants_over_time"]([0, 1], x) for x in (0.0, 0.5, 1.0))
+    untouched = SimpleNamespace(apply=lambda interventions: None)
+    found["RemoveAnts"] = lambda share: untouched
+    assert np.array_equal(found["ants_over_time"]([0, 1], 0.5), none)
+    before, at = slice(0, 2), 2
+    assert np.array_equal(half[:, before], none[:, before])
+    assert (np.abs(half[:, at] - none[:, at] / 2) <= 0.5).all()
+    assert not all_of_them[:, at].any()  # later, the queen turns the food that she has into ants
+
+
 # experiments/models/misreading.py
 
 
@@ -120,6 +167,21 @@ def test_deliveries_of_ants_that_misread_by_hand(script, ticks, delivered, expec
     found = script("models/misreading", Colony=Given)
     Given.deliveries = np.array(delivered)
     assert found["deliveries"](found["FORAGING"], 0.1, 2, 1, ticks).tolist() == expected
+
+
+@pytest.mark.slow
+def test_a_rate_of_no_misread_cells_does_not_matter_and_a_rate_of_all_does(script):
+    found = script("models/misreading")
+    small = found["FORAGING"], 3, 6, 300  # rules; seeds, episodes, ticks
+
+    def deliveries(rate):
+        return found["deliveries"](small[0], rate, *small[1:])
+
+    never, always = deliveries(0.0), deliveries(1.0)
+    found["Noise"] = lambda misread: Noise()
+    assert np.array_equal(deliveries(1.0), never)
+    assert never.min() > 100
+    assert always.max() < 0.02 * never.min()
 
 
 # experiments/models/double_bridge.py
@@ -156,6 +218,19 @@ def test_intervals_of_shares(script, which, expected):
     assert interval(np.array(which)).startswith(expected)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("marks", ["both ways", "on the return"])
+def test_sides_of_equal_branches_do_not_matter_and_a_closed_branch_does(script, marks):
+    found = script("models/double_bridge", TICKS=2000)
+    model, short = found["MODELS"][marks], found["SHORT"]
+    equal = found["shares"](model, short, 0, 60)
+    won = (equal > 0.5).sum()  # of 60 colonies: 30 with a standard deviation of 3.9
+    assert abs(won - 30) < 15
+    assert (np.abs(equal - 0.5) > 0.2).mean() > 0.5
+    closed = found["shares"](model, short, 2000, 2)
+    assert np.array_equal(closed, [0, 0])
+
+
 # experiments/models/division_of_labour.py
 
 
@@ -175,32 +250,23 @@ def test_shares_of_foragers_by_hand(script):
     assert rows == [(50, 1 / 3), (100, 2 / 3), (150, 2 / 3), (200, 1 / 3)]
 
 
-# experiments/goss.py
+def test_equal_thresholds_do_not_divide_labour_and_different_ones_do(script):
+    found = script("models/division_of_labour", TICKS=2000)
 
+    def divided():
+        """Return shares of time of the first and last third of ants, sorted by threshold."""
+        forages, own, _ = found["foraging_over_time"](range(6), 0.5)
+        ants = np.take_along_axis(forages.mean(axis=1), np.argsort(own, axis=1), axis=1)
+        return ants[:, :21].mean(axis=1), ants[:, -21:].mean(axis=1)
 
-# experiments/ant_system.py
-
-
-# experiments/fixed_rules.py
-
-
-# experiments/utility.py
-
-
-# experiments/bridge.py
-
-
-# experiments/plugins/hysteretic.py
-
-
-@pytest.mark.parametrize(
-    ("value", "reward", "largest", "error"),
-    [(1, 2, 4, 3), (5, 0, 4, -0.6), (2, 0, 4, 0), (0, -1, 0, -0.2), (-3, -1, 0, 2)],
-)
-def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, largest, error):
-    td_error = script("plugins/hysteretic")["td_error"].__wrapped__
-    next_values = np.array([-9.0, largest, -9.0, -9.0, -9.0])
-    assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
+    low, high = divided()
+    assert (low > 3 * high).all()
+    equal = Caste(threshold=Threshold("lognormal", value=20, spread=0))
+    found["WORKERS"] = {"worker": equal}
+    low, high = divided()
+    difference = low - high
+    assert abs(difference.mean()) < 4 * difference.std(ddof=1) / 6**0.5
+    assert abs(difference.mean()) < 0.1
 
 
 @pytest.mark.slow
@@ -226,3 +292,231 @@ def test_the_share_of_foragers_is_demand_by_relief_whatever_the_thresholds(scrip
     majors = np.where(thresholds == 80, forages.mean(axis=1), np.nan)
     minors = np.where(thresholds == 10, forages.mean(axis=1), np.nan)
     assert (np.nanmean(minors, axis=1) > 3 * np.nanmean(majors, axis=1)).all()
+
+
+# experiments/goss.py
+
+
+def test_the_table_of_goss_by_hand(script, capsys):
+    found = script("goss")
+
+    def took(short, long, colonies, ants, opens, **others):
+        """Of four colonies, one takes the short branch at last, and one each second time."""
+        choices = np.zeros((colonies, ants), np.uint8)
+        choices[0, ants - 2 :] = 1
+        choices[1, ants - 1] = 1
+        return choices
+
+    found["choices"] = took
+    found["print_table"](found["parse_arguments"](["--colonies", "4", "--choices", "4"]))
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "Percentage of colonies by the share of ants 3 to 4 on the short branch."
+    assert lines[1] == "If that branch opens after ant 4: ants 7 to 8."
+    rows = [line.split()[-5:] for line in lines if " ours " in line]
+    assert rows == [["50.0", "0.0", "25.0", "0.0", "25.0"]] * 4
+    assert lines[-1].endswith("at most 25.0 percentage points.")
+
+
+def test_bridges_of_goss_without_a_difference_or_without_trails():
+    n = 10_000
+    equal, longer = (choices(9, steps, n)[:, 500:].mean(axis=1) for steps in (9, 19))
+    error = np.sqrt(0.25 / n)  # of the share of colonies
+    assert abs((equal > 0.5).mean() - (equal < 0.5).mean()) < 8 * error
+    assert abs((longer > 0.5).mean() - 0.76) < 4 * error + 0.01
+    # With a large k, marks do not matter, and neither does the length.
+    unmarked = choices(9, 19, n, k=1e9)[:, 500:].mean(axis=1)
+    assert abs(unmarked.mean() - 0.5) < 4 * np.sqrt(0.25 / (500 * n))
+    assert unmarked.var() == pytest.approx(0.25 / 500, rel=0.1)
+
+
+# experiments/ant_system.py
+
+# A ring around obstacles, with two ways from the queen to food: 5 and 7 steps.
+WAYS = World((3, 3, 3), (2, 0, 0), foods=[(0, 2, 1)], obstacles=[CENTRE, *RING])
+
+
+def test_the_row_of_ant_system_by_hand(script):
+    found = script("ant_system")
+    best = np.array([[5, 4, 4], [5, 5, 5], [4, 6, 4]], np.int32)
+    mean = np.array([[8.0, 6.0, 4.0], [np.nan, 6.0, 5.0], [9.0, 6.0, np.nan]])
+    found["search"] = lambda *given, **settings: Search(4, best, mean, 0 * best)
+    settings = found["parse_arguments"](["--colonies", "3"])
+    row = found["row"](settings, WAYS, "max_min").split()
+    assert row == ["4", "2/3", "2", "8.5", "4.5"]  # found in the iterations 2 and 1
+    found["search"] = lambda *given, **settings: Search(3, best, mean, 0 * best)
+    assert found["row"](settings, WAYS, "max_min").split() == ["3", "0/3", "-", "8.5", "4.5"]
+
+
+@pytest.mark.parametrize(
+    ("method", "rho", "again"),
+    [
+        # A lone ant starts with tau = 1 / L, for its tour L. Then the arcs of that tour have
+        # (1 - rho) / L + 1 / L, and the others (1 - rho) / L, so L does not matter.
+        ("ant_system", 0.5, (1.5 / 2, 1.5 / 2)),
+        ("ant_system", 0.1, (1.9 / 2.8, 1.9 / 2.8)),
+        ("ant_system", 1.0, (1, 1)),
+        # Tau starts at its upper bound, which the deposit restores. On the other arcs it falls to
+        # 1 - rho of it, but not below 1 / 0.05^(1/L) - 1 of it: 0.8206 for L = 5, 0.5341 for 7.
+        ("max_min", 0.02, (1 / 1.98, 1 / 1.98)),
+        ("max_min", 0.4, (1 / 1.8206, 1 / 1.6)),
+        ("max_min", 1.0, (1 / 1.8206, 1 / 1.5341)),
+    ],
+)
+def test_how_often_a_lone_ant_takes_the_same_way_again(method, rho, again):
+    n = 20_000
+    settings = {"ants": 1, "colonies": n, "evaporation": rho}
+    first, second = search(WAYS, method, iterations=2, **settings).best.T
+    assert set(first) == {5, 7}
+    assert abs((first == 5).mean() - 0.5) < 4 * np.sqrt(0.25 / n)
+    for length, share in zip((5, 7), again, strict=True):
+        same = (second == first)[first == length].mean()
+        assert abs(same - share) <= 4 * np.sqrt(share * (1 - share) / (n / 2))
+
+
+# experiments/fixed_rules.py
+
+
+def test_the_rules_and_rows_of_fixed_rules_by_hand(script):
+    found = script("fixed_rules")
+    assert found["rule"]("paper") == (
+        "paper: without food F take, P stay, T straight, E open, else left; with food Q take, "
+        "S any, E any, else left"
+    )
+    # Two episodes of two seeds; one episode is without any delivery.
+    outcome = SimpleNamespace(
+        deliveries=np.array([[10, 0], [20, 2]]),
+        first_delivery=np.array([[4, -1], [6, 90]]),
+        blocked=np.array([[1, 2], [3, 4]]),
+        moves=np.array([[10, 10], [10, 10]]),
+    )
+    cells = found["row"](outcome, {}).split()
+    assert cells == ["8", "1", "to", "15", "1", "275", "25", "%"]
+    cells = found["row"](outcome, {0: 25.0, 1: 11.0, 2: 99.0}).split()
+    assert cells[8:] == ["18", "+10", "[10", "to", "10]"]
+    with pytest.raises(found["AntsError"], match="the study has no seed 1"):
+        found["row"](outcome, {0: 25.0})
+    assert found["NETLOGO"].half_life == pytest.approx(6.57881)  # 0.9^6.57881 = 1 / 2
+
+
+def test_the_study_of_fixed_rules_by_hand(script, tmp_path):
+    (tmp_path / "seeds.csv").write_text(
+        "world_kind,rules,regime,ants,seed,deliveries,greedy\n"
+        "paper,foraging,joint,64,0,50,60\n"
+        "paper,foraging,open,64,0,1,1\n"
+        "rocks,foraging,open,64,1,70,80\n"
+        "rocks,foraging,joint,64,1,2,2\n",
+        "utf-8",
+    )
+    assert script("fixed_rules")["read_study"](tmp_path) == {
+        ("paper", "foraging", 64, "deliveries"): {0: 50},
+        ("paper", "foraging", 64, "greedy"): {0: 60},
+        ("rocks", "foraging", 64, "deliveries"): {1: 70},
+        ("rocks", "foraging", 64, "greedy"): {1: 80},
+    }
+
+
+@pytest.mark.slow
+def test_learning_rates_do_not_matter_to_fixed_rules_and_exploration_does(script):
+    found = script("fixed_rules", EPISODES=2, TICKS=200)
+    training = found["TrainingConfig"]
+    settings = found["parse_arguments"](["--seeds", "2"])
+    rules = found["task_in"]("paper", found["TASKS"]["foraging"])
+    places = [found["place"]("paper", seed) for seed in (0, 1)]
+
+    def deliveries(epsilon):
+        return found["evaluate"](settings, places, rules, epsilon, 16).deliveries
+
+    fixed = deliveries(0.01)
+    assert fixed.min() > 0
+    assert deliveries(1.0).max() < 0.5 * fixed.min()
+    assert not np.array_equal(deliveries(0.0), fixed)
+    found["TrainingConfig"] = lambda name, rate, *given, **named: training(
+        "q_learning", 0.9, *given, **named
+    )
+    assert np.array_equal(deliveries(0.01), fixed)
+
+
+# experiments/utility.py
+
+
+def test_the_row_of_utilities_by_hand(script):
+    found = script("utility")
+    first = Foraging(
+        8, np.array([[0, 2, 0, 2], [0, 0, 0, 0]]), np.array([[9, 8], [0, 12]]), np.zeros(1)
+    )
+    second = Foraging(
+        4, np.array([[1, 1, 1, 1], [0, 0, 0, 4]]), np.array([[4, 4], [0, 0]]), np.zeros(1)
+    )
+    # Per 1000 ticks, the colonies of the seeds deliver 500 and 1000 food items. First deliveries
+    # are in the ticks 2, 1 and 4; one colony has none, and counts with 4. Paths are shortest from
+    # the ticks 20 and 10 on. At the end, three have the lengths 8 / 8, 12 / 8 and 4 / 4.
+    expected = ["750", "500", "to", "1000", "3", "2/4", "15", "1.17", "3"]
+    assert found["row"]([first, second]).split() == expected
+
+
+def test_more_room_than_ants_does_not_matter_to_utilities_and_evaporation_does(script):
+    found = script("utility", EPISODES=2)
+    world = found["WORLDS"]["open"](0)
+
+    def outcome(room, *arguments):
+        settings = found["parse_arguments"](["--ants", "8", "--ticks", "200", *arguments])
+        return found["run"](settings, world, 3, room)
+
+    free, more, tight = (outcome(room).deliveries for room in (8, 1000, 1))
+    assert np.array_equal(free, more)
+    assert free.sum() > tight.sum() > 0
+    assert not outcome(8, "--evaporation", "1").utilities.any()
+    assert outcome(8, "--evaporation", "1").deliveries.sum() < 0.1 * free.sum()
+
+
+# experiments/bridge.py
+
+
+def test_names_of_equal_branches_do_not_matter():
+    """On a symmetric bridge, the short branch of the mirror image is the long one, ant by ant."""
+    ones, others = ({"short": 8, "long": 8, "mirrored": mirrored} for mirrored in (False, True))
+    one, other = (double_bridge(**bridge).obstacles.tolist() for bridge in (ones, others))
+    assert sorted(one) == sorted(other)
+
+    def counts(bridge):
+        follow = TrainingConfig("q_learning", 1.0, 1.0, epsilon=0.05, epsilon_decay=1.0)
+        options = {"sharing": "frozen", "q_values": trail_follower("ants"), "schedule": "by_world"}
+        rules = task.foraging().replace(life={"regrowth": 0})
+        colony = Colony(double_bridge(**bridge), rules, follow, [0, 1], 16, **options)
+        return crossings(colony, bridge, 400)
+
+    first, swapped = counts(ones), counts(others)
+    assert first.sum() > 20
+    assert np.array_equal(first, swapped[:, :, ::-1])
+
+
+# experiments/plugins/hysteretic.py
+
+
+@pytest.mark.parametrize(
+    ("value", "reward", "largest", "error"),
+    [(1, 2, 4, 3), (5, 0, 4, -0.6), (2, 0, 4, 0), (0, -1, 0, -0.2), (-3, -1, 0, 2)],
+)
+def test_td_errors_of_hysteretic_q_learning_by_hand(script, value, reward, largest, error):
+    td_error = script("plugins/hysteretic")["td_error"].__wrapped__
+    next_values = np.array([-9.0, largest, -9.0, -9.0, -9.0])
+    assert td_error(value, reward, 0.5, next_values, 0, 0.3) == pytest.approx(error)
+
+
+@pytest.mark.slow
+def test_patience_of_one_is_q_learning_and_another_is_not(script, tmp_path):
+    text = (EXPERIMENTS / "plugins" / "hysteretic.py").read_text("utf-8")
+    patient = tmp_path / "patient.py"
+    patient.write_text(
+        text.replace("PATIENCE = 0.2", "PATIENCE = 1.0").replace('"hysteretic"', '"patient"'),
+        "utf-8",
+    )
+    script("plugins/hysteretic")
+    script(str(patient.with_suffix("")))
+    tables = [
+        train(paper(), TrainingConfig(name, 0.1, 0.9, 0.3, 0.97), range(2), 10, 200).q_values
+        for name in ("q_learning", "patient", "hysteretic")
+    ]
+    assert tables[0].any()
+    assert np.array_equal(tables[0], tables[1])
+    assert not np.array_equal(tables[0], tables[2])

@@ -1,0 +1,212 @@
+"""Whole models: everything that a colony can have, drawn together, equals the plain reference.
+
+Each model combines nests, kinds of food, fields, cues, noise, castes, division of labour, traffic,
+a learner, rules of users, and a drawn protocol.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_castes import drawn_castes
+from random_choices import NOISE
+from random_colonies import RandomColony, random_colony, with_nests
+from random_protocols import random_protocol
+from same_colonies import assert_equal
+
+from taichi_ants import AntsError, Colony
+from taichi_ants.engines.colony.timetable import Timetable
+from taichi_ants.protocol import ProtocolEvent
+from taichi_ants.reference import ReferenceColony
+from taichi_ants.reference.protocol import Protocol
+
+TICKS, EPISODES = 50, 2
+TRAIL = {"evaporation": "power_law", "half_life": None, "deposit": "weaker", "cap": None}
+TRAIL |= {"level": 250, "slope": None}
+ALARM = {"deposit": "alarm", "level": 250, "cap": None, "slope": None}
+# By name: arguments of `random_colony`; nests, kinds of food, loads; castes, labour, their cues;
+# and changes of the task.
+MODELS = {
+    "softmax": (
+        {
+            **{"learner": "sarsa", "sharing": "shared", "traffic": "right_of_way"},
+            **{"dense": False, "fields": "ab", "cues": ("a", "b"), "choice": "softmax"},
+        },
+        (2, 2, True),
+        (2, True, None),
+        {},
+    ),
+    "deneubourg": (
+        {
+            **{"learner": "q_learning", "sharing": "frozen", "traffic": "following"},
+            **{"dense": False, "fields": "aB", "choice": "deneubourg", "view": "strongest"},
+        },
+        (2, 1, False),
+        (2, True, [("trail", "compass"), ("a", "B")]),
+        {},
+    ),
+    "rules of users": (
+        {"learner": "q_learning", "sharing": "frozen", "traffic": "following", "dense": True},
+        (2, 2, False),
+        (2, True, None),
+        {"choice": "weber", "pheromone": TRAIL},
+    ),
+    "rewards of users": (
+        {
+            **{"learner": "sarsa", "sharing": "shared", "dense": False, "fields": "B"},
+            **{"traffic": "right_of_way"},
+        },
+        (3, 2, True),
+        (2, True, None),
+        {"choice": "restless", "reward": "shaped", "fields": {"B": {"evaporation": "power_law"}}},
+    ),
+    "labour of users": (
+        {
+            **{"learner": "sarsa", "sharing": "shared", "traffic": "following"},
+            **{"dense": False, "fields": "aB"},
+        },
+        (2, 2, False),
+        (2, True, None),
+        {"reward": "demanded", "pheromone": ALARM, "fields": {"a": ALARM, "B": ALARM}},
+    ),
+    "choice by labour": (
+        {"learner": "q_learning", "sharing": "frozen", "dense": True, "fields": "aB"},
+        (2, 1, False),
+        (2, True, None),
+        {"choice": "hungry", "fields": {"a": {**ALARM, "deposited_when": "dead_end"}}},
+    ),
+    "own tables": (
+        {
+            **{"learner": "dyna_q", "sharing": "independent", "observation": "queues"},
+            **{"dense": True, "fields": "a", "cues": ("a", "compass"), "traffic": "following"},
+        },
+        (2, 3, True),
+        (2, True, None),
+        {},
+    ),
+    "castes without labour": (
+        {
+            **{"learner": "expected_sarsa", "sharing": "shared", "observation": "trail_levels"},
+            **{"dense": True, "fields": "aB"},
+        },
+        (2, 2, False),
+        (3, False, [("B", "a"), ("trail", "compass")]),
+        {},
+    ),
+}
+SLOW = ("deneubourg", "labour of users")
+
+
+def drawn_model(name: str, seed: int) -> tuple[RandomColony, list[ProtocolEvent]] | None:
+    """Return a drawn colony of a model and its protocol; None if its world has too few cells."""
+    arguments, (nests, kinds, loads), castes, changes = MODELS[name]
+    drawn = random_colony(seed, 60, largest_range=8, noise=NOISE, changes=True, **arguments)
+    if not drawn.task.food_changes or drawn.population["ants"] < 20:
+        return None  # other kernels, or few steps
+    life = drawn.task.life
+    drawn = replace(drawn, task=drawn.task.replace(life={"lifespan": life.lifespan and 25}))
+    drawn = with_nests(drawn, seed, nests, kinds, loads)
+    if castes[1]:  # your rules can read thresholds; `drawn_castes` draws others
+        changes = {"labour": "thresholds", "castes": {"one": {"threshold": 1.0}}, **changes}
+    drawn = replace(drawn, task=drawn.task.replace(**changes))
+    if not drawn.task.choice.needs_table:
+        drawn = replace(drawn, training=None, q_values=None)
+    made = drawn_castes(drawn, seed, *castes)
+    if made is None or made.world.n_nests != nests:
+        return None
+    capacity = made.population["ants"] + 12
+    made = replace(
+        made, population={**made.population, "ends_at_delivery": False, "capacity": capacity}
+    )
+    rng, learns = np.random.default_rng([seed, 11]), made.sharing != "frozen"
+    protocol = random_protocol(rng, made.world, made.task, capacity, TICKS, 1, learns)
+    return made, protocol
+
+
+def assert_ants_equal(colony: Colony, plain: ReferenceColony) -> None:
+    """Compare the ants alone, because `assert_equal` is slow."""
+    slots = np.flatnonzero(colony.living[0])
+    assert slots.tolist() == sorted(plain.ants)
+    ants = [plain.ants[slot] for slot in slots.tolist()]
+    assert colony.grid.cells(colony.cells[0, slots]).tolist() == [list(a.cell) for a in ants]
+    for column, of_ant in (
+        (colony.headings, [ant.heading for ant in ants]),
+        (colony.events, [ant.event for ant in ants]),
+        (colony.paper_states, [ant.paper_state for ant in ants]),
+        (colony.states, [ant.state for ant in ants]),
+        (colony.actions, [ant.action for ant in ants]),
+        (colony.idle, [ant.idle for ant in ants]),
+        (colony.streams, [ant.stream.state for ant in ants]),
+    ):
+        assert column[0, slots].tolist() == of_ant
+
+
+def steps_compared(
+    drawn: RandomColony, protocol: list[ProtocolEvent], schedule: str, seen: Counter
+) -> int:
+    """Compare the episodes of a colony tick by tick, and return the number of ant-steps.
+
+    An episode ends early if its world does not allow an intervention.
+    """
+    rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
+    given = (drawn.world, drawn.task, drawn.training, drawn.seed)
+    colony = Colony(*given, **rules, schedule=schedule)
+    timetable = Timetable(colony, protocol, TICKS)
+    plain = ReferenceColony(*given, **rules)
+    twin, steps = Protocol(plain, protocol), 0
+    try:
+        for _ in range(EPISODES):
+            colony.begin_episode(TICKS)
+            twin.begin_episode()
+            with timetable:
+                for tick in range(TICKS):
+                    for _ in timetable.pieces(colony._stepper, 1):
+                        pass
+                    twin.before_tick()
+                    steps += len(plain.ants)
+                    plain.tick(last=tick == TICKS - 1)
+                    assert_ants_equal(colony, plain)
+                    if tick % 25 == 24:
+                        assert_equal(colony, plain)
+            colony.end_episode()
+            twin.end_episode()
+            record = plain.records[-1]
+            seen["deliveries"] += record.deliveries
+            seen["births"] += record.births
+            seen["deaths"] += record.deaths
+            seen["later nests"] += sum(n for (nest, _), n in record.apart.items() if nest)
+            seen["idle"] += sum(ant.idle for ant in plain.ants.values())
+            seen["castes"] += len({ant.caste for ant in plain.ants.values()}) > 1
+    except AntsError:
+        seen["refused"] += 1
+    return steps
+
+
+@pytest.mark.parametrize(
+    ("name", "ant_steps"),
+    [
+        *(pytest.param(name, 2_500, marks=pytest.mark.slow) for name in SLOW),
+        # Two million in all, in ten minutes.
+        *(pytest.param(name, 340_000, marks=pytest.mark.long) for name in MODELS),
+        pytest.param("softmax", 2_500, marks=pytest.mark.optimised),
+    ],
+)
+def test_every_tick_of_whole_models(name, ant_steps):
+    steps, seed, seen = 0, 0, Counter()
+    schedules = ("by_world", "by_chunk")
+    if ant_steps < 10_000:  # each needs its own kernels
+        schedules = schedules[list(MODELS).index(name) % 2 :][:1]
+    while steps < ant_steps:
+        assert seed < 100 or steps > 10 * seed, (steps, seed, seen)
+        found = drawn_model(name, seed)
+        if found is not None:
+            try:
+                steps += steps_compared(*found, schedules[seed % len(schedules)], seen)
+            except AntsError:  # the protocol asks for other kernels
+                seen["other kernels"] += 1
+        seed += 1
+    assert {"deliveries", "deaths", "later nests"} <= {name for name, n in seen.items() if n}
+    assert seen["refused"] < seed / 2, (seen, seed)
