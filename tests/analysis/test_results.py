@@ -231,7 +231,10 @@ def test_results_without_numbers_are_refused():
 @pytest.mark.parametrize(
     ("attempt", "message"),
     [
-        (lambda one: compare(one, 3), "b is 3; give a result of Colony.run, train or evaluate"),
+        (
+            lambda one: compare(one, 3),
+            "b is 3; it must be a result of Colony.run, train or evaluate",
+        ),
         (lambda one: compare(one, one, "nothing"), "no measure 'nothing'"),
         (lambda one: compare(one, run(seeds=range(1, 6)), "deliveries"), "same seeds"),
         (lambda one: compare(one, one, configurations=(0, 1)), "configuration is 1"),
@@ -240,7 +243,7 @@ def test_results_without_numbers_are_refused():
         (lambda one: plot(one, "nothing"), "choose one of deliveries, entropy.trail"),
         (lambda one: plot(one, path="plot.jpg"), "must be one of .png"),
         (lambda one: summary(one, last=0), "last is 0"),
-        (lambda one: plot({"a": one, "b": 3}), "b is 3; give a result of Colony.run"),
+        (lambda one: plot({"a": one, "b": 3}), "b is 3; it must be a result of Colony.run"),
         (lambda one: plot({}), "there are no results"),
         (lambda one: plot({"a": one, "b": run(seeds=range(1, 6))}), "the seeds of 'b' are"),
         (lambda one: plot({"a": one, "b": one}, "nothing"), "no measure 'nothing'"),

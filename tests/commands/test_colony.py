@@ -100,7 +100,10 @@ def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are
             "`world.ranges` is not a setting of the world 'paper'",
         ),
         (["live", "--world", "nowhere"], "there is no world 'nowhere'"),
-        (["live", "--task.life.births", "--capacity", 5], "capacity is 5, but 80 ants start"),
+        (
+            ["live", "--task.life.births", "--capacity", 5],
+            "capacity is 5; it must lie between 80 and",
+        ),
         (["live", "--render", "x.bmp"], "'x.bmp' ends in '.bmp'"),
         (["live", "--save", "/proc/x/y"], "cannot write '/proc/x/y'"),
         (["live", "--save", "."], "'.' is not a regular file"),

@@ -8,6 +8,8 @@ from command_lines import ROOT
 
 from taichi_ants import Colony, TrainingConfig, files, worlds
 from taichi_ants.learners.policies import frozen_policy
+from taichi_ants.studies.store import Store
+from taichi_ants.studies.study import run
 from taichi_ants.studies.sweep import sweep_of
 from taichi_ants.task import foraging
 
@@ -17,8 +19,9 @@ COLONY, RUNS = (part.split("```")[0] for part in GUIDE.split("```python\n")[1:])
 
 def row_of(file, tmp_path):
     """The measures of the only row of a sweep, by name."""
-    (tmp_path / "blocks").mkdir()
-    values = sweep_of(file).measured(tmp_path / "blocks", lambda share: None)
+    study, store = sweep_of(file).study, Store(tmp_path)
+    run(study, store)
+    values = store.read(study.keys, study.seeds, study.arrays)
     return {name: array.item() for name, array in values.items()}
 
 

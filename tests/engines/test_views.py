@@ -147,7 +147,9 @@ def test_a_field_is_read_by_its_name(diffusion):
 
 def test_a_field_that_the_task_lacks_cannot_be_read():
     observations.register(Observation("homely", 16, of_home, reads=("home",)))
-    with pytest.raises(AntsError, match=r"reads the field 'home'; add `task\.fields\.home`\.$"):
+    with pytest.raises(
+        AntsError, match="'homely' reads is 'home'; it must be one of trail, or the name of a field"
+    ):
         Task("homely")
     task = Task("homely", fields={"home": Field(), "other": Field(), "third": Field()})
     message = r"^`task\.fields` has home, other, third, which a run of .*, or use a Colony\.$"
