@@ -421,7 +421,7 @@ def test_learning_rates_do_not_matter_to_fixed_rules_and_exploration_does(script
     training = found["TrainingConfig"]
     settings = found["parse_arguments"](["--seeds", "2"])
     rules = found["task_in"]("paper", found["TASKS"]["foraging"])
-    places = [found["place"]("paper", seed) for seed in (0, 1)]
+    places = [paper(), paper()]
 
     def deliveries(epsilon):
         return found["evaluate"](settings, places, rules, epsilon, 16).deliveries

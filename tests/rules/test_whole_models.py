@@ -177,7 +177,7 @@ def steps_compared(
             seen["deliveries"] += record.deliveries
             seen["births"] += record.births
             seen["deaths"] += record.deaths
-            seen["later nests"] += sum(n for (nest, _), n in record.apart.items() if nest)
+            seen["later nests"] += sum(n for (nest, _), n in record.delivered.items() if nest)
             seen["idle"] += sum(ant.idle for ant in plain.ants.values())
             seen["castes"] += len({ant.caste for ant in plain.ants.values()}) > 1
     except AntsError:

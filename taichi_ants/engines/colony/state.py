@@ -822,11 +822,11 @@ class ColonyState:
             n_given = [] if not leading else [n_worlds, slots if leading == axes and own else 1]
             given = q_values.reshape(*n_given, 1, n_states, N_ACTIONS)
             q[..., :N_ACTIONS] = given
-        of_groups = q.reshape(n_worlds, self.n_nests, -1, *q.shape[2:])
         for number, (name, caste) in enumerate(self.task.castes.items()):
             if caste.policy is not None:
                 path = f"`task.castes.{name}.policy`"
                 table = frozen_policy(caste.policy, self.task.observation, path)
+                of_groups = q.reshape(n_worlds, self.n_nests, -1, *q.shape[2:])
                 of_groups[:, :, number, 0, :, :N_ACTIONS] = table
         note_best_actions(q)
         return q.reshape(-1)
