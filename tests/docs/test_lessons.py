@@ -109,6 +109,7 @@ def test_questions_come_before_results_and_solutions_after_exercises(path):
     ids=lambda path: path.stem,
 )
 def test_run_afresh_it_says_the_same(path, kernels, monkeypatch):
+    monkeypatch.delenv("MPLBACKEND", raising=False)  # commands that other tests call have set it
     for name, value in environment(kernels).items():
         monkeypatch.setenv(name, value)
     execute = executor()
