@@ -48,8 +48,9 @@ class Example(NamedTuple):
         It has the evaporation of training, not that of the greedy evaluation.
         """
         steps, task = min(self.point.max_steps, STEPS), as_in_training(self.point.task)
-        given = {"seed": self.seed, "max_steps": steps, "task": task}
-        return Episode.play(self.point.world, self.q_values, **given)
+        return Episode.play(
+            self.point.world, self.q_values, seed=self.seed, max_steps=steps, task=task
+        )
 
 
 class Seen(NamedTuple):

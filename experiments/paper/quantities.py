@@ -9,7 +9,7 @@ configurations that differ only in it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any, NamedTuple
@@ -142,7 +142,7 @@ class Quantity:
 
     words: str
     unit: str
-    effects: dict[str, Effect]
+    effects: Mapping[str, Effect]
     possible: tuple[float, float] = UNBOUNDED
     of_estimates: Callable[[np.ndarray], np.ndarray] | None = None
 
@@ -188,7 +188,7 @@ def _value(
 
 
 def _quantity(
-    scope: str, measure: str, effects: dict[str, Effect], bounds: tuple[float, float] = UNBOUNDED
+    scope: str, measure: str, effects: Mapping[str, Effect], bounds: tuple[float, float] = UNBOUNDED
 ) -> Quantity:
     """Return a quantity in the unit of a measure; `bounds` apply to shares and counts."""
     one = LONE[measure]
