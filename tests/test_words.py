@@ -101,7 +101,7 @@ class Docstring(NamedTuple):
     def returns(self) -> bool:
         """Whether it is that of a public function that returns a value, and no property.
 
-        A `Change` of `engines.colony.interventions` is no value: it does something.
+        A `Change` of `engines.colony.interventions` is not a value: it does something.
         """
         node = self.node
         if (

@@ -35,7 +35,7 @@ def parts_of(name: str, names: Iterable[str]) -> list[str]:
 
 
 class Held(NamedTuple):
-    """What a file holds: keys of points, seeds, and names of arrays."""
+    """The contents of a file: keys of points, seeds, and names of arrays."""
 
     path: Path
     points: tuple[str, ...]

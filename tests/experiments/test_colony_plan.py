@@ -1,4 +1,4 @@
-"""What the study of colonies plans; what comes out is tried as a script."""
+"""The plan of the study of colonies; other tests run it as a script."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ FILES = {
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory, kernels):
-    """What one run of the script has printed, and its folder; not to be written to."""
+    """Return the output of one run of the script, and its folder, which is not to be changed."""
     place = tmp_path_factory.mktemp("finished")
     done = run("colony", [*SMALL, "--out", "out"], kernels, place)
     assert (done.returncode, done.stderr) == (0, "")

@@ -1,7 +1,7 @@
 """Compare compiled kernels with those recorded: python tests/golden/kernels.py [--write]
 
 Taichi names each file of its cache by a hash of the kernel, so equal names are equal kernels. They
-do not depend on Python, the number of threads or the place of files. A commit that moves code keeps
+do not depend on the version of Python or the place of files. A commit that moves code keeps
 them, and with them results and speed. Where kernels change, record the names anew with `--write`,
 and let the golden hashes show that results stay. This takes 20 s of processor time.
 """
