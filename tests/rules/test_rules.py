@@ -45,9 +45,7 @@ def test_a_task_names_rules_and_their_parameters():
     assert (other.rules["weber"].k, other.rules["weber"].exponent) == (3.0, 1.5)
     assert other != task
     assert Task.from_dict(other.as_dict()) == other == pickle.loads(pickle.dumps(other))
-    greedy = other.replace(
-        choice="greedy"
-    )  # parameters of an unused rule are dropped
+    greedy = other.replace(choice="greedy")  # parameters of an unused rule are dropped
     assert list(greedy.rules) == ["weaker", "power_law"]
     assert greedy.replace(choice="weber").rules["weber"].k == 20.0
     assert task.pheromone.dense
