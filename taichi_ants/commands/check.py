@@ -30,7 +30,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return settings
 
 
-def check(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Try everything that the file registers."""
     from taichi_ants import learners, rules
     from taichi_ants.errors import AntsError
@@ -69,8 +69,3 @@ def _results(
     for name in learners:
         fault = check_learner(name)
         yield f"{name}: 2000 steps: {fault or 'no fault'}", fault
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: check(parse_arguments(arguments)))

@@ -108,7 +108,7 @@ def _add_live(parser: command_line.Parser) -> None:
     command_line.add_settings(parser, _LEARNING)
 
 
-def live(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Run a colony and print a summary; a signal stops it between two ticks."""
     from taichi_ants import Colony
     from taichi_ants.studies.one_colony import check_places, summary
@@ -170,8 +170,3 @@ def rules(settings: argparse.Namespace, policy: Policy | None) -> Task:
     if policy:
         base = replace(base, observation=policy.observation)
     return base.replace(**command_line.given_settings(settings).get("task", {}))
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: live(parse_arguments(arguments)))

@@ -23,7 +23,6 @@ from taichi_ants.studies.command_line import (
     given_settings,
     given_world,
     progress_bar,
-    run_command,
     whole_number,
 )
 from taichi_ants.studies.plugins import load_plugin
@@ -101,6 +100,9 @@ def add_options(parser: Parser, flags: Container[str], **defaults: Any) -> None:
     add_settings(parser, TRAINING)
 
 
+STOPPED = "Stopped; nothing was left behind."
+
+
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
@@ -138,7 +140,7 @@ def is_page(settings: argparse.Namespace) -> bool:
     return Path(settings.out).suffix.lower() == ".html"
 
 
-def show(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Write the file that the settings describe, and print a summary."""
     from taichi_ants.rendering import check_animation, check_picture
     from taichi_ants.rendering.scene import check_size
@@ -263,8 +265,3 @@ def save_frames(settings: argparse.Namespace, pictures: Iterable[np.ndarray], n:
 
     with progress_bar("Rendering") as progress:
         save_animation(settings.out, counted(), settings.fps, pause=PAUSE)
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command line."""
-    run_command(lambda: show(parse_arguments(arguments)), "Stopped; nothing was left behind.")

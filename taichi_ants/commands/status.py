@@ -20,7 +20,7 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(arguments)
 
 
-def status(settings: argparse.Namespace) -> None:
+def run(settings: argparse.Namespace) -> None:
     """Print the state of each folder."""
     from taichi_ants.studies.folder import status as status_of
 
@@ -36,8 +36,3 @@ def status(settings: argparse.Namespace) -> None:
         command_line.notice(f"error: {one}")
     if wrong:
         raise wrong[-1]
-
-
-def main(arguments: list[str] | None = None) -> None:
-    """Run the command."""
-    command_line.run_command(lambda: status(parse_arguments(arguments)))

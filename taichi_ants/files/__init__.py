@@ -205,10 +205,13 @@ def read_csv(path: PathLike) -> list[dict[str, Any]]:
         raise AntsError(f"{named(path)} is not a table (CSV); name another file.") from error
 
 
-def smallest(array: np.ndarray) -> np.ndarray:
-    """Return integers as an array of the smallest integer type that can hold them."""
+def small(array: np.ndarray) -> np.ndarray:
+    """Return integers as the smallest signed type that holds them.
+
+    Signed, so that the type of joined blocks does not depend on how runs were cut into blocks.
+    """
     low, high = int(array.min(initial=0)), int(array.max(initial=0))
-    return array.astype(np.promote_types(np.min_scalar_type(low), np.min_scalar_type(high)))
+    return array.astype(np.min_scalar_type(min(low, -1 - high)))
 
 
 def check_writable_folder(path: PathLike, chosen: PathLike | None = None) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 
 from taichi_ants.arguments import checked_seeds, checked_share
 from taichi_ants.errors import AntsError, as_array, checked_whole, expect
-from taichi_ants.files import PathLike, smallest
+from taichi_ants.files import PathLike, small
 from taichi_ants.files.archives import Kind
 from taichi_ants.records import Record
 from taichi_ants.task import Task
@@ -152,7 +152,7 @@ class Dataset(Record):
     def save(self, path: PathLike) -> None:
         """Write a .npz file; raises as `archives.write` does."""
         arrays = {name: getattr(self, name) for name in COLUMNS}
-        arrays = {n: smallest(a) if a.dtype.kind == "i" else a for n, a in arrays.items()}
+        arrays = {n: small(a) if a.dtype.kind == "i" else a for n, a in arrays.items()}
         _KIND.write(path, self.facts(), arrays)
 
     @classmethod

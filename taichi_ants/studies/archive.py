@@ -17,7 +17,7 @@ from typing import Any
 from taichi_ants import files
 from taichi_ants.errors import AntsError
 from taichi_ants.studies import folder
-from taichi_ants.studies.folder import PAGE
+from taichi_ants.studies.folder import MANIFEST, PAGE
 from taichi_ants.studies.provenance import packages, source
 
 RESULTS = "results"  # the folder of results in an archive
@@ -49,8 +49,8 @@ def finished(place: Path) -> dict[str, Any]:
     Raises:
         AntsError: The results are not finished, or a file is missing or has changed.
     """
-    asked, manifest = folder.asked_in(place), folder.manifest_in(place)
-    if not asked or not manifest or not folder.is_finished(place, asked, False, False):
+    asked, manifest = folder.asked_in(place), folder.json_in(place / MANIFEST)
+    if not manifest or not folder.is_finished(place, asked, False, False):
         raise AntsError(
             f"{files.named(place)} has no finished results, or some of them have changed; run the "
             "command of this folder again, which writes what is missing."
@@ -156,7 +156,7 @@ def compare(one: Path, other: Path) -> Iterator[tuple[str, str, str]]:
     The difference is "" if they are equal. Pages name the command, the time and the machine of a
     run, which may differ.
     """
-    first, second = ((folder.manifest_in(place) or {})["files"] for place in (one, other))
+    first, second = ((folder.json_in(place / MANIFEST) or {})["files"] for place in (one, other))
     for name in sorted({*first, *second}):
         if name not in first or name not in second:
             yield name, f"is only in the {'archive' if name in first else 'new results'}", ""

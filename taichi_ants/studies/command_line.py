@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from taichi_ants.worlds.world import World
 
 EXIT_BAD_INPUT = 2
-MOST_SHARDS = 100_000
 # Help for options that several commands have.
 PLUGIN = "Python file that registers learners, observations, worlds, measures or rules"
 THREADS = "number of CPU threads (default: all)"
@@ -75,11 +74,9 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Return parsed and unknown arguments; refuse empty ones, as from unset variables."""
         words = sys.argv[1:] if args is None else list(args)
-        for before, word in zip(["", *words], words, strict=False):
+        for before, word in zip(["the first argument", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
-                after = f"the argument after {before!r}" if before else "the first argument"
-                name = word[:-1] or (before if before.startswith("--") else after)
-                self.error(f"{name} is empty; give a value or leave it out")
+                self.error(f"{word[:-1] or before} is empty; give a value or leave it out")
             self._add_setting(word.partition("=")[0])
         return super().parse_known_args(words, namespace)
 
@@ -126,57 +123,32 @@ def add_results(parser: argparse.ArgumentParser, name: str, quick: bool = True) 
 
 
 def add_machines(parser: argparse.ArgumentParser) -> None:
-    """Add the options of commands that can spread their work, see `machines.chosen`."""
-    add = parser.add_argument
+    """Add the options of commands that can spread their work, see `command.executor_of`."""
+    add = parser.add_mutually_exclusive_group().add_argument
     workers = "number of worker processes on this machine (default: all work in this process)"
     add("--workers", type=whole_number(1, 1024), metavar="N", help=workers)
     ray = (
         "spread the work with Ray over this machine, or over the cluster at HOST:PORT that this "
         "machine belongs to"
     )
-    add("--ray", nargs="?", const=True, type=_address, metavar="HOST:PORT", help=ray)
+    add("--ray", nargs="?", const=True, metavar="HOST:PORT", help=ray)
     shard = (
         "compute only the I-th of N equal parts, for example of a job array; the last part to "
         "finish in a folder writes the tables"
     )
-    add("--shard", type=_shard, metavar="I/N", help=shard)
-
-
-def _address(text: str) -> str:
-    """Return the address of a Ray cluster."""
-    host, _, port = text.rpartition(":")
-    if not (host and "/" not in host and port.isdecimal() and 0 < int(port) < 2**16):
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not the address of a Ray cluster; write HOST:PORT, for example "
-            "10.0.0.1:6379, or leave it out and give --ray as the last option"
-        )
-    return text
+    parser.add_argument("--shard", type=_shard, metavar="I/N", help=shard)
 
 
 def _shard(text: str) -> tuple[int, int]:
     """Return the numbers of a shard such as 2/3."""
-    number, slash, shards = text.partition("/")
-    if not (slash and number.isdecimal() and shards.isdecimal()):
+    number, _, shards = text.partition("/")
+    if not (number.isdecimal() and shards.isdecimal() and 1 <= int(number) <= int(shards)):
         raise argparse.ArgumentTypeError(f"{text!r} is not a shard; write I/N, for example 2/3")
-    if not 1 <= int(number) <= int(shards) <= MOST_SHARDS:
-        raise argparse.ArgumentTypeError(
-            f"there is no shard {text}; write I/N with I from 1 to N, and N at most {MOST_SHARDS}"
-        )
     return int(number), int(shards)
 
 
 def with_folder(settings: argparse.Namespace, name: str) -> argparse.Namespace:
-    """Return the settings with a folder for the results, which --quick changes.
-
-    Raises:
-        AntsError: Options of `add_machines` exclude each other.
-    """
-    for other in ("workers", "shard"):
-        if getattr(settings, "ray", None) and getattr(settings, other, None):
-            raise AntsError(
-                f"--ray and --{other} cannot be combined, because Ray already spreads all of the "
-                "work; leave one of them out."
-            )
+    """Return the settings with a folder for the results, which --quick changes."""
     name = f"{name}-quick" if getattr(settings, "quick", False) else name
     settings.out = settings.out or Path("results", name)
     return settings
@@ -248,15 +220,16 @@ def given_world(settings: argparse.Namespace) -> World:
     return worlds.build(settings.world, **given)
 
 
-def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> NoReturn:
-    """Run a command, report an error or interruption in one sentence, and exit Python."""
+@contextmanager
+def reporting(interrupted: str = "Stopped.") -> Iterator[None]:
+    """Return a context that reports an error or interruption in one sentence, and exits Python."""
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="replace")  # a terminal that lacks a character shows "?"
     os.environ["MPLBACKEND"] = "agg"  # figures are files, and the user's backend may be missing
     status = 0
     try:
         with stoppable(interrupted):
-            command()
+            yield
         if sys.stdout is not None:  # it is None if the caller has closed it
             sys.stdout.flush()
     except BrokenPipeError:  # nobody reads the output any more, for example after `| head`
@@ -267,6 +240,12 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
         notice(f"error: {text.rstrip('.')}.")
         status = getattr(error, "exit_status", EXIT_BAD_INPUT)
     sys.exit(status)
+
+
+def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> None:
+    """Run a command `reporting` its errors, and exit Python."""
+    with reporting(interrupted):
+        command()
 
 
 @contextmanager

@@ -64,7 +64,14 @@ def completed(
         LostWorkersError: The executor takes no more work.
     """
     if executor is None:
-        yield from ((piece, _tried(work_of(piece))) for piece in pieces)
+        for piece in pieces:
+            outcome: Any
+            try:
+                outcome = work_of(piece)()
+            except Exception as error:
+                stop_if_noted()
+                outcome = error
+            yield piece, outcome
         return
     source, again, deaths = iter(pieces), deque[Piece](), Counter[Piece]()
     coming: dict[Future[Any], Piece] = {}
@@ -77,7 +84,15 @@ def completed(
                     following = again.popleft()
                 if following is None:
                     break
-                coming[_submitted(executor, work_of(following), code)] = following
+                work = pickle.dumps(work_of(following), -1)
+                try:
+                    future = executor.submit(do, versions(), tuple(code), work)
+                except (BrokenExecutor, RuntimeError) as refusal:
+                    why = f"{type(refusal).__name__}: {refusal}"
+                    raise LostWorkersError(
+                        f"the executor takes no more work ({why}); {RESUME}."
+                    ) from refusal
+                coming[future] = following
             if not coming:
                 return
             done, _ = concurrent.futures.wait(
@@ -98,24 +113,6 @@ def completed(
     finally:
         for future in coming:
             future.cancel()
-
-
-def _tried(work: Callable[[], Any]) -> Any:
-    """Return the outcome of some work, or its exception."""
-    try:
-        return work()
-    except Exception as error:
-        stop_if_noted()
-        return error
-
-
-def _submitted(executor: Any, work: Callable[..., Any], code: Sequence[Code]) -> Future[Any]:
-    try:
-        return executor.submit(do, versions(), tuple(code), pickle.dumps(work, -1))
-    except (BrokenExecutor, RuntimeError) as refusal:
-        raise LostWorkersError(
-            f"the executor takes no more work ({type(refusal).__name__}: {refusal}); {RESUME}."
-        ) from refusal
 
 
 def _error_of(future: Future[Any]) -> Exception | None:

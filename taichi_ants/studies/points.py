@@ -29,7 +29,7 @@ from taichi_ants.task.constants import EPISODE_STEPS, EPISODES, MAX_STEPS, ROW
 from taichi_ants.worlds.world import World
 
 if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony, ColonyEpisodes
+    from taichi_ants.engines.colony.colony import Colony
 
 # Added to the seeds of a colony for its evaluation, so that it shares no random numbers with the
 # training.
@@ -63,9 +63,9 @@ class Drawn:
         cls, preset: str, first: int = 0, regions: Mapping[str, Any] | None = None, **settings: Any
     ) -> Drawn:
         """Return the worlds that `worlds.build(preset, first + seed, **settings)` draws."""
-        for one in worlds.settings_of(preset) if preset in worlds.names() else ():
-            if one.name in settings:  # so that equal numbers of other types are equal
-                settings[one.name] = one.checked(settings[one.name])
+        for declared in worlds.settings_of(preset) if preset in worlds.names() else ():
+            if declared.name in settings:  # so that equal numbers of other types are equal
+                settings[declared.name] = declared.checked(settings[declared.name])
         return cls(json.dumps([preset, first, settings, regions or {}], sort_keys=True))
 
     def of(self, seed: int) -> World:
@@ -157,11 +157,11 @@ class RunPoint:
         else:
             trained = train(world, configs, seeds, *lengths, task, **where, progress=progress)
             q_values = trained.q_values
-            outcome = {name: small(getattr(trained, name)) for name in _RUN_ARRAYS}
+            outcome = {name: files.small(getattr(trained, name)) for name in _RUN_ARRAYS}
             outcome["q_values"] = q_values
         greedy = evaluate(world, q_values, first.rollouts, seeds, first.max_steps, task, **where)
         of_rollouts = {f"greedy_{name}": getattr(greedy, name) for name in _RUN_ARRAYS}
-        return outcome | {name: small(array) for name, array in of_rollouts.items()}
+        return outcome | {name: files.small(array) for name, array in of_rollouts.items()}
 
 
 @dataclass(frozen=True)
@@ -281,65 +281,66 @@ class ColonyPoint:
         """Raise an AntsError, which names the event, if it can never happen as it should."""
         for learns in (True, False) if self.episodes else (False,):
             events = self.events(learns)
-            for check, event in product((self._check_times, self._check_event), events):
-                number = [one for one in self.protocol if one.path == event.path].index(event) + 1
+            for checks_times, event in product((True, False), events):  # all times come first
+                of_path = [other for other in self.protocol if other.path == event.path]
                 try:
-                    check(event, learns)
+                    if checks_times:
+                        event.times(self.ticks)
+                    else:
+                        self._check_event(event, events, learns)
                 except AntsError as error:
+                    number = of_path.index(event) + 1
                     raise AntsError(
                         f"in [[{event.path}]] number {number}, in the {DURING[learns]}, {error}"
                     ) from error
 
-    def _check_times(self, event: ProtocolEvent, learns: bool) -> None:
-        event.times(self.ticks)
-
-    def _check_event(self, event: ProtocolEvent, learns: bool) -> None:
-        places = self.pool if learns and self.pool else self.places_of_evaluation
-        of, start = self.events(learns), (self.ants, self.capacity, self.start, False)
+    def _check_event(
+        self, event: ProtocolEvent, events: tuple[ProtocolEvent, ...], learns: bool
+    ) -> None:
+        world = self.pool[0] if learns and self.pool else self.first_world
+        start = self.ants, self.capacity, self.start, False
         capacity = arguments.checked_capacity(self.task, *start)
-        check_room(event, of, self.task, self.ants, capacity, self.ticks)
-        for one in event.interventions:
-            one.check_in(places[0], self.task, learns)
+        check_room(event, events, self.task, self.ants, capacity, self.ticks)
+        for intervention in event.interventions:
+            intervention.check_in(world, self.task, learns)
         if isinstance(event, When):
-            measures.check_part(event.measure, places[0], self.task, single=True)
-        for world in () if places is self.pool else places:  # a pool's worlds are drawn
-            check_queen(event, of, world, self.ticks)
+            measures.check_part(event.measure, world, self.task, single=True)
+        if not (learns and self.pool):  # a pool's worlds are drawn
+            check_queen(event, events, world, self.ticks)
 
-    def check_worlds(self, several: Iterable[World]) -> None:
+    def check_worlds(self, of_seeds: Iterable[World]) -> None:
         """Raise AntsError if an event of the evaluation is impossible in one of its worlds."""
         events = self.events(learns=False)
-        for event, world in product(events, several if events else ()):
+        for event, world in product(events, of_seeds if events else ()):
             check_queen(event, events, world, self.ticks)
 
     @property
-    def places_of_evaluation(self) -> tuple[World, ...]:
-        """The worlds of the evaluation that checks look at: one, if each seed draws its own."""
-        return (self.world.of(0) if isinstance(self.world, Drawn) else self.world,)
+    def first_world(self) -> World:
+        """The world of the evaluation; that of seed 0, if each seed draws its own."""
+        return self.world.of(0) if isinstance(self.world, Drawn) else self.world
 
     alike = property(lambda self: self)  # each point has its own blocks
 
     @property
     def runs_of_a_block(self) -> int:
         """The number of seeds of a block, whose colonies run together, as memory allows."""
-        if any(isinstance(one, When) and one.in_all_worlds for one in self.protocol):
+        if any(isinstance(event, When) and event.in_all_worlds for event in self.protocol):
             return 1  # a condition of one world must not change what all share
-        world = self.places_of_evaluation[0]
         slots, states = self.capacity or self.ants, self.task.n_states
         memory = learners.get(self.training.learner).memory_for(self.training, states)
         table = (1 + memory.tables) * states * ROW + memory.floats + memory.integers
         owners = slots if self.sharing == "independent" else 1
-        ants, cells = slots * _NUMBERS_OF_AN_ANT, world.grid.size * _NUMBERS_OF_A_CELL
+        ants, cells = slots * _NUMBERS_OF_AN_ANT, self.first_world.grid.size * _NUMBERS_OF_A_CELL
         fits = _NUMBERS_OF_A_BLOCK // (ants + cells + owners * table)
         return max(1, min(fits, round(_SECONDS_OF_A_BLOCK / self.seconds)))
 
     @property
     def seconds(self) -> float:
         """The approximate time of a seed on one processor."""
-        world = self.places_of_evaluation[0]
-        cells = sum(
-            world.grid.size * (_WORK_OF_DIFFUSION if one.diffusion else _WORK_OF_A_CELL)
-            for one in (self.task.pheromone, *self.task.fields.values())
-            if one.dense
+        cells = self.first_world.grid.size * sum(
+            _WORK_OF_DIFFUSION if field.diffusion else _WORK_OF_A_CELL
+            for field in (self.task.pheromone, *self.task.fields.values())
+            if field.dense
         )
         ticks = self.ticks * (self.episodes + self.rollouts)
         return (self.ants + cells) * ticks / _TICKS_OF_A_SECOND
@@ -405,8 +406,15 @@ class ColonyPoint:
             every=point.measure_every,
             protocol=point.events(learns=False),
         )
-        outcome = {name: small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
-        outcome |= _series_of(episodes, point)
+        outcome = {name: files.small(getattr(episodes, name).T) for name in _COLONY_ARRAYS}
+        if (series := episodes.series) is not None:
+            for name in series.maps:
+                raise AntsError(
+                    f"the measure {name!r} is an array; choose measures that give numbers."
+                )
+            shape = point.rollouts, -1, len(seeds)  # all worlds run for all ticks
+            for name, values in series.values.items():
+                outcome[f"{SERIES}{name}"] = np.moveaxis(values.reshape(shape), -1, 0)
         if point.episodes and point.sharing == "shared":
             outcome["q_values"] = tables
         return {name: array[None] for name, array in outcome.items()}
@@ -433,20 +441,6 @@ class ColonyPoint:
         return [world.of(seed) for seed in seeds] if isinstance(world, Drawn) else world
 
 
-def _series_of(episodes: ColonyEpisodes, point: ColonyPoint) -> Outcome:
-    """Return the series of measures, float64 (seeds, rollouts, rows) by "series_NAME"."""
-    series = episodes.series
-    if series is None:
-        return {}
-    for name in series.maps:
-        raise AntsError(f"the measure {name!r} is an array; choose measures that give numbers.")
-    shape = point.rollouts, -1, len(episodes.seeds)  # all worlds run for all ticks
-    return {
-        f"{SERIES}{name}": np.moveaxis(values.reshape(shape), -1, 0)
-        for name, values in series.values.items()
-    }
-
-
 Point = RunPoint | ColonyPoint
 
 
@@ -459,8 +453,8 @@ def key_of(point: Point, *more: str) -> str:
     facts = {"physics": PHYSICS, "kind": point.kind, "more": more, **_changed(point)}
     castes = {name: caste.policy for name, caste in point.task.castes.items() if caste.policy}
     if castes:  # whose policies are named by their files
-        named = ((name, FixedPolicy.named(one, point.task)) for name, one in castes.items())
-        facts["castes"] = {name: one.sha256 for name, one in named}
+        named = ((name, FixedPolicy.named(path, point.task)) for name, path in castes.items())
+        facts["castes"] = {name: policy.sha256 for name, policy in named}
     return hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:32]
 
 
@@ -475,22 +469,24 @@ def _changed(value: Any) -> Any:
     if isinstance(value, ProtocolEvent):
         return value.facts()
     if isinstance(value, Mapping):  # in which the order of the names counts
-        return [[name, _changed(one)] for name, one in value.items()]
+        return [[name, _changed(entry)] for name, entry in value.items()]
     if hasattr(value, "__dataclass_fields__"):
-        found = {one.name: getattr(value, one.name) for one in fields(value)}
-        own = {one.name: found[one.name] for one in fields(value) if found[one.name] != _usual(one)}
+        pairs = ((getattr(value, one.name), one) for one in fields(value))
+        own = {one.name: setting for setting, one in pairs if setting != _default(one)}
         if isinstance(value, TrainingConfig):
-            usual = learners.get(value.learner).hyperparameters()
-            more = {n: v for n, v in value.hyperparameters if v != getattr(usual, n, None)}
+            defaults = learners.get(value.learner).hyperparameters()
+            more = {n: v for n, v in value.hyperparameters if v != getattr(defaults, n, None)}
             own["hyperparameters"] = sorted(more.items())
-        return {name: _changed(one) for name, one in own.items()}
+        return {name: _changed(setting) for name, setting in own.items()}
     if isinstance(value, (list, tuple)):
-        return [_changed(one) for one in value]
+        return [_changed(element) for element in value]
     return value.item() if isinstance(value, np.generic) else value
 
 
-def _usual(one: Field[Any]) -> Any:
-    return one.default if one.default_factory is MISSING else one.default_factory()
+def _default(declared: Field[Any]) -> Any:
+    if declared.default_factory is MISSING:
+        return declared.default
+    return declared.default_factory()
 
 
 @lru_cache(4096)
@@ -500,58 +496,57 @@ def _sum_of(world: World) -> str:
     return files.checksum_of_json([world_facts(world), regions])[:32]
 
 
-def small(array: np.ndarray) -> np.ndarray:
-    """Return integers as the smallest signed type that holds them.
-
-    Signed, so that the type of joined blocks does not depend on how runs were cut into blocks.
-    """
-    low, high = int(array.min(initial=0)), int(array.max(initial=0))
-    return array.astype(np.min_scalar_type(min(low, -1 - high)))
-
-
 def settings_of(points: Sequence[Point], seeds: Sequence[int]) -> dict[str, Any]:
     """Return everything that determines the results of points and seeds, by name.
 
     Settings that all points share are single values; others are lists with an entry per point.
     """
-    points = tuple(dict.fromkeys(one for point in points for one in chain(point)))
-    places: list[Any] = [place for one in points for place in (one.world, one.pool) if place]
-    worlds = list(dict.fromkeys(places))
-    numbers = {one: number for several in (points, worlds) for number, one in enumerate(several)}
-    drawn = {one: tuple(map(one.of, seeds)) for one in worlds if isinstance(one, Drawn)}
-    rows = [facts_of(point, lambda name, value: numbers[value]) for point in points]
-    names = dict.fromkeys(name for row in rows for name in row)
-    columns = {name: [row.get(name) for row in rows] for name in names}
+    points = tuple(dict.fromkeys(earlier for point in points for earlier in chain(point)))
+    each = (map(w.of, seeds) if isinstance(w, Drawn) else w for w in _worlds_of(points))
+    columns = columns_of(points).items()
     return {
         "version": __version__,
         "seeds": list(seeds),
         "worlds": [
-            [world_facts(one) for one in world] if isinstance(world, tuple) else world_facts(world)
-            for world in (drawn.get(one, one) for one in worlds)
+            world_facts(worlds) if isinstance(worlds, World) else [*map(world_facts, worlds)]
+            for worlds in each
         ],
         **{
-            name: values[0] if all(one == values[0] for one in values) else values
-            for name, values in columns.items()
+            name: values[0] if all(v == values[0] for v in values) else values
+            for name, values in columns
         },
     }
 
 
-def facts_of(point: Point, number_of: Callable[[str, Any], Any]) -> dict[str, Any]:
-    """Return the settings of a point by name.
+def _worlds_of(points: Sequence[Point]) -> list[Any]:
+    """Return the worlds of points, recipes and pools, in order of appearance."""
+    return list(dict.fromkeys(w for p in points for w in (p.world, p.pool) if w))
 
-    `number_of` gets the name and the value of a world, several worlds or another point, and returns
-    what represents it.
+
+def columns_of(points: Sequence[Point]) -> dict[str, list[Any]]:
+    """Return the settings of points by name, each a list with an entry per point.
+
+    Numbers represent worlds, and other points. A point that lacks a setting has None.
     """
-    found = {one.name: getattr(point, one.name) for one in fields(point)}
-    for name in ("world", "pool", "after"):
-        found |= {name: number_of(name, found[name])} if found.get(name) else {}
-    protocol, during = found.pop("protocol", ()), found.pop("during", "")
-    if protocol:
-        found |= {"protocol": [event.facts() for event in protocol], "during": during}
-    found = {k: v for k, v in found.items() if k not in _LATER or v not in (None, ())}
-    if policy := found.get("policy"):
-        found["policy"] = {"name": policy.name, "sha256": policy.sha256}
-    return flat({**found, "task": point.task.as_dict(), "training": point.training.as_dict()})
+    numbers = {
+        value: n for values in (points, _worlds_of(points)) for n, value in enumerate(values)
+    }
+    rows = []
+    for point in points:
+        row = {field.name: getattr(point, field.name) for field in fields(point)}
+        for name in ("world", "pool", "after"):
+            row |= {name: numbers.get(row[name])} if row.get(name) else {}
+        protocol, during = row.pop("protocol", ()), row.pop("during", "")
+        if protocol:
+            row |= {"protocol": [event.facts() for event in protocol], "during": during}
+        row = {k: v for k, v in row.items() if k not in _LATER or v not in (None, ())}
+        if policy := row.get("policy"):
+            row["policy"] = {"name": policy.name, "sha256": policy.sha256}
+        rows.append(
+            flat({**row, "task": point.task.as_dict(), "training": point.training.as_dict()})
+        )
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: [row.get(name) for row in rows] for name in names}
 
 
 def world_facts(world: World) -> dict[str, Any]:

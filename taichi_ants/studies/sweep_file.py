@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from taichi_ants import (
     arguments,
-    files,
     interventions,
     learners,
     measures,
@@ -53,24 +50,6 @@ _BESIDE |= {f"return_{of}": f"deliveries_{of}" for of in ("first50", "second50",
 _OF_LEARNERS = [one.name for one in declared(TrainingConfig)]
 
 Settings = dict[str, Any]  # by their full names, as "task.pheromone.half_life"
-
-
-@contextmanager
-def contents(path: Path) -> Iterator[Settings]:
-    """Yield the contents of a file (.toml); errors in the context name the file.
-
-    Raises:
-        AntsError: The file cannot be read.
-    """
-    text = files.read_text(path)
-    try:
-        file = files.tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise AntsError(f"{str(path)!r} is not valid TOML: {error}; correct it.") from error
-    try:
-        yield file
-    except AntsError as error:
-        raise AntsError(f"in {str(path)!r}, {error}") from error
 
 
 class Base(NamedTuple):
@@ -137,7 +116,7 @@ class Base(NamedTuple):
                     f"{name} needs {least} episodes; use more or choose another measure."
                 )
             if isinstance(point, ColonyPoint):
-                measures.check_part(name, point.places_of_evaluation[0], point.task)
+                measures.check_part(name, point.first_world, point.task)
         return point
 
 
