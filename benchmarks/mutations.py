@@ -281,7 +281,6 @@ MUTATIONS = [
     ("files/archives.py", "if size > most:", "if size > 2 * most:", ARCHIVES),
     ("files/archives.py", "if version != self.version:", "if version < 0:", ARCHIVES),
     ("files/__init__.py", 'with open(temporary, "wb")', 'with open(target, "wb")', FILES),
-    ("files/__init__.py", "st_mtime > _ABANDONED", "st_mtime >= 0", FILES),
     ("files/__init__.py", "None if v != v else v", "v", FILES),
     (
         "studies/store.py",

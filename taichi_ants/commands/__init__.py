@@ -23,14 +23,11 @@ COMMANDS = {  # modules of this package with their help
 }
 
 
-def run(
-    name: str, arguments: Sequence[str] | None = None, program: str | None = None, **more: object
-) -> None:
+def run(name: str, arguments: Sequence[str] | None = None, program: str | None = None) -> None:
     """Run a command and exit; Ctrl-C also works during its imports.
 
     A command has the functions `parse_arguments` and `run`, and perhaps `STOPPED`, which it prints
-    if a signal stops it. `program` is its name in --help, by default that of the script; `more` are
-    further arguments of `parse_arguments`.
+    if a signal stops it. `program` is its name in --help, by default that of the script.
     """
     # Commands use all cores themselves, so OpenBLAS should not start threads; it reads this at the
     # import of NumPy.
@@ -41,7 +38,7 @@ def run(
         Parser.program = program
         command = import_module(f"{__name__}.{name}")
         with reporting(getattr(command, "STOPPED", "Stopped.")):
-            command.run(command.parse_arguments(arguments, **more))
+            command.run(command.parse_arguments(arguments))
 
 
 def main() -> None:

@@ -64,8 +64,8 @@ def _results(
     from taichi_ants.testing import check_learner, check_observation, check_rule
 
     of_rules = (check_rule(name, inputs) for name in rules)
-    for one in chain(of_rules, map(check_observation, observations)):
-        yield str(one), one.difference
+    for comparison in chain(of_rules, map(check_observation, observations)):
+        yield str(comparison), comparison.difference
     for name in learners:
         fault = check_learner(name)
         yield f"{name}: 2000 steps: {fault or 'no fault'}", fault

@@ -19,7 +19,6 @@ import shutil
 import stat
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -36,9 +35,6 @@ else:
     import tomli as tomllib  # noqa: F401
 
 PathLike = str | os.PathLike[str]
-_ABANDONED = 3600.0  # age in seconds at which an unfinished file must be from a killed process
-_LISTED_FOR = 60.0  # seconds, because listing a folder of many files takes long
-_listed: dict[Path, tuple[float, list[Path]]] = {}
 
 
 def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> None:
@@ -59,40 +55,15 @@ def write_atomically(path: PathLike, writer: Callable[[BinaryIO], object]) -> No
 def unfinished(target: Path) -> Iterator[Path]:
     """Yield a free path in the target's folder; the caller moves a complete file to the target.
 
-    A file or folder that is still at this path is removed at the end. If the process is killed, a
-    later write to the same target removes it, at least an hour later.
+    A file or folder that is still at this path is removed at the end. Its name begins with a dot.
     """
-    # A hash, because the name itself can already have the greatest length allowed.
-    name = hashlib.sha256(os.fsencode(target.name)).hexdigest()[:16]
-    for leftover in _left_in(target.parent):
-        with suppress(OSError):
-            if (
-                leftover.name.startswith(f".{name}.")
-                and time.time() - leftover.stat().st_mtime > _ABANDONED
-            ):
-                _remove(leftover)
-    temporary = target.parent / f".{name}.{secrets.token_hex(8)}.tmp"
+    temporary = target.parent / f".{secrets.token_hex(8)}.tmp"
     try:
         yield temporary
     finally:
+        shutil.rmtree(temporary, ignore_errors=True)  # only removes folders
         with suppress(OSError):
-            _remove(temporary)
-
-
-def _left_in(folder: Path) -> list[Path]:
-    """Return the unfinished files that a folder had at most a minute ago."""
-    when, names = _listed.get(folder, (0.0, []))
-    if not when or time.monotonic() - when > _LISTED_FOR:
-        names = list(folder.glob(".*.tmp"))
-        _listed[folder] = time.monotonic(), names
-    return names
-
-
-def _remove(path: Path) -> None:
-    if path.is_dir():
-        shutil.rmtree(path)
-    else:
-        path.unlink()
+            temporary.unlink()
 
 
 def check_writable_file(path: PathLike) -> Path:

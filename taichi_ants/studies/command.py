@@ -171,7 +171,7 @@ def run_study(settings: Namespace, planned: Planned) -> bool:
             with (
                 folder.session(out, shard),
                 executor_of(settings) as (executor, threads),
-                progress_bar(title, executor) as progress,
+                progress_bar(title) as progress,
             ):
                 how: dict[str, Any] = {"threads": threads, "arch": planned.facts["arch"]}
                 run(study, store, executor, shard, progress, planned.code, **how)
@@ -191,7 +191,7 @@ def run_study(settings: Namespace, planned: Planned) -> bool:
     if is_shown:
         print(f"{out}/ already has these results; use --force to write their tables again.")
     else:
-        print(f"\n{time.perf_counter() - began:.1f} s; all results are in {out}/")
+        print(f"{time.perf_counter() - began:.1f} s; all results are in {out}/")
     if (out / PAGE).exists():
         print(out / PAGE)
     return True

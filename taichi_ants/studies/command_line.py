@@ -74,9 +74,11 @@ class Parser(argparse.ArgumentParser):
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
         """Return parsed and unknown arguments; refuse empty ones, as from unset variables."""
         words = sys.argv[1:] if args is None else list(args)
-        for before, word in zip(["the first argument", *words], words, strict=False):
+        for before, word in zip(["", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
-                self.error(f"{word[:-1] or before} is empty; give a value or leave it out")
+                self.error(
+                    f"{word[:-1] or f'the argument after {before!r}'} is empty; give a value or leave it out"
+                )
             self._add_setting(word.partition("=")[0])
         return super().parse_known_args(words, namespace)
 
@@ -172,26 +174,28 @@ def add_settings(parser: Parser, base: Settings) -> None:
     """Add an option for each setting except `parser.own_settings`; `base` has the defaults."""
     parser.usage = "%(prog)s [options]"  # without the list of options, which is too long
     group = parser.add_argument_group(f"{base.path} settings")
-    for one in declared(type(base)):
-        value = getattr(base, one.name)
-        if one.kind is Named:
-            parser.named_groups += (one.path,)
-            group.description = f"{group.description or ''}{_help_of_entries(one)}"
-        elif one.path not in parser.own_settings and (one.has_names or not one.is_group):
+    for setting in declared(type(base)):
+        value = getattr(base, setting.name)
+        if setting.kind is Named:
+            parser.named_groups += (setting.path,)
+            group.description = f"{group.description or ''}{_help_of_entries(setting)}"
+        elif setting.path not in parser.own_settings and (
+            setting.has_names or not setting.is_group
+        ):
             # The value is checked where it is used.
-            how: dict[str, Any] = {"metavar": {int: "N", float: "X"}.get(one.kind, "NAME")}
-            if one.kind is bool:
+            how: dict[str, Any] = {"metavar": {int: "N", float: "X"}.get(setting.kind, "NAME")}
+            if setting.kind is bool:
                 how = {"nargs": "?", "const": True, "metavar": "true|false"}
-            how |= {"dest": one.path, "type": _literal, "default": argparse.SUPPRESS}
-            about = one.about(value).replace("%", "%%")
-            group.add_argument(f"--{one.path.replace('_', '-')}", **how, help=about)
-        if one.is_group:
+            how |= {"dest": setting.path, "type": _literal, "default": argparse.SUPPRESS}
+            about = setting.about(value).replace("%", "%%")
+            group.add_argument(f"--{setting.path.replace('_', '-')}", **how, help=about)
+        if setting.is_group:
             add_settings(parser, value)
 
 
 def _help_of_entries(group: DeclaredSetting) -> str:
     """Return the help of options such as --task.fields.home.level, for any name."""
-    names = ", ".join(one.name.replace("_", "-") for one in declared(group.entry))
+    names = ", ".join(setting.name.replace("_", "-") for setting in declared(group.entry))
     option = f"--{group.path.replace('_', '-')}.NAME.SETTING"
     settings = f"SETTING is one of {names}" if names else "each rule declares its own"
     return f"{option}: {group.rule.help}; {settings}. "
@@ -249,25 +253,22 @@ def run_command(command: Callable[[], None], interrupted: str = "Stopped.") -> N
 
 
 @contextmanager
-def progress_bar(title: str, executor: Any = None) -> Iterator[Callable[[float], None]]:
+def progress_bar(title: str) -> Iterator[Callable[[float], None]]:
     """Yield a function that shows the finished share of the work, 0 to 1, as a progress bar.
 
-    The bar is on standard error, if that is a terminal. It ends with the text of `executor`, if
-    that has workers which come and go. The function raises KeyboardInterrupt if a library has
-    ignored a signal to stop.
+    The bar is on standard error, if that is a terminal. The function raises KeyboardInterrupt if a
+    library has ignored a signal to stop.
     """
     from rich.console import Console
-    from rich.progress import Progress, TextColumn
+    from rich.progress import Progress
 
-    console, state = Console(stderr=True), getattr(executor, "state", lambda: "")
-    columns = *Progress.get_default_columns(), TextColumn("{task.fields[state]}")
-    how: Any = {"console": console, "transient": True, "disable": not console.is_terminal}
-    with Progress(*columns, **how) as bar:
-        task = bar.add_task(title, total=1.0, state=state())
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(title, total=1.0)
 
         def update(share: float) -> None:
             stop_if_noted()
-            bar.update(task, completed=share, state=state())
+            bar.update(task, completed=share)
 
         stop_if_noted()
         yield update

@@ -75,6 +75,7 @@ def completed(
         return
     source, again, deaths = iter(pieces), deque[Piece](), Counter[Piece]()
     coming: dict[Future[Any], Piece] = {}
+    fault: Any
     try:
         while True:
             workers = getattr(executor, "num_workers", 0) or available_threads()
@@ -101,29 +102,21 @@ def completed(
             stop_if_noted()
             getattr(executor, "check", lambda: None)()
             for future in done:
-                piece, fault = coming.pop(future), _error_of(future)
-                if not isinstance(fault, BrokenExecutor):
-                    yield piece, fault or future.result()
-                    continue
-                deaths[piece] += 1
-                if deaths[piece] < TRIES:
-                    again.append(piece)
-                else:
-                    yield piece, LostWorkersError(_DIED)
+                piece, fault = coming.pop(future), RuntimeError("cancelled")  # by somebody else
+                if not future.cancelled():
+                    fault = future.exception()
+                if fault and not isinstance(fault, Exception):  # a SystemExit, for example
+                    fault = RuntimeError(f"{type(fault).__name__}: {fault}")
+                if isinstance(fault, BrokenExecutor):
+                    deaths[piece] += 1
+                    if deaths[piece] < TRIES:
+                        again.append(piece)
+                        continue
+                    fault = LostWorkersError(_DIED)
+                yield piece, fault or future.result()
     finally:
         for future in coming:
             future.cancel()
-
-
-def _error_of(future: Future[Any]) -> Exception | None:
-    """Return the error of a finished future, which somebody else may have cancelled."""
-    try:
-        error = future.exception()
-    except concurrent.futures.CancelledError as cancelled:
-        return RuntimeError(f"cancelled {cancelled}".strip())
-    if error is None or isinstance(error, Exception):
-        return error
-    return RuntimeError(f"{type(error).__name__}: {error}")  # a SystemExit, for example
 
 
 def versions() -> Versions:
@@ -171,8 +164,8 @@ class Workers(Executor):
     def submit(self, call: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
         """Return the future of a call in the worker that has the fewest calls."""
         for calls in self._calls:
-            calls -= {one for one in calls if one.done()}
-        n = min(range(self.num_workers), key=lambda one: len(self._calls[one]))
+            calls -= {future for future in calls if future.done()}
+        n = min(range(self.num_workers), key=lambda n: len(self._calls[n]))
         with _without_ctrl_c():
             for _ in range(TRIES):
                 with suppress(BrokenExecutor):

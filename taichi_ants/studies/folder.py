@@ -119,7 +119,7 @@ def ask(folder: Path, asked: Mapping[str, Any], inputs: Mapping[str, bytes], for
         return
     if before and not force:
         _check_grows(folder, before, asked)
-    elif not force and folder.is_dir() and any(p.name not in _OF_ALL for p in folder.iterdir()):
+    elif not force and folder.is_dir() and any(p.name not in _OF_ALL for p in folder.glob("[!.]*")):
         raise AntsError(
             f"{files.named(folder)} contains files, but no results; choose another --out, or give "
             "--force to add results to them."
@@ -140,7 +140,9 @@ def _check_grows(folder: Path, before: Mapping[str, Any], asked: Mapping[str, An
         for facts in (before, asked)
     )
     differ = [name for name in {**there, **here} if there.get(name) != here.get(name)]
-    words = (f"{n} is {shown(there.get(n))} instead of {shown(here.get(n))}" for n in differ)
+    words = (
+        f"{n} is {shown(there.get(n), 40)} instead of {shown(here.get(n), 40)}" for n in differ
+    )
     raise AntsError(
         f"{files.named(folder)} contains results that this study lacks ({', '.join(words)}); "
         "choose another --out, or give --force to replace them."

@@ -249,19 +249,14 @@ class ColonyPoint:
         arguments.check_learner(config, self.task, self.sharing)
         _check_policy(self.policy, self.episodes)
         rule = self.task.choice
-        if not rule.needs_table and (self.episodes or self.policy or self.after):
-            given = "a policy is given" if self.policy else f"episodes is {self.episodes}"
-            raise AntsError(
-                f"`task.choice.rule` is {rule.rule!r}, which needs no action values, but {given}; "
-                "set episodes = 0 and leave out policy."
-            )
+        for name in ("episodes", "policy", "after", "evaluation_epsilon"):
+            if not rule.needs_table and getattr(self, name) not in (None, 0):
+                raise AntsError(
+                    f"{name} has no effect if `task.choice.rule` is {rule.rule!r}, by which ants "
+                    "choose without action values; set episodes = 0, and leave out the others."
+                )
         if self.evaluation_epsilon is not None:
             arguments.checked_share("evaluation_epsilon", self.evaluation_epsilon)
-            if not rule.needs_table:
-                raise AntsError(
-                    f"evaluation_epsilon is {self.evaluation_epsilon}, but `task.choice.rule` is "
-                    f"{rule.rule!r}, with which ants do not explore; leave it out."
-                )
         without_training = self.after or self.policy or not rule.needs_table
         more = "" if without_training else "; 0 requires a policy"
         checked_whole("episodes", self.episodes, 0 if without_training else 1, otherwise=more)
@@ -471,8 +466,8 @@ def _changed(value: Any) -> Any:
     if isinstance(value, Mapping):  # in which the order of the names counts
         return [[name, _changed(entry)] for name, entry in value.items()]
     if hasattr(value, "__dataclass_fields__"):
-        pairs = ((getattr(value, one.name), one) for one in fields(value))
-        own = {one.name: setting for setting, one in pairs if setting != _default(one)}
+        pairs = ((getattr(value, each.name), each) for each in fields(value))
+        own = {each.name: setting for setting, each in pairs if setting != _default(each)}
         if isinstance(value, TrainingConfig):
             defaults = learners.get(value.learner).hyperparameters()
             more = {n: v for n, v in value.hyperparameters if v != getattr(defaults, n, None)}

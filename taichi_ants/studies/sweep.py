@@ -132,12 +132,12 @@ def sweep_of(file: Settings) -> Sweep:
     """Return the sweep of the contents of a file; AntsError if a setting is not allowed."""
     base, drawn = Base.of(file), Design.of(file)
     axes = tuple(axes_of(base.kind, table, base.fixed) for table in as_list(file.get("vary", [])))
-    check_entries(file, {name for one in axes for name in one})
+    check_entries(file, {name for names in axes for name in names})
     if not axes:
         raise AntsError("[vary] is missing; add it with lists of values of the settings that vary.")
     if drawn.sensitivity and len(axes) > 1:
         raise AntsError(f"sensitivity is for one [vary] table, but there are {len(axes)}.")
-    grids = [drawn.rows(one) for one in axes]
+    grids = [drawn.rows(of_table) for of_table in axes]
     rows, built = tuple(itertools.chain(*grids)), dict[str, Any]()
     points = tuple(base.point(row, built) for row in rows)
     ends = list(itertools.accumulate(map(len, grids), initial=0))

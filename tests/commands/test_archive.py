@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 from command_lines import ROOT, assert_one_sentence, assert_same_results, call, contents
 
+from taichi_ants import commands
 from taichi_ants.studies import archive
-from taichi_ants.studies.folder import asked_in, checksum_of, manifest_in, write_json
+from taichi_ants.studies.folder import asked_in, checksum_of, json_in, write_json
 
 PLUGIN = """
 from pathlib import Path
@@ -65,7 +66,7 @@ def study(tmp_path_factory):
             "archive": ["done", "--out", "done.zip"],
         }.items():
             with pytest.raises(SystemExit) as exit_:
-                __import__(f"taichi_ants.commands.{name}", fromlist=["main"]).main(arguments)
+                commands.run(name, arguments)
             assert exit_.value.code == 0
         for path in ("old", "my.toml", "ran"):
             shutil.rmtree(path) if Path(path).is_dir() else Path(path).unlink()
@@ -94,7 +95,7 @@ def test_an_archive_has_the_folder_and_all_that_repeats_the_study(here):
         lock = found.read("requirements.txt").decode()
     inputs = ("my.toml", "plugin/my_plugin.py", "plugin/ants_halved.py", "rule.npz", "garden.txt")
     assert {f"results/inputs/{name}" for name in inputs} <= {*own}
-    manifest = manifest_in(here / "done")
+    manifest = json_in(here / "done" / "manifest.json")
     assert {"taichi", "numpy", "kiwisolver", "taichi_ants"} <= manifest["packages"].keys()
     assert f"numpy=={manifest['packages']['numpy']}\n" in lock
     assert f"# Python {manifest['python']}\n" in lock
@@ -121,7 +122,7 @@ def test_an_archive_repeats_itself_without_the_files_that_the_study_read(here, c
     assert status == 0
     assert err.startswith("Running code of the archive: results/inputs/plugin/")
     *lines, verdict = out.splitlines()
-    names = sorted(manifest_in(here / "done")["files"])
+    names = sorted(json_in(here / "done" / "manifest.json")["files"])
     assert [line.split()[1] for line in lines] == names
     assert all(line.startswith("equal  ") for line in lines)
     assert verdict == f"All {len(names)} files are equal: the study is reproduced."
@@ -140,7 +141,7 @@ def copy(here):
 def rewrite(copy, name, change):
     """Change a file of results and its checksum."""
     (copy / name).write_text(change((copy / name).read_text()))
-    manifest = manifest_in(copy)
+    manifest = json_in(copy / "manifest.json")
     manifest["files"][name] = checksum_of(copy / name)
     write_json(copy / "manifest.json", manifest)
 

@@ -130,12 +130,12 @@ def test_unfinished_work_grows_too(sweep, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "change", "words"),
     [
-        (RUNS, ("episodes = 6", "episodes = 7"), "of other settings (episodes is 6 instead of 7)"),
+        (RUNS, ("episodes = 6", "episodes = 7"), "that this study lacks (episodes is 6 instead of 7)"),
         (RUNS, ("discount = 0.9\n", "discount = 0.8\n"), "discount is 0.9 instead of 0.8"),
-        (RUNS, ("[7, 2, 5, 1]", "[7, 2, 5]"), "that this study lacks (seed 1); add them"),
-        (RUNS, ("[0.01, 0.1, 0.2]", "[0.01, 0.1, 0.3]"), "lacks (training.learning_rate 0.2)"),
+        (RUNS, ("[7, 2, 5, 1]", "[7, 2, 5]"), "(seeds is [7, 2, 5, 1] instead of [7, 2, 5])"),
+        (RUNS, ("[0.01, 0.1, 0.2]", "[0.01, 0.1, 0.3]"), "training.learning_rate is [0.01, "),
         (RUNS, ("[training]", 'task.delivery = "truncates"\n[training]'), "task.delivery is "),
-        (DRAWN, ("samples = 8", "samples = 4"), "that this study lacks (training.learning_rate 0."),
+        (DRAWN, ("samples = 8", "samples = 4"), "that this study lacks (training.learning_rate is [0."),
         (DRAWN, ("samples = 8", "samples = 8\ndesign_seed = 3"), "design.design_seed is 0 instead"),
         (DRAWN, ('"sobol"', '"random"'), "design.design is 'sobol' instead of 'random'"),
     ],

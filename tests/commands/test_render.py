@@ -87,7 +87,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_training(
     monkeypatch.setattr(render, "find_policy", lambda *_: pytest.fail("it trains first"))
     (tmp_path / name).mkdir()
     with pytest.raises(SystemExit) as end:
-        render.main(["colony", "--out", str(tmp_path / name)])
+        commands.run("render", ["colony", "--out", str(tmp_path / name)])
     assert end.value.code == 2
     assert "is not a regular file; name a file to write to." in capsys.readouterr().err
 
@@ -96,7 +96,7 @@ def test_a_wrong_size_is_refused_before_the_training(tmp_path, monkeypatch) -> N
     monkeypatch.setattr(render, "find_policy", lambda *_: pytest.fail("it trains first"))
     wrong = ["episode", "--size", "63x63", "--out", str(tmp_path / "a.gif")]
     with pytest.raises(AntsError, match="64 and 4096"):
-        render.show(render.parse_arguments(wrong))
+        render.run(render.parse_arguments(wrong))
 
 
 @pytest.mark.parametrize("shown", ["episode", "colony"])

@@ -34,7 +34,7 @@ from taichi_ants.analysis import sweeps
 from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.studies.points import EVALUATION_SEEDS, RunPoint
-from taichi_ants.studies.sweep import read_sweep, sweep_of
+from taichi_ants.studies.sweep import plan, sweep_of
 from taichi_ants.task import foraging, observations, paper
 from taichi_ants.worlds import registry
 
@@ -320,7 +320,7 @@ def test_a_file_that_is_missing_is_named(capsys):
 
 def settings_of(text, tmp_path):
     (tmp_path / "a.toml").write_text(text)
-    return read_sweep(tmp_path / "a.toml").settings
+    return plan({"file": tmp_path / "a.toml"}).settings
 
 
 def test_several_grids_are_joined(tmp_path):
@@ -395,7 +395,7 @@ def test_what_findings_say(shift, margin, word, tmp_path):
         .replace("[0.1, 0.5, 1.0]", "0.1")
         .replace("[7, 2, 5]", "20")
     )
-    asked = read_sweep(tmp_path / "a.toml")
+    asked = plan({"file": tmp_path / "a.toml"})
     noise = np.random.default_rng(0).normal(size=(2, 20))
     noise -= noise.mean(axis=1, keepdims=True)
     found = asked.findings(noise + [[shift], [0.0]])
@@ -419,7 +419,7 @@ def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatc
     worlds.register("line", line)
     text = RUNS.replace("[vary]", '[world]\npreset = "line"\n[vary]\nworld.length = [4, 6]')
     (tmp_path / "a.toml").write_text(text)
-    points = read_sweep(tmp_path / "a.toml").study.points
+    points = plan({"file": tmp_path / "a.toml"}).study.points
     assert {point.world for point in points} == {line(0, 4), line(0, 6)}
 
 
@@ -427,7 +427,7 @@ def test_traffic_has_names_and_learners_first_values(tmp_path):
     grid = '[vary]\ntask.traffic = ["blocking", "following"]\ntraining.initial_q = [0, 10]\n'
     more = "learning_rate = 0.1\nepsilon = 0.3\n"
     (tmp_path / "a.toml").write_text(RUNS[: RUNS.index("[vary]")] + more + grid)
-    points = read_sweep(tmp_path / "a.toml").study.points
+    points = plan({"file": tmp_path / "a.toml"}).study.points
     found = [(point.task.traffic.follow, point.training.initial_q) for point in points]
     assert found == [(False, 0), (False, 10), (True, 0), (True, 10)]
 
@@ -438,7 +438,7 @@ def test_a_sweep_begins_with_a_preset_of_the_task(sweep):
         f'{text}"task.preset" = ["paper", "foraging"]\n[task]\nrewards.deliver = 70\n'
     )
     changes = {"rewards": {"deliver": 70}}
-    found = [point.task for point in read_sweep(Path("a.toml")).study.points]
+    found = [point.task for point in plan({"file": Path("a.toml")}).study.points]
     assert found == [paper().replace(**changes), foraging().replace(**changes)]
 
 
@@ -465,7 +465,7 @@ def test_lone_ants_follow_policies_without_learning(sweep):
 
 @pytest.mark.parametrize("name", ["crowds", "learning_rates", "observations", "trails"])
 def test_the_examples_can_be_read(name):
-    assert len(read_sweep(EXPERIMENTS / "sweeps" / f"{name}.toml").settings) > 4
+    assert len(plan({"file": EXPERIMENTS / "sweeps" / f"{name}.toml"}).settings) > 4
 
 
 def test_help_is_quick_and_needs_no_taichi(tmp_path):
@@ -497,7 +497,7 @@ def test_the_script_of_observations_takes_the_options_of_a_sweep(tmp_path):
 
 
 def test_what_observations_gain_is_asked_of_all_of_them():
-    asked = read_sweep(EXPERIMENTS / "sweeps" / "observations.toml")
+    asked = plan({"file": EXPERIMENTS / "sweeps" / "observations.toml"})
     for grid in asked.grids:
         seen = {one["task.observation"] for one in asked.settings[grid]}
         assert seen == set(observations.names())
@@ -528,7 +528,7 @@ def test_a_protocol_is_part_of_the_points_of_a_sweep(sweep, tmp_path):
     assert (status, err) == (0, "")
     rows = read_csv("results/sweep-my/runs.csv")
     assert [row["at.1.remove_ants"] for row in rows] == ["0.0", "0.0", "0.5", "0.5"]
-    point = read_sweep(Path("my.toml")).study.points[1]
+    point = plan({"file": Path("my.toml")}).study.points[1]
     assert point.during == "both"
     assert point.runs_of_a_block == 1  # because epsilon belongs to all worlds of a colony
     for seed in (0, 1):
@@ -610,7 +610,7 @@ WRONG_EVENTS = {
 def test_events_that_can_succeed_are_not_refused(old, new, tmp_path):
     assert old in PROTOCOL
     (tmp_path / "my.toml").write_text(PROTOCOL.replace(old, new))
-    assert len(read_sweep(tmp_path / "my.toml").study.points) > 1
+    assert len(plan({"file": tmp_path / "my.toml"}).study.points) > 1
 
 
 def test_ranges_of_events_are_checked_and_whole(tmp_path):
@@ -618,13 +618,13 @@ def test_ranges_of_events_are_checked_and_whole(tmp_path):
     text = PROTOCOL.replace("tick = 20\n", "").replace("at.1.remove_ants = [0.0, 0.5]", ranges)
     text = 'design = "latin_hypercube"\nsamples = 4\n' + text
     (tmp_path / "my.toml").write_text(text)
-    events = [one.protocol[0] for one in read_sweep(tmp_path / "my.toml").study.points]
+    events = [one.protocol[0] for one in plan({"file": tmp_path / "my.toml"}).study.points]
     assert len({event.tick for event in events}) == 4
     assert all(type(level) is int for event in events for _, level in event.task.values)
     for end, said in (("from = -5", "`at.1.tick` is -5; it must be"), ("from = 5.5", "whole")):
         (tmp_path / "my.toml").write_text(text.replace("from = 5", end, 1))
         with pytest.raises(AntsError, match=said):
-            read_sweep(tmp_path / "my.toml")
+            plan({"file": tmp_path / "my.toml"})
 
 
 def test_ranges_of_entries_of_groups_are_checked_and_whole(tmp_path):
@@ -632,23 +632,23 @@ def test_ranges_of_entries_of_groups_are_checked_and_whole(tmp_path):
     text = text.replace("[training]", '[task.fields.home]\ndeposited_when = "always"\n\n[training]')
     text = 'design = "random"\nsamples = 4\n' + text
     (tmp_path / "my.toml").write_text(text.replace("R", "from = 5, to = 50"))
-    points = read_sweep(tmp_path / "my.toml").study.points
+    points = plan({"file": tmp_path / "my.toml"}).study.points
     levels = {one.task.fields["home"].level for one in points}
     assert len(levels) > 1
     assert all(type(level) is int for level in levels)
     (tmp_path / "my.toml").write_text(text.replace("R", "from = 0, to = 50"))
     with pytest.raises(AntsError, match=r"`task\.fields\.home\.level` is 0; it must be between 1"):
-        read_sweep(tmp_path / "my.toml")
+        plan({"file": tmp_path / "my.toml"})
 
 
 def test_births_leave_room_for_more_ants_than_start(tmp_path):
     text = PROTOCOL.replace("remove_ants = [0.0, 0.5]", "add_ants.number = [0, 65]")
     text = text.replace("capacity = 12\n", "").replace("life.regrowth = 0", "life.births = true")
     (tmp_path / "my.toml").write_text(text)
-    assert len(read_sweep(tmp_path / "my.toml").study.points) == 6
+    assert len(plan({"file": tmp_path / "my.toml"}).study.points) == 6
     (tmp_path / "my.toml").write_text(text.replace("65]", "66]"))
     with pytest.raises(AntsError, match=r"makes 69 ants .* leave room for 68, because the capac"):
-        read_sweep(tmp_path / "my.toml")
+        plan({"file": tmp_path / "my.toml"})
 
 
 @pytest.mark.parametrize("name", WRONG_EVENTS)

@@ -25,7 +25,7 @@ from taichi_ants import (
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.measures import registry
 from taichi_ants.studies.points import EVALUATION_SEEDS
-from taichi_ants.studies.sweep import read_sweep, sweep_of
+from taichi_ants.studies.sweep import plan, sweep_of
 from taichi_ants.task import Pheromone, Task
 
 FILE = """
@@ -181,11 +181,11 @@ def test_parameters_of_a_rule_vary_without_a_table(sweep, monkeypatch):
     text = FILE.replace("[vary]", '[task]\npheromone.evaporation = "weaker"\n\n[vary]')
     text += "task.rules.weaker.rate = [0.1, 0.5]\n"
     Path("my.toml").write_text(text)
-    rates = [one.task.rules["weaker"].rate for one in read_sweep(Path("my.toml")).study.points]
+    rates = [one.task.rules["weaker"].rate for one in plan({"file": Path("my.toml")}).study.points]
     assert set(rates) == {0.1, 0.5}
     Path("my.toml").write_text(text.replace("rules.weaker", "rules.weakr"))
     with pytest.raises(AntsError, match=r"no table \[task\.rules\.weakr\]; choose weaker, or add"):
-        read_sweep(Path("my.toml"))
+        plan({"file": Path("my.toml")})
 
 
 def weaker(level, rate=0.2):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from taichi_ants import files
 from taichi_ants.errors import AntsError
 from taichi_ants.studies.design import Choices, Design, Range
-from taichi_ants.studies.sweep import read_sweep, sweep_of
+from taichi_ants.studies.sweep import plan, sweep_of
 
 SHARES = st.floats(0, 1)
 AXES = {
@@ -118,14 +118,14 @@ def test_points_of_saltelli_differ_in_one_setting():
 def test_the_points_of_a_file_are_built_from_drawn_values(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(COLONY, "utf-8")
-    sweep = read_sweep(path)
+    sweep = plan({"file": path})
     assert len(sweep.settings) == len(set(sweep.study.points)) == 8
     for row, point in zip(sweep.settings, sweep.study.points, strict=True):
         assert point.task.pheromone.half_life == row["task.pheromone.half_life"]
         assert point.task.noise.slip == row["task.noise.slip"]
     assert sweep.facts()["design"] == {"design": "sobol", "design_seed": 0}
     path.write_text(COLONY.replace('"sobol"', '"latin_hypercube"'), "utf-8")
-    assert read_sweep(path).facts()["design"]["samples"] == 8
+    assert plan({"file": path}).facts()["design"]["samples"] == 8
 
 
 def test_declared_whole_numbers_need_no_key():

@@ -9,10 +9,13 @@ import runpy
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from taichi_ants import commands
 
 ROOT = Path(__file__).resolve().parents[2]
 EXPERIMENTS = ROOT / "experiments"
@@ -90,7 +93,8 @@ def call(name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[s
     """Return exit status, standard output and standard error of a command run in this process."""
     capsys.readouterr()
     with pytest.raises(SystemExit) as exit_:
-        load(name).main([str(argument) for argument in arguments])
+        main = load(name).main if name in STUDIES else partial(commands.run, name)
+        main([str(argument) for argument in arguments])
     written = capsys.readouterr()
     return exit_.value.code, written.out, written.err
 
