@@ -76,9 +76,8 @@ class Parser(argparse.ArgumentParser):
         words = sys.argv[1:] if args is None else list(args)
         for before, word in zip(["", *words], words, strict=False):
             if word == "" or (word.startswith("--") and word.endswith("=")):
-                self.error(
-                    f"{word[:-1] or f'the argument after {before!r}'} is empty; give a value or leave it out"
-                )
+                name = word[:-1] or f"the argument after {before!r}"
+                self.error(f"{name} is empty; give a value or leave it out")
             self._add_setting(word.partition("=")[0])
         return super().parse_known_args(words, namespace)
 

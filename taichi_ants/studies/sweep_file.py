@@ -60,7 +60,7 @@ class Base(NamedTuple):
     @classmethod
     def of(cls, file: Settings) -> Base:
         """Return the part of a file; AntsError if a key or value is not allowed."""
-        kind: Any = file.get("kind", "missing")
+        kind: Any = file.get("kind")
         check_one_of("kind", kind, tuple(KINDS))
         wanted = as_list(file.get("measures", []))
         if not wanted:

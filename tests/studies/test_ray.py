@@ -71,7 +71,7 @@ def test_an_address_where_nobody_listens_is_refused_in_seconds(sweep):
     assert time.monotonic() - began < promptly()
     assert status == 2
     assert_one_sentence(err)
-    assert f"no Ray cluster listens at {address!r} (Connection refused); give the address" in err
+    assert f"no Ray cluster listens at {address!r} (Connection refused); give HOST:PORT" in err
 
 
 def test_ray_is_an_extra(monkeypatch, sweep):

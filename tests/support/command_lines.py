@@ -92,8 +92,8 @@ Outcome = tuple[int, str, str]
 def call(name: str, arguments: Sequence[object], capsys: pytest.CaptureFixture[str]) -> Outcome:
     """Return exit status, standard output and standard error of a command run in this process."""
     capsys.readouterr()
+    main = load(name).main if name in STUDIES else partial(commands.run, name)
     with pytest.raises(SystemExit) as exit_:
-        main = load(name).main if name in STUDIES else partial(commands.run, name)
         main([str(argument) for argument in arguments])
     written = capsys.readouterr()
     return exit_.value.code, written.out, written.err

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 import taichi_ants
-from taichi_ants import Colony, TrainingConfig, World, rollout, worlds
-from taichi_ants import commands
+from taichi_ants import Colony, TrainingConfig, World, commands, rollout, worlds
 from taichi_ants.learners.policies import save_policy, trail_follower
 from taichi_ants.rendering import Episode, colours
 from taichi_ants.task import Caste, Food, Task
