@@ -10,7 +10,6 @@ import codecs
 import csv
 import errno
 import hashlib
-import io
 import json
 import math
 import os
@@ -161,21 +160,6 @@ def read_text(path: PathLike, most: int = 1 << 26) -> str:
         raise AntsError(f"{named(path)} is not UTF-8 text; name another file.") from error
 
 
-def read_csv(path: PathLike) -> list[dict[str, Any]]:
-    """Return the rows of a file that `write_csv` wrote, with empty fields as None.
-
-    Numbers are floats, except that whole ones above 2^53 are integers.
-    """
-    try:
-        header, *lines = csv.reader(io.StringIO(read_text(path, 1 << 30)))
-        rows = [zip(header, line, strict=True) for line in lines if line]
-        return [{name: _number_in(text) for name, text in row} for row in rows]
-    except (csv.Error, ValueError) as error:
-        if isinstance(error, AntsError):
-            raise
-        raise AntsError(f"{named(path)} is not a table (CSV); name another file.") from error
-
-
 def small(array: np.ndarray) -> np.ndarray:
     """Return integers as the smallest signed type that holds them.
 
@@ -238,12 +222,3 @@ def named(path: PathLike) -> str:
 def _reason(error: Exception) -> str:
     text = getattr(error, "strerror", None) or str(error) or type(error).__name__
     return text[:1].lower() + text[1:]
-
-
-def _number_in(text: str) -> float | str | None:
-    try:
-        number = float(text)
-    except ValueError:
-        return text or None
-    # Such whole numbers, for example seeds, can differ although they are equal as floats.
-    return int(text) if abs(number) > 1 << 53 and text.lstrip("-").isdigit() else number

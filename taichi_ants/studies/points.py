@@ -267,10 +267,7 @@ class ColonyPoint:
         check_one_of("during", self.during, DURING)
         self._check_protocol()
         if self.after and (self.after.sharing != "shared" or not self.after.episodes):
-            raise AntsError(
-                "`after` has no shared table; it must be a point with sharing='shared' and at "
-                "least one episode."
-            )
+            raise AntsError("`after` has no shared table; set its sharing='shared' and episodes.")
 
     def _check_protocol(self) -> None:
         """Raise an AntsError, which names the event, if it can never happen as it should."""
@@ -340,24 +337,9 @@ class ColonyPoint:
         ticks = self.ticks * (self.episodes + self.rollouts)
         return (self.ants + cells) * ticks / _TICKS_OF_A_SECOND
 
-    @property
-    def exploration(self) -> float:
-        """The exploration rate of the evaluation."""
-        if self.evaluation_epsilon is not None:
-            return self.evaluation_epsilon
-        return 0.0 if self.policy else self.training.least_epsilon
-
     def events(self, learns: bool) -> tuple[ProtocolEvent, ...]:
         """Return the events of episodes of training or, if not `learns`, of the evaluation."""
         return self.protocol if self.during in ("both", DURING[learns]) else ()
-
-    def places(self, seeds: Sequence[int]) -> list[list[World]] | None:
-        """Return the world of each training episode and seed; None without a pool."""
-        if self.pool is None:
-            return None
-        streams = [np.random.default_rng(seed % 2**64) for seed in seeds]
-        draws = [stream.integers(len(self.pool), size=self.episodes) for stream in streams]
-        return [[self.pool[n] for n in of_episode] for of_episode in np.transpose(draws)]
 
     def colony(
         self, world: Any, seeds: Sequence[int], q_values: Any, learns: bool, **options: Any
@@ -371,12 +353,13 @@ class ColonyPoint:
         training: TrainingConfig | None = self.training
         if not learns:
             seeds = [seed + EVALUATION_SEEDS for seed in seeds]
-            training = TrainingConfig.frozen(self.exploration)
+            least = 0.0 if self.policy else self.training.least_epsilon
+            epsilon = least if self.evaluation_epsilon is None else self.evaluation_epsilon
+            training = TrainingConfig.frozen(epsilon)
         if not self.task.choice.needs_table:
             training = None
-        sharing = self.sharing if learns else "frozen"
         options |= {"ants": self.ants, "capacity": self.capacity, "start": self.start}
-        options |= {"sharing": sharing, "q_values": q_values}
+        options |= {"sharing": self.sharing if learns else "frozen", "q_values": q_values}
         return Colony(world, self.task, training, seeds, **options)
 
     @staticmethod
@@ -393,10 +376,12 @@ class ColonyPoint:
         """
         (point,) = points
         share = point.episodes / (point.episodes + point.rollouts)
-        tables = point.tables(seeds, learned, part_of(progress, 0.0, share), where)
+        tables = point.tables(seeds, learned, lambda done: progress(share * done), where)
         colony = point.colony(point.worlds(seeds), seeds, tables, False, **where)
         episodes = colony.run(
-            *(point.rollouts, point.ticks, part_of(progress, share, 1 - share)),
+            point.rollouts,
+            point.ticks,
+            lambda done: progress(share + (1 - share) * done),
             measures=point.measures,
             every=point.measure_every,
             protocol=point.events(learns=False),
@@ -423,11 +408,14 @@ class ColonyPoint:
         """
         if not self.episodes:
             return self.policy.q_values if self.policy else learned
-        places = self.places(seeds)
-        first = places[0] if places else self.worlds(seeds)
+        worlds, protocol = None, self.events(learns=True)
+        if self.pool is not None:  # a world for each episode and seed
+            streams = [np.random.default_rng(seed % 2**64) for seed in seeds]
+            draws = [stream.integers(len(self.pool), size=self.episodes) for stream in streams]
+            worlds = [[self.pool[n] for n in of_episode] for of_episode in np.transpose(draws)]
+        first = worlds[0] if worlds else self.worlds(seeds)
         learning = self.colony(first, seeds, learned, True, **where)
-        protocol = self.events(learns=True)
-        learning.run(self.episodes, self.ticks, progress, places, protocol=protocol)
+        learning.run(self.episodes, self.ticks, progress, worlds, protocol=protocol)
         return learning.q_values
 
     def worlds(self, seeds: Sequence[int]) -> Any:
@@ -563,7 +551,3 @@ def world_facts(world: World) -> dict[str, Any]:
 def chain(point: Any) -> list[Any]:
     """Return a point after the one that is its `after`, and so on."""
     return [*chain(point.after), point] if point.after is not None else [point]
-
-
-def part_of(progress: Progress, begin: float, share: float) -> Progress:
-    return lambda done: progress(begin + share * done)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 
@@ -13,6 +12,7 @@ from command_lines import (
     assert_one_sentence,
     call,
     contents,
+    read_csv,
 )
 
 from taichi_ants import (
@@ -96,11 +96,6 @@ def sweep(tmp_path, capsys, monkeypatch):
         return call("sweep", ["my.toml", *more], capsys)
 
     return called
-
-
-def read_csv(path):
-    with open(path, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 # Deliveries are reported beside returns.

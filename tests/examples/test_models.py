@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from command_lines import ROOT, run
+from command_lines import ROOT, numbers_in, run
 
-from taichi_ants import files
 from taichi_ants.rules import registry
 
 MODELS = ROOT / "experiments" / "models"
@@ -25,7 +24,7 @@ def rows_of(name: str, seeds: int, folder, monkeypatch) -> list[dict[str, Any]]:
         runpy.run_path(str(MODELS / f"{name}.py"), run_name="__main__")
     assert ended.value.code == 0
     assert (folder / f"{name}.png").stat().st_size > 10_000
-    return files.read_csv(folder / f"{name}.csv")
+    return numbers_in(folder / f"{name}.csv")
 
 
 @pytest.mark.slow
@@ -55,7 +54,7 @@ def test_two_nests(tmp_path, monkeypatch):
 def test_a_no_entry_pheromone(kernels: Path, tmp_path: Path) -> None:
     done = run("models/no_entry", ["--seeds", 2, "--out", tmp_path], kernels, tmp_path)
     assert done.returncode == 0, done.stderr
-    rows = files.read_csv(tmp_path / "no_entry.csv")
+    rows = numbers_in(tmp_path / "no_entry.csv")
     assert len(rows) == 2 * 4 * 2 * 30
     last = [row["delivered"] for row in rows if row["tick"] == 3000]
     assert min(last) > 0

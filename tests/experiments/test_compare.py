@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import re
 import shutil
@@ -22,6 +21,7 @@ from command_lines import (
     contents,
     load,
     promptly,
+    read_csv,
     run,
     start,
 )
@@ -121,11 +121,6 @@ def compare(capsys, monkeypatch):
     """Calls the script within this process, without a worker process, which `finished` has."""
     monkeypatch.setattr(process, "available_threads", lambda: 1)
     return lambda *arguments: call("compare", arguments, capsys)
-
-
-def read_csv(path):
-    with open(path, newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
 
 
 def config_of(row):

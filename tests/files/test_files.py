@@ -231,23 +231,6 @@ def test_csv_reads_back(tmp_path: Path) -> None:
     assert [float(row["b"]) for row in read] == [0.1 + 0.2, 1e-300, float(np.float32(0.1)), 2]
 
 
-def test_what_csv_holds_is_read_as_numbers_and_text(tmp_path: Path) -> None:
-    rows = [{"a": 0.1 + 0.2, "b": "x, y"}, {"a": 3, "b": None}, {"a": float("nan"), "b": "-"}]
-    files.write_csv(tmp_path / "a.csv", rows, ["a", "b"])
-    read = files.read_csv(tmp_path / "a.csv")
-    expected = [{"a": 0.1 + 0.2, "b": "x, y"}, {"a": 3.0, "b": None}, {"a": None, "b": "-"}]
-    assert read == expected
-    with pytest.raises(AntsError, match=r"cannot read '.*none\.csv'"):
-        files.read_csv(tmp_path / "none.csv")
-
-
-@pytest.mark.parametrize("text", ["", "a,b\n1\n", "a,b\n1,2,3\n", 'a\n"' + "x" * 200_000 + '"\n'])
-def test_a_file_that_is_not_a_table_is_named(text: str, tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(AntsError, match=r"a\.csv' is not a table \(CSV\); name another file\."):
-        files.read_csv(tmp_path / "a.csv")
-
-
 # Reading.
 
 
@@ -323,11 +306,3 @@ def test_no_permission_is_told_before_the_work(check, tmp_path: Path, below: str
     with without_privileges(), pytest.raises(AntsError, match="ermission denied"):
         check(locked / below)
     assert names(locked) == []
-
-
-def test_large_whole_numbers_of_a_table_stay_different(tmp_path):
-    numbers = [2**60 + 1, 2**60 + 2, -(2**60) - 1, 2**53, 7]
-    files.write_csv(tmp_path / "a.csv", [{"seed": one} for one in numbers], ["seed"])
-    read = [row["seed"] for row in files.read_csv(tmp_path / "a.csv")]
-    assert read == numbers
-    assert [type(one) for one in read] == [int, int, int, float, float]

@@ -8,9 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from command_lines import ROOT
-
-from taichi_ants import files
+from command_lines import ROOT, numbers_in
 
 
 @pytest.mark.slow
@@ -21,7 +19,7 @@ def test_thresholds_divide_labour(tmp_path, capsys, monkeypatch):
     with pytest.raises(SystemExit) as ended:
         runpy.run_path(str(script), run_name="__main__")
     assert ended.value.code == 0
-    rows = files.read_csv(tmp_path / "division_of_labour.csv")
+    rows = numbers_in(tmp_path / "division_of_labour.csv")
     assert len(rows) == 4 * 3 * 80
     late = {demand: [] for demand in (0.25, 0.5, 1, 2)}
     for row in rows:

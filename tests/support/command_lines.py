@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib
 import json
 import os
@@ -12,6 +13,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -110,6 +112,24 @@ def call_script(
             runpy.run_path(str(EXPERIMENTS / f"{name}.py"), run_name="__main__")
     written = capsys.readouterr()
     return exit_.value.code, written.out, written.err
+
+
+def read_csv(path: Path | str) -> list[dict[str, str]]:
+    """Return the rows of a CSV file."""
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def numbers_in(path: Path | str) -> list[dict[str, Any]]:
+    """Return the rows of a CSV file, with numbers as floats, and empty fields as None."""
+
+    def value(text: str) -> Any:
+        try:
+            return float(text)
+        except ValueError:
+            return text or None
+
+    return [{name: value(text) for name, text in row.items()} for row in read_csv(path)]
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -17,7 +17,6 @@ from taichi_ants import (
     Task,
     TrainingConfig,
     TrainingResult,
-    files,
     load_policy,
     save_policy,
     worlds,
@@ -80,7 +79,6 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
         "manifest": of("manifest.json", lambda path: json_in(path)),
         "map": of("map.txt", worlds.load_map)._replace(checked=False),
         "sweep": of("sweep.toml", _sweep)._replace(checked=False),
-        "table of others": of("other.csv", files.read_csv)._replace(checked=False),
     }
     save_policy(found["policy"].path, Q_VALUES, {"seed": 3})
     facts = {"kind": "policy", "version": 2, "observation": "paper", "metadata": {"seed": 3}}
@@ -92,7 +90,6 @@ def small_files(folder: Path) -> dict[str, SmallFile]:
     colony.save(found["colony"].path)
     Session(Setup("paper", TASK, SARSA, ants=2)).save(found["session"].path)
     write_json(folder / "manifest.json", {"seconds": 2.0, "files": {}})
-    files.write_csv(found["table of others"].path, [{"a": 1.5, "b": None}], ("a", "b"))
     found["map"].path.write_text(MAP)
     found["sweep"].path.write_text(SWEEP)
     return found
