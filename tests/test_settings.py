@@ -25,6 +25,7 @@ from taichi_ants.settings import (
     all_of,
     declared,
     named_groups,
+    nested,
 )
 from taichi_ants.task import Caste, Field, Pheromone, Task, Threshold, Traffic
 from taichi_ants.worlds import double_bridge, open_world
@@ -138,6 +139,14 @@ def test_what_depends_on_another_setting():
     assert Soup("thick").flour == 20
     assert replace(Soup("thick", 7), salt=5) == Soup("thick", 7, 5)
     assert Soup("thick", 7).replace(kind="thin") == Soup()
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_group_and_its_settings_are_nested_in_any_order(order):
+    named = {"kitchen.soup": "thick", "kitchen.soup.flour": 5}
+    assert nested(dict([*named.items()][::order])) == {
+        "kitchen": {"soup": {"": "thick", "flour": 5}}
+    }
 
 
 @dataclass(frozen=True)
