@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import cache, partial
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_args
@@ -240,18 +240,15 @@ class Task(Settings, path="task"):
                     f"the rule {name!r} reads `{needs[0]}`; set `task.labour.rule` to 'thresholds'."
                 )
 
-    def _changed(self, changes: Mapping[str, Any]) -> Task:
-        # Rules that are no longer used lose their parameters.
-        if not self.rules and "rules" not in changes:
-            return super()._changed(changes)
+    def replace(self, /, **changes: Any) -> Task:
+        """Return the task with changes; rules that it no longer uses lose their parameters."""
         bare = copy.copy(self)
         object.__setattr__(bare, "rules", Named())
-        others = {name: value for name, value in changes.items() if name != "rules"}
-        task = super(Task, bare)._changed(others)
+        parameters = changes.pop("rules", {})
+        task = super(Task, bare).replace(**changes)
         kept = {name: self.rules.get(name, default) for name, default in task.rules.items()}
-        return super(Task, replace(task, rules=Named(kept)))._changed(
-            {"rules": changes["rules"]} if "rules" in changes else {}
-        )
+        object.__setattr__(task, "rules", Named(kept))
+        return task if parameters == {} else super(Task, task).replace(rules=parameters)
 
     @property
     def has_loads(self) -> bool:
