@@ -26,7 +26,7 @@ from taichi_ants.settings import (
     declared,
     named_groups,
 )
-from taichi_ants.task import Caste, Field, Pheromone, Task, Threshold, Traffic
+from taichi_ants.task import Field, Pheromone, Task, Threshold, Traffic
 from taichi_ants.worlds import double_bridge, open_world
 
 KINDS = (Task, TrainingConfig, open_world, double_bridge)
