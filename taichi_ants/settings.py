@@ -271,6 +271,14 @@ class Settings:
 
     def __post_init__(self) -> None:
         self.check()
+        for fault in self.faults():
+            raise AntsError(fault)
+
+    def __repr__(self) -> str:
+        """Return the settings that differ from their defaults; for classes with `repr=False`."""
+        values = [(setting, getattr(self, setting.name)) for setting in declared(type(self))]
+        changed = [f"{s.name}={value!r}" for s, value in values if value != s.default]
+        return f"{type(self).__name__}({', '.join(changed)})"
 
     @classmethod
     def named(cls) -> Mapping[str, Any]:
@@ -294,6 +302,10 @@ class Settings:
         for setting in declared(type(self)):
             if setting.rule.only is not None:
                 self._fill_or_refuse(setting)
+
+    def faults(self) -> Iterator[str]:
+        """Yield messages about combinations of values that are not allowed."""
+        yield from ()
 
     def _fill_or_refuse(self, setting: DeclaredSetting) -> None:
         """Refuse a setting that has no effect; replace None by the usual value if it has one."""

@@ -48,7 +48,7 @@ WRONG = {
 def wrong_values(one: DeclaredSetting) -> list:
     """Values that are not allowed."""
     if one.is_group:
-        return ["no such name", 3, {}]
+        return ["no such name", [3], {}]
     rule, wrong = one.rule, list(WRONG[one.kind])
     if one.is_text:
         wrong.remove("no such word")

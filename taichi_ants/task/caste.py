@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
 from typing import Annotated, Any, Literal, get_args
@@ -44,18 +44,22 @@ class Threshold(Settings, path="task.castes.NAME.threshold"):
         Setting(least=0, most=1e6, usual=1.0, only=("distribution", *DISTRIBUTIONS[2:])),
     ] = None
 
-    def __post_init__(self) -> None:
-        self.check()
-        if self.distribution == "uniform" and self.spread > self.value:  # type: ignore[operator]
-            raise AntsError(
-                f"`{self.path}.spread` is {self.spread}; it must be at most the value, "
-                f"{self.value}, because thresholds cannot be negative."
+    def faults(self) -> Iterator[str]:
+        """Yield messages about combinations of values that are not allowed."""
+        value, spread = self.value or 0.0, self.spread or 0.0
+        if self.distribution == "uniform" and spread > value:
+            yield (
+                f"`{self.path}.spread` is {spread}; it must be at most the value, {value}, because "
+                "thresholds cannot be negative."
             )
-        if self.distribution == "lognormal" and self.spread > 20:  # type: ignore[operator]
-            raise AntsError(
-                f"`{self.path}.spread` is {self.spread}; it must be between 0 and 20 for "
-                "'lognormal'."
-            )
+        if self.distribution == "lognormal" and spread > 20:
+            yield f"`{self.path}.spread` is {spread}; it must be between 0 and 20 for 'lognormal'."
+
+    @classmethod
+    def converted(cls, value: Any) -> Any:
+        """Return the threshold that a number or the name of a distribution stands for."""
+        is_number = isinstance(value, Real) and not is_flag(value)
+        return cls("fixed", value) if is_number else super().converted(value)
 
     @classmethod
     def named(cls) -> Mapping[str, Threshold]:
@@ -80,8 +84,8 @@ class Caste(Settings, path="task.castes.NAME"):
     Ants of a caste share a table of action values, and can have their own numbers. None means that
     they have those of the task, or of the training. A caste has a `share` of the ants of each nest,
     or a number of `ants`; castes without both divide the remaining share equally. With a `policy`,
-    the ants of the caste follow it and do not learn. `lays` can also be a list of names, and
-    `threshold` a number, which is a fixed threshold.
+    the ants of the caste follow it and do not learn. `threshold` can also be a number, which is a
+    fixed threshold.
     """
 
     most_entries = MAX_CASTES
@@ -146,38 +150,18 @@ class Caste(Settings, path="task.castes.NAME"):
         default_factory=Threshold
     )
 
-    def __post_init__(self) -> None:
-        lays: Any = self.lays
-        if isinstance(lays, (list, tuple)) and all(isinstance(name, str) for name in lays):
-            object.__setattr__(self, "lays", ",".join(lays) or NOTHING)
-        value: Any = self.threshold
-        if isinstance(value, Real) and not is_flag(value):
-            object.__setattr__(self, "threshold", Threshold("fixed", value))  # type: ignore[arg-type]
-        self.check()
+    def faults(self) -> Iterator[str]:
+        """Yield messages about combinations of values that are not allowed."""
+        path, spread, epsilon = self.path, self.epsilon_spread, self.epsilon
         if self.share is not None and self.ants is not None:
-            raise AntsError(
-                f"`{self.path}.ants` is {self.ants}, but `share` is {self.share}; give one of them."
+            yield f"`{path}.ants` is {self.ants}, but `share` is {self.share}; give one of them."
+        if spread is not None and epsilon is None:
+            yield f"`{path}.epsilon_spread` is {spread}, but `epsilon` is off; set it, too."
+        if spread is not None and epsilon is not None and spread > min(epsilon, 1 - epsilon):
+            yield (
+                f"`{path}.epsilon_spread` is {spread}; with `epsilon` {epsilon} it must be at most "
+                f"{min(epsilon, 1 - epsilon):g}, because rates lie between 0 and 1."
             )
-        if self.epsilon_spread is not None:
-            self._check_spread(self.epsilon_spread)
-
-    def _check_spread(self, spread: float) -> None:
-        if self.epsilon is None:
-            raise AntsError(
-                f"`{self.path}.epsilon_spread` is {spread}, but `epsilon` is off; set it, too."
-            )
-        if spread > min(self.epsilon, 1 - self.epsilon):
-            raise AntsError(
-                f"`{self.path}.epsilon_spread` is {spread}; with `epsilon` {self.epsilon} it must "
-                f"be at most {min(self.epsilon, 1 - self.epsilon):g}, because rates lie between 0 "
-                "and 1."
-            )
-
-    def __repr__(self) -> str:
-        """Return the settings that differ from their defaults."""
-        defaults, values = vars(Caste()), vars(self)
-        changed = [f"{name}={values[name]!r}" for name in values if values[name] != defaults[name]]
-        return f"Caste({', '.join(changed)})"
 
     @property
     def fixed(self) -> tuple[Any, ...]:
