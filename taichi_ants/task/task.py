@@ -17,9 +17,8 @@ from taichi_ants.settings import Named, Setting, Settings
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
-from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.task.field import COMPASS, TRAIL, Field
-from taichi_ants.task.food import Food
+from taichi_ants.task.food import Food, Ticks
 from taichi_ants.task.labour import Labour
 from taichi_ants.task.observations import Observation
 from taichi_ants.task.pheromone import Pheromone
@@ -28,7 +27,6 @@ from taichi_ants.task.rewards import Rewards
 Delivery = Literal["terminates", "truncates"]
 DELIVERIES: tuple[str, ...] = get_args(Delivery)
 _CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not pheromones
-Ticks = Annotated[int | None, Setting(unit="ticks", least=1, most=MAX_STEPS)]
 
 
 @dataclass(frozen=True)
