@@ -18,22 +18,18 @@ import ast
 import inspect
 import math
 from collections.abc import Callable, Iterator, Mapping
+from functools import reduce
 from textwrap import dedent
 from typing import Any, NoReturn
 
 # Numbers of arguments; the first argument of `pick` is a vector.
 FUNCTIONS = {"exp": 1, "log": 1, "power": 2, "pick": 2, "min": 2, "max": 2, "abs": 1}
 _MOST_REPEATS = 256  # of the body of the innermost loop
-_OPERATORS = {ast.Add: "{} + {}", ast.Sub: "{} - {}", ast.Mult: "{} * {}", ast.Div: "{} / {}"}
-_OPERATORS |= {ast.FloorDiv: "ti.floor({} / {})", ast.Mod: "modulo({}, {})"}
-_COMPARISONS = {
-    ast.Lt: "<",
-    ast.LtE: "<=",
-    ast.Gt: ">",
-    ast.GtE: ">=",
-    ast.Eq: "==",
-    ast.NotEq: "!=",
-}
+_OPERATORS: dict[type, str] = {ast.Add: "{} + {}", ast.Sub: "{} - {}", ast.Mult: "{} * {}"}
+_OPERATORS |= {ast.Div: "{} / {}", ast.FloorDiv: "ti.floor({} / {})", ast.Mod: "modulo({}, {})"}
+_OPERATORS |= {ast.USub: "-{}", ast.UAdd: "{}"}
+_COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "=="}
+_COMPARISONS |= {ast.NotEq: "!="}
 
 
 class LanguageError(ValueError):
@@ -128,7 +124,10 @@ class _Translation:
                 for statement in node.orelse:
                     yield from self._statement(statement, indent + "    ")
         elif isinstance(node, ast.For) and not node.orelse:
-            yield from self._loop(node, indent)
+            yield f"{indent}{self._enter(node.iter, node.target)}:"
+            for statement in node.body:
+                yield from self._statement(statement, indent + "    ")
+            self._loops.pop()
         elif isinstance(node, ast.Pass):
             yield f"{indent}pass"
         else:
@@ -150,12 +149,6 @@ class _Translation:
         if self._lengths.setdefault(name, length) != length:
             self._refuse(node, f"must have {self._lengths[name]} entries, as before")
         return vector
-
-    def _loop(self, node: ast.For, indent: str) -> Iterator[str]:
-        yield f"{indent}{self._enter(node.iter, node.target)}:"
-        for statement in node.body:
-            yield from self._statement(statement, indent + "    ")
-        self._loops.pop()
 
     def _enter(self, over: ast.expr, variable: ast.expr) -> str:
         """Return the head of a loop, which is then the innermost one of the present loops."""
@@ -203,15 +196,17 @@ class _Translation:
         if isinstance(node, ast.Name):
             return self._name(node)
         if isinstance(node, ast.Attribute):
-            return self._literal(node, self._attribute(node))
+            name, *attributes = ast.unparse(node).split(".")
+            outside = self._outside.get(name)
+            value = reduce(lambda of, attribute: getattr(of, attribute, None), attributes, outside)
+            return self._literal(node, value)
         if isinstance(node, ast.Subscript):
             return self._entry(node)
-        if isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:
-            form = _OPERATORS[type(node.op)]
+        form = _OPERATORS.get(type(getattr(node, "op", None)), "")
+        if isinstance(node, ast.BinOp) and form:
             return f"({form.format(self._number(node.left), self._number(node.right))})"
-        if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
-            sign = "-" if isinstance(node.op, ast.USub) else ""
-            return f"({sign}{self._number(node.operand)})"
+        if isinstance(node, ast.UnaryOp) and form:
+            return f"({form.format(self._number(node.operand))})"
         if isinstance(node, ast.Compare):
             return f"ti.cast({self._truth(node)}, ti.f64)"
         if isinstance(node, ast.IfExp):
@@ -245,13 +240,6 @@ class _Translation:
             self._refuse(node, "is not defined")
         return self._literal(node, self._outside[node.id])
 
-    def _attribute(self, node: ast.Attribute) -> Any:
-        inner = node.value
-        if isinstance(inner, ast.Attribute):
-            return getattr(self._attribute(inner), node.attr, None)
-        name = inner.id if isinstance(inner, ast.Name) else ""
-        return getattr(self._outside.get(name), node.attr, None)
-
     def _entry(self, node: ast.Subscript) -> str:
         name = node.value.id if isinstance(node.value, ast.Name) else ""
         length, index = self._lengths.get(name, 0), node.slice
@@ -278,10 +266,9 @@ class _Translation:
         is_folded = name in ("min", "max") and len(arguments) >= wanted
         if node.keywords or not (len(arguments) == wanted or is_folded):
             self._refuse(node, f"must have {wanted} arguments")
-        result = arguments[0] if is_folded else f"{name}_({', '.join(arguments)})"
-        for argument in arguments[1:] if is_folded else ():
-            result = f"{name}_({result}, {argument})"
-        return result
+        if is_folded:
+            return reduce(lambda result, argument: f"{name}_({result}, {argument})", arguments)
+        return f"{name}_({', '.join(arguments)})"
 
     def _truth(self, node: ast.expr) -> str:
         """Return an expression of a truth value."""
