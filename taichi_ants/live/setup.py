@@ -21,7 +21,6 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, ROW
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds import text_map
-from taichi_ants.worlds.double_bridge import bridge_ranges
 from taichi_ants.worlds.validation import parse_ranges
 from taichi_ants.worlds.world import World
 
@@ -108,8 +107,6 @@ class Setup:
             _check_cells(text_map.ranges_of(self.world))
         elif settings.get("ranges") is not None:
             _check_cells(parse_ranges(settings["ranges"]))
-        elif self.world == "double_bridge":
-            _check_cells(bridge_ranges(**settings))
 
     def build_world(self) -> World:
         """Return the world; raise AntsError if it is unknown or cannot be built."""
