@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from numbers import Real
 
 import numpy as np
@@ -149,9 +149,3 @@ def checked_share(name: str, value: float) -> float:
     if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= value <= 1:
         raise AntsError(f"{name} is {shown(value)}; it must be a number between 0 and 1.")
     return float(value)
-
-
-def check_progress(progress: object) -> None:
-    """Raise AntsError unless `progress` is None or a function."""
-    if progress is not None:
-        expect("progress", progress, Callable)  # type: ignore[arg-type]

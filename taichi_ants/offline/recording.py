@@ -111,7 +111,6 @@ def record_colony(
     refuse_unsupported("record_colony", uses, SUPPORTS, "record another colony")
     episodes = checked_whole("episodes", episodes)
     ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
-    arguments.check_progress(progress)
     if len(dict.fromkeys(colony.worlds)) > 1:
         raise AntsError("the worlds of the colony differ; record a separate colony for each world.")
     facts = {"policy": "colony", "sharing": colony.sharing, "ants": colony.ants}

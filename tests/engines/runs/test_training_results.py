@@ -58,7 +58,7 @@ def test_what_was_loaded_goes_on_bit_for_bit(result, tmp_path):
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("state_integers", np.zeros((2, 3, 6487), np.int32), "integers of a result is an array"),
+        ("state_integers", np.zeros((2, 2, 6488), np.int32), "integers of a result is an array"),
         ("state_q", np.zeros((2, 3, 1, 432, 5), np.float32), "q of a result is an array"),
         (
             "returns",
@@ -80,7 +80,7 @@ def test_damaged_arrays(stored, tmp_path, name, value, said):
         ({"configs": [{"learner": "sarsa"}]}, ""),
         ({"seeds": [1, 1, 2]}, "more than once"),
         ({"task": {"delivery": "never"}}, "`task.delivery` is 'never'"),
-        ({"task": {"observation": "paper"}}, "of shape (2, 3, 1, 128, 8)"),
+        ({"task": {"observation": "paper"}}, "of shape (2, 3, n, 128, 8)"),
         ({"world": {**WORLD, "ranges": [0, 1, 2]}}, "ranges are"),
     ],
 )
