@@ -24,13 +24,13 @@ from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.world import STARTS, World
 
 MAX_ANTS = 1 << 24
-_ALONE = "a run of one ant", LONE, "leave it out, or use a Colony"
+ALONE = "a run of one ant", LONE, "leave it out, or use a Colony"
 
 
 def checked_world(
     world: World,
     learns: bool = False,
-    what: str = _ALONE[0],
+    what: str = ALONE[0],
     supports: Collection[str] = LONE,
 ) -> World:
     """Return the world; AntsError unless `what` supports it and, with `learns`, it has food."""
@@ -58,9 +58,13 @@ def checked_task(
     return task
 
 
-def checked_lone_task(task: Task | None) -> Task:
-    """Return the task of a run of one ant, by default the paper's."""
-    return checked_task(task, *_ALONE)
+def checked_run(
+    world: World, task: Task | None, max_steps: int, learns: bool = False
+) -> tuple[Task, int]:
+    """Return the task, by default the paper's, and the step limit of runs of one ant."""
+    task = checked_task(task, *ALONE)
+    checked_world(world, learns)
+    return task, checked_max_steps(max_steps, task)
 
 
 def checked_capacity(

@@ -60,11 +60,11 @@ def record(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    arguments.checked_world(world, learns=isinstance(behaviour, TrainingConfig))
-    task, numbers = arguments.checked_lone_task(task), arguments.checked_seeds(seeds)
+    learns = isinstance(behaviour, TrainingConfig)
+    task, max_steps = arguments.checked_run(world, task, max_steps, learns)
+    numbers = arguments.checked_seeds(seeds)
     episodes = checked_whole("episodes", episodes)
     epsilon = arguments.checked_share("epsilon", epsilon)
-    max_steps = arguments.checked_max_steps(max_steps, task)
     runtime.start(threads, arch)
     facts: dict[str, Any]
     if isinstance(behaviour, TrainingConfig):

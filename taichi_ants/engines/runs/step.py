@@ -156,9 +156,7 @@ def observe_function(rules: Rules) -> Callable[..., Any]:
                 after = noise.misread_view(view, observation, ant.random_state, a.misread_below)
             state = encode(view)
         elif ti.static(rules.misreads):  # no view is needed
-            state, after = noise.misread_paper_state(
-                paper_state, ant.random_state, a.misread_below
-            )
+            state, after = noise.misread_paper_state(paper_state, ant.random_state, a.misread_below)
         return paper_state, state, after
 
     return observe

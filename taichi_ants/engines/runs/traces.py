@@ -108,8 +108,7 @@ def rollout(
     Instead of the table, you can pass the `TrainingResult` of a single run, or a `Policy`. Other
     arguments and errors are those of `evaluate`. Numbers start at 0.
     """
-    task = arguments.checked_lone_task(task)
-    max_steps = arguments.checked_max_steps(max_steps, task)
+    task, max_steps = arguments.checked_run(world, task, max_steps)
     table = checked_table(q_values, task)
     seeds = arguments.checked_seeds_for(seed, ())
     number = checked_whole("number", number, least=0)
@@ -131,8 +130,7 @@ def trace_policies(
 
     `seeds` has one seed per policy, and may repeat seeds. Other arguments are those of `evaluate`.
     """
-    task = arguments.checked_lone_task(task)
-    max_steps = arguments.checked_max_steps(max_steps, task)
+    task, max_steps = arguments.checked_run(world, task, max_steps)
     tables = checked_values(q_values, task)
     runs = Runs.following(tables, np.array(seeds, dtype=object), np.zeros(1, dtype=int), 0.0)
     yield from _followed(world, task, runs, max_steps)
@@ -142,7 +140,6 @@ def _followed(
     world: World, task: Task, runs: Runs, max_steps: int, made_by: RolloutArguments | None = None
 ) -> Iterator[Trace]:
     """Yield the traces of one rollout of each policy; its number is that of the episode."""
-    arguments.checked_world(world)
     _check_length(max_steps, MAX_ROLLOUT_STEPS)
     for steps in record_steps(world, task, max_steps, runs, episodes=1):
         values = runs.state.q[steps["runs"], 0, steps["states"], :N_ACTIONS]
@@ -163,9 +160,7 @@ def trace_training(
     Arguments and errors are those of `train`; episodes * max_steps * n_states is limited to 12.8
     million.
     """
-    arguments.checked_world(world, learns=True)
-    task = arguments.checked_lone_task(task)
-    max_steps = arguments.checked_max_steps(max_steps, task)
+    task, max_steps = arguments.checked_run(world, task, max_steps, learns=True)
     episodes = checked_whole("episodes", episodes)
     several = arguments.checked_configs(config, task)
     if len(several) > 1:
@@ -195,7 +190,7 @@ def _check_length(steps: int, most: int) -> None:
 
 def _trace(world: World, steps: dict[str, np.ndarray], **more: Any) -> Trace:
     """Return the trace of recorded steps."""
-    columns = {name: steps[name] for name in TRACE}
+    columns: dict[str, Any] = {name: steps[name] for name in TRACE}
     columns["cells"] = world.grid.cells(columns["cells"])
     columns["terminated"] = columns["terminated"].astype(bool)
     return Trace(**columns, **more)

@@ -54,14 +54,12 @@ def train(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    task = arguments.checked_lone_task(task)
+    task, max_steps = arguments.checked_run(world, task, max_steps, learns=True)
     configs = arguments.checked_configs(configs, task)
     seeds = arguments.checked_seeds(seeds)
-    arguments.checked_world(world, learns=True)
-    max_steps = arguments.checked_max_steps(max_steps, task)
-    none_yet = [np.zeros((len(configs), len(seeds), 0), dtype=np.int32)] * len(OUTCOMES)
+    outcomes = (np.zeros((len(configs), len(seeds), 0), dtype=np.int32),) * 3
     state = RunState.initial(configs, seeds, task.n_states)
-    start = TrainingResult(world, configs, seeds, max_steps, task, *none_yet, 0.0, state)
+    start = TrainingResult(world, configs, seeds, max_steps, task, *outcomes, 0.0, state)
     return _train(start, episodes, threads, arch, progress)
 
 
@@ -160,7 +158,7 @@ def evaluate(
     Raises:
         AntsError: An argument is not allowed; the message names it.
     """
-    task = arguments.checked_lone_task(task)
+    task, max_steps = arguments.checked_run(world, task, max_steps)
     tables = checked_values(q_values, task)
     if tables.ndim == 2 and (several := len(arguments.checked_seeds(seeds))) > 1:
         tables = np.broadcast_to(tables, (several, *tables.shape))
@@ -168,12 +166,11 @@ def evaluate(
     run_seeds = arguments.checked_seeds_for(seeds, shape)
     rollouts = checked_whole("rollouts", rollouts)
     epsilon = arguments.checked_share("epsilon", epsilon)
-    max_steps = arguments.checked_max_steps(max_steps, task)
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
     runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
     outcomes = np.empty((3, len(runs), rollouts), np.int32)
-    do_episodes(arguments.checked_world(world), task, max_steps, runs, outcomes, progress)
+    do_episodes(world, task, max_steps, runs, outcomes, progress)
     returns, steps, deliveries = outcomes.reshape(3, *shape, rollouts)
     of_tables = tuple(run_seeds[: shape[-1] if shape else 1].tolist())
     return Rollouts(returns, steps, deliveries, of_tables)
