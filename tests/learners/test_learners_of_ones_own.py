@@ -95,6 +95,21 @@ def test_what_is_natural_works(like, td_error, engine):
     assert np.array_equal(values, engine(like))
 
 
+def test_a_learner_of_ones_own_is_replaced():
+    """As in a cell of a notebook that is run again; the next training uses the new one."""
+    tables = []
+    for td_error in (natural_q_learning, of_reward):
+        register(td_learner("mine", td_error))
+        tables.append(in_runs())
+    assert not np.array_equal(*tables)
+    assert registry.names().count("mine") == 1
+
+
+@ti.func
+def of_reward(value, reward, discount, next_values, next_action, epsilon):
+    return reward - value
+
+
 @ti.func
 def of_a_vector(value, reward, discount, next_values, next_action, epsilon):
     return reward + discount * next_values - value
@@ -292,6 +307,8 @@ def test_learners_that_are_refused_when_they_are_registered(changes, says):
         register(replace(with_memory(), **changes))
     assert str(caught.value).startswith(says)
     assert "mine" not in registry.names()
+    with pytest.raises(AntsError, match=r"^learner is .*; it must be a Learner\.$"):
+        register(natural_sarsa)
 
 
 def test_the_examples_memory_makes_the_difference(tmp_path):
