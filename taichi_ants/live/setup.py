@@ -16,7 +16,7 @@ from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, s
 from taichi_ants.features import CASTES, COLONY, FIELDS, FOODS, OWN_RULES
 from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.policies import WITHOUT_LEARNING, checked_table
+from taichi_ants.learners.policies import NAMED, checked_table
 from taichi_ants.task import Task
 from taichi_ants.task.constants import MAX_STEPS, ROW
 from taichi_ants.task.field import TRAIL
@@ -62,10 +62,10 @@ class Setup:
         checked_task(self.task, "the live page", SUPPORTS)
         check_one_of("pheromone", self.pheromone, (TRAIL, *self.task.fields))
         for name, caste in self.task.castes.items():
-            if caste.policy not in (None, *WITHOUT_LEARNING):  # pages must not name files
+            if caste.policy not in (None, *NAMED):  # pages must not name files
                 raise AntsError(
                     f"`task.castes.{name}.policy` is {shown(caste.policy)}, but the live page "
-                    f"reads no files; choose one of {', '.join(WITHOUT_LEARNING)}, or leave it out."
+                    f"reads no files; choose one of {', '.join(NAMED)}, or leave it out."
                 )
         if isinstance(self.policy, TrainingConfig):
             check_one_of("sharing", self.sharing, ("shared", "independent"))

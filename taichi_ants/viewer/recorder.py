@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import learners
-from taichi_ants.arguments import check_progress
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.runs.traces import Trace
 from taichi_ants.errors import AntsError, check_one_of, count, expect
@@ -378,7 +377,6 @@ def record_colony(
         AntsError: A number is not allowed, or no episode has begun.
     """
     between, done = intervals(colony, ticks, frame_interval, follow), 0
-    check_progress(progress)
     recorder = Recorder(colony, world, title, follow, pheromone)
     frames = [recorder.snapshot()]
     for n in between:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import arguments
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import checked_worlds
@@ -83,7 +82,6 @@ class Colony(TickingColony):
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         places = self._checked_places(worlds, episodes)
-        arguments.check_progress(progress)
         recorder, timetable = Recorder(measures, every), Timetable(self, protocol, ticks)
         outcomes = []
         for episode in range(episodes):
