@@ -341,10 +341,9 @@ def tables(plan: Plan, runs: Runs) -> str:
             save_policy(path, q_values[run], metadata, point.task.observation)
     parts: dict[str, Any] = {"drawings": [], "players": []}
     if runs.figures:
-        with style.all_or_none(folder / "figures"):
-            style.save_all(draw_all(results.rows), folder / "figures")
-            parts["drawings"] = drawings(draw_all(results.rows))
-            parts["players"] = at_work(conditions, policies, seeds[0])
+        style.save_all(draw_all(results.rows), folder / "figures")
+        parts["drawings"] = drawings(draw_all(results.rows))
+        parts["players"] = at_work(conditions, policies, seeds[0])
     facts = page.setting_facts(settings_of(runs.study.points, seeds))
     parts["facts"] = {**facts, **page.made_facts(runs.made)}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]

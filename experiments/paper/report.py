@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from paper.baselines import Baseline
 from paper.claims import Audit, headlines, tallies
 from paper.comparison import GREEDY_RETURN, GREEDY_STEPS, Comparison
 from paper.table2 import (
@@ -13,7 +14,6 @@ from paper.table2 import (
     Line,
 )
 from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, counts
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.statistics import Estimator
 from taichi_ants.analysis.tables import (
     MISSING,

@@ -25,7 +25,7 @@ from command_lines import (
     run,
     start,
 )
-from paper import figures, process
+from paper import process
 
 from taichi_ants import (
     Task,
@@ -404,22 +404,6 @@ def test_an_interruption_of_the_pictures_keeps_the_runs(kernels, tmp_path):
     assert err.count("\n") == 1
     assert time.perf_counter() - sent < promptly()
     assert len(list((tmp_path / "out" / "blocks").iterdir())) == 2 * 2
-
-
-@pytest.mark.slow  # the second process draws animations meanwhile
-def test_a_figure_that_fails_costs_no_results_and_is_drawn_later(tmp_path, compare, monkeypatch):
-    def fails(*given):
-        raise RuntimeError("no font")
-
-    arguments = [*SMALL, "--out", tmp_path / "out"]
-    with monkeypatch.context() as patch:
-        patch.setattr(figures, "save_all", fails)
-        status, _, err = compare(*arguments)
-    assert status == 0
-    assert "there are no figures, because one failed with RuntimeError: no font." in err
-    assert not FIGURES & set(contents(tmp_path / "out"))
-    assert compare(*arguments, "--force")[0] == 0
-    assert set(contents(tmp_path / "out")) >= FIGURES | RENDERS
 
 
 def test_more_seeds_keep_what_is_there_and_fewer_are_refused(tmp_path, compare):

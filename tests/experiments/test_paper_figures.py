@@ -11,6 +11,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from paper.baselines import Baseline
 from paper.comparison import DYNA_P5, FIGURE_1, SARSA, VARIANTS, Variant
 from paper.figures import (
     BEHAVIOUR_LOOKS,
@@ -30,7 +31,6 @@ from synthetic_comparison import (
 )
 
 from taichi_ants.analysis.behaviour import BEHAVIOURS, CIRCLES, OTHER
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.statistics import interquartile_mean
 from taichi_ants.analysis.style import save_all
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from paper.baselines import Baseline
 from paper.claims import CLAIMS, HEADLINES, assess
 from paper.comparison import DYNA_P5, FIGURE_1, SARSA, Comparison
 from paper.report import (
@@ -25,7 +26,6 @@ from paper.table2 import (
 from synthetic_comparison import build, change, remeasured, subset, unchanged
 
 from taichi_ants.analysis.behaviour import CIRCLES, WALKS
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.tables import plain_text
 
 BASELINES = [

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from plain_runs import rollout
-
-from taichi_ants.analysis.bounds import episodes
-from taichi_ants.analysis.bounds.baselines import (
+from paper.baselines import (
     bound_rows,
     policy_rows,
 )
+from plain_runs import rollout
+
+from taichi_ants.analysis.bounds import episodes
 from taichi_ants.learners.policies import random_policy, trail_follower
 from taichi_ants.task import Rewards, Task
 from taichi_ants.worlds import paper
