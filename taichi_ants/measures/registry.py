@@ -87,5 +87,5 @@ def check_part(name: str, world: World, task: Task, single: bool = False) -> Non
     if part not in parts if part else single and (is_array or len(parts) > 1):
         kind = f"a part of {whole}" if part else "one number"
         allowed = ", ".join(f"{whole}.{known}" for known in parts)
-        choose = f"choose one of {allowed}" if allowed else "it has no parts"
-        raise AntsError(f"{name!r} is not {kind}; {choose}.")
+        choose = f"one of {allowed}" if allowed else "another measure"
+        raise AntsError(f"{name!r} is not {kind}; choose {choose}.")

@@ -108,18 +108,6 @@ def test_pandas_has_the_rows(series):
     assert wide.index.tolist() == [25, 50, 60]
 
 
-def test_missing_extras_are_named(series, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "pandas", None)
-    with pytest.raises(AntsError, match=r'pip install -e "\.\[pandas\]"'):
-        series.to_pandas()
-
-
-def test_results_are_equal_by_content(series):
-    assert series == run(measures=ASKED, every=25)
-    assert series != run(measures=ASKED, every=30)
-    assert series != run()
-
-
 def test_summaries_are_means_over_seeds(series, trained):
     rows = {row["measure"]: row for row in summary(series).rows}
     means = series.deliveries.mean(axis=0)

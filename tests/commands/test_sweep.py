@@ -570,10 +570,10 @@ WRONG_EVENTS = {
     "no part": (
         '"living"',
         '"living.home"',
-        ["'living.home' is not a part of living; it has no parts"],
+        ["'living.home' is not a part of living; choose another measure"],
     ),
     "no region": ('"living"', '"regions.gate"', ["in [[when]] number 1", "world.regions"]),
-    "array": ('"living"', '"occupancy"', ["in [[when]] number 1", "'occupancy' is an array"]),
+    "array": ('"living"', '"occupancy"', ["in [[when]] number 1", "'occupancy' is not one number"]),
     "room": (
         *("remove_ants = [0.0, 0.5]", "add_ants.number = [0, 6]"),
         [

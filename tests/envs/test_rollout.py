@@ -258,14 +258,3 @@ def test_many_ants_and_steps(mode):
     assert made.terminated.sum() > 100
     assert made.truncated.sum() > 100
     assert_steps(theirs, made)
-
-
-def test_a_seed_determines_the_actions():
-    made = []
-    for seed, its in ((5, None), (5, None), (6, None), (5, 1), (6, 1)):
-        env = lone(40)
-        env.reset(seed=seed)
-        made.append(env.rollout("random", 10, seed=its).actions)
-    assert np.array_equal(made[0], made[1])
-    assert not np.array_equal(made[0], made[2])
-    assert np.array_equal(made[3], made[4])

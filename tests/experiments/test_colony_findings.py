@@ -12,7 +12,6 @@ from colony_findings import (
     ALONE,
     BC,
     FEW,
-    JOINT,
     PAPER,
     QUESTIONS,
     QUEUES,
@@ -151,31 +150,6 @@ def test_below_ten_seeds_no_difference_has_a_verdict(seeds: int, verdict: Verdic
     assert (verdicts_of(judged) == {Verdict.TOO_FEW}) == (seeds < 10)
     tables = [one for one in found(condition_rows(study), judged) if isinstance(one, Table)]
     assert all((f"{seeds} seeds, too few" in one.notes[0]) == (seeds < 10) for one in tables)
-
-
-def test_missing_conditions_leave_out_only_what_needs_them() -> None:
-    judged = judge_all(build(regimes=(JOINT,), rules=(PAPER, SILENT)))
-    asked = [series.question for _, series in judged]
-    assert asked == [TRAIL, MORE]
-    assert judge_all(build(regimes=(JOINT,), rules=(PAPER,), sizes=(1,))) == {}
-
-
-def test_each_arena_and_question_is_judged_for_itself() -> None:
-    judged = judge_all(build(world_kinds=("paper", "open")))
-    assert {(world_kind, series.question) for world_kind, series in judged} == {
-        (world_kind, question) for world_kind in ("paper", "open") for question in QUESTIONS
-    }
-    for question in QUESTIONS:
-        of_question = [
-            finding
-            for (world_kind, series), findings in judged.items()
-            for finding in findings.values()
-            if (world_kind, series.question) == ("paper", question)
-        ]
-        expected = 1 - 0.05 / len(of_question)
-        assert [finding.level for finding in of_question] == pytest.approx(
-            [expected] * len(of_question)
-        )
 
 
 def test_seeds_are_paired() -> None:
