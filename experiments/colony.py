@@ -44,7 +44,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.analysis.bounds.limits import limits_of
     from taichi_ants.analysis.drawings import drawings
     from taichi_ants.analysis.findings import seeds_in_words
-    from taichi_ants.analysis.tables import markdown, plain_text, sentence
+    from taichi_ants.analysis.tables import plain_text, sentence
     from taichi_ants.errors import count
     from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import COLONY, Run, values_of
@@ -322,7 +322,6 @@ def tables(plan: Plan, runs: Runs) -> str:
         ("differences.csv", study.difference_rows(results.judged)),
     ):
         files.write_csv(folder / name, table, list(table[0]))
-    files.write_text(folder / "findings.md", markdown(study.found(*results)))
     policies = {}
     for condition, point in conditions.items():
         if condition.rules in COMPARED and condition.regime == JOINT:

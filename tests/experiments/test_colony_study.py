@@ -19,7 +19,7 @@ SMALL = [
     *("--episodes", EPISODES, "--ticks", TICKS, "--rollouts", ROLLOUTS),
 ]
 FILES = {
-    *("conditions.csv", "differences.csv", "seeds.csv", "findings.md", "manifest.json"),
+    *("conditions.csv", "differences.csv", "seeds.csv", "manifest.json"),
     *("report.html", "report.txt", "study.json"),
     *(f"figures/{name}.png" for name in ("elsewhere", "rules", "scaling", "training")),
     *(

@@ -76,9 +76,9 @@ SHOWN = [
 ]
 RENDERS = {f"renders/{name}.gif" for name in SHOWN}
 FILES = {
-    *("baselines.csv", "behaviours.csv", "claims.csv", "claims.md", "runs.npz"),
+    *("baselines.csv", "behaviours.csv", "claims.csv", "runs.npz"),
     *("manifest.json", "report.html", "report.txt", "study.json"),
-    *("summary.csv", "table2.csv", "table2.md"),
+    *("summary.csv", "table2.csv"),
     *(f"policies/{name}.npz" for name in SHOWN),
     *FIGURES,
     *RENDERS,
@@ -237,8 +237,7 @@ def test_evaporation_is_chosen_told_and_kept_apart(training, greedy, tmp_path, c
     assert np.array_equal(archive["greedy_return"], rollouts.returns.mean(axis=2))
     assert np.array_equal(archive["policy_returns"], once.returns[..., 0])
     words = f"Training {'with' if training == 'on' else 'without'} evaporation of trails, greedy"
-    for name in ("report.txt", "table2.md"):
-        assert words in (out / name).read_text("utf-8")
+    assert words in (out / "report.txt").read_text("utf-8")
     first, *_ = read_csv(out / "baselines.csv")
     assert (first["baseline"] == "exact bounds") == (training == "on")
     status, _, err = compare(*TINY, "--episodes", 30, "--out", out)
@@ -265,9 +264,8 @@ def test_other_worlds(world, tmp_path, compare):
     status, _, err = compare(*TINY, *chosen, "--out", tmp_path / "out")
     assert (status, err) == (0, "")
     name = "garden.txt" if world == "garden" else "open, world seed 5"
-    for file in ("report.txt", "claims.md", "table2.md"):
-        text = (tmp_path / "out" / file).read_text("utf-8")
-        assert text.startswith(f"World: {name}.\n"), file
+    text = (tmp_path / "out" / "report.txt").read_text("utf-8")
+    assert text.startswith(f"World: {name}.\n")
     assert "47.3" not in text
     verdicts = read_csv(tmp_path / "out" / "claims.csv")
     assert {row["verdict"] for row in verdicts} == {"not tested"}
@@ -292,11 +290,10 @@ def test_a_learner_of_ones_own_and_a_discount_of_one_are_reported(tmp_path, comp
     cells = [line.split() for line in out.splitlines() if line.startswith("hysteretic *")]
     assert cells[0][3] == f"{returns[best]:.1f}"
     assert " paper " not in out.split("Learner")[1]  # it does not have such a learner
-    tables = (tmp_path / "out" / "table2.md").read_text("utf-8")
-    lines = [line.split(" | ") for line in tables.splitlines() if line.startswith("| hysteretic *")]
-    assert lines[4][2] == f"{greedy:.1f}"
-    assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in tables
+    (line,) = read_csv(tmp_path / "out" / "table2.csv")
+    assert float(line["greedy_return_mean"]) == pytest.approx(greedy)
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert f"hysteretic *, terminates: 0.1 / {best} / 0.3 / 0.9" in page
     assert "the discount is 1.0; it must be at least 0 and below 1" in page
     assert max(len(line) for line in out.splitlines()[:-2]) < 80
 
