@@ -23,7 +23,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from colony import LEARNING, scheduled
 
     from taichi_ants import AntsError, Colony, Life, Task, files
-    from taichi_ants.analysis import style
     from taichi_ants.engines.colony.interventions import Interventions
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command import run_study
@@ -149,9 +148,8 @@ def tables(plan: Plan, results: Results) -> str:
     files.write_csv(results.folder / "shares.csv", table, list(table[0]))
     if results.figures:
         folder = files.check_writable_folder(results.folder / "figures")
-        with style.all_or_none(folder):
-            shown.draw(folder / "bridge.png", found, plan.ticks)
-            shown.draw_late(folder / "late.png", found, plan.ticks)
+        shown.draw(folder / "bridge.png", found, plan.ticks)
+        shown.draw_late(folder / "late.png", found, plan.ticks)
     return shown.report(found, plan.ticks)
 
 

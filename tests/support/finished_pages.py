@@ -9,6 +9,7 @@ import numpy as np
 from colony import colony_page
 from colony_figures import draw_all as draw_study
 from colony_findings import Results as StudyResults
+from paper.baselines import Baseline
 from paper.claims import Audit, assess
 from paper.comparison import DYNA_P5, Comparison
 from paper.figures import for_page
@@ -18,7 +19,6 @@ from synthetic_colony_study import build as build_study
 from synthetic_comparison import build, change, unchanged
 
 from taichi_ants import Colony, Task, TrainingConfig, worlds
-from taichi_ants.analysis.bounds.baselines import Baseline
 from taichi_ants.analysis.drawings import drawings
 from taichi_ants.learners.policies import trail_follower
 from taichi_ants.rendering import Episode
