@@ -1,7 +1,7 @@
 """Files that pages can export from a session, and jobs: replays, and files that take long.
 
-A job has the attributes `done` and `total`, in steps or ticks, `page`, which is the page that asked
-for it, if any, and `result`: a session, a file or a message, None before the end.
+A job has the attributes `done` and `total`, in steps or ticks, and `page`, the page that asked for
+it, if any. Its `result` is a session, a file or a message; None before the end.
 """
 
 from __future__ import annotations
