@@ -242,7 +242,7 @@ class Session:
         self._cells += cells_of(plain)
         self._episodes += "episode" in plain
         try:
-            intervention.apply(self.interventions)
+            self.interventions.apply(intervention)
         except AntsError:
             del self.edits[known[0] :], self.changes[known[1] :]
             self._cells, self._episodes = known[2:]

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from taichi_ants import AntsError, Colony, Interventions, TrainingConfig, World, protocol
+from taichi_ants.interventions import AddAnts, RemoveAnts
 from taichi_ants.task import (
     Choice,
     Field,
@@ -553,5 +554,5 @@ def disturb(colony: Colony) -> None:
     """Add two ants to each world and remove one, where there is room."""
     interventions = Interventions(colony, lasting=False)
     with contextlib.suppress(AntsError):
-        interventions.add_some(2, None)
-    interventions.remove_some(1, None)
+        interventions.apply(AddAnts(number=2))
+    interventions.apply(RemoveAnts(number=1))

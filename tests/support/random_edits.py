@@ -57,7 +57,7 @@ def apply_to_both(
 ) -> None:
     """Apply an edit to a colony and to its twin; raises AntsError if the world forbids it."""
     change: Any = edits.checked(edit, interventions)
-    change.apply(interventions)
+    interventions.apply(change)
     if getattr(change, "cells", None):
         change = replace(change, cells=interventions.colony.grid.cells(change.cells).tolist())
     plain.apply(change)
