@@ -74,10 +74,12 @@ class FoodSources:
                 source.waiting_since = tick
 
     def regrow(self, world: WorldState, delays: Sequence[int | None], tick: int) -> int:
-        """Let food grow back on empty cells of food sources that have waited long enough.
+        """Let food grow back where food sources have waited long enough, and their cell is empty.
 
-        `delays` are ticks, by kind of food; None means that the kind does not grow back. Return the
-        number of loads that grew back.
+        `delays` are ticks, by kind of food; None means that the kind does not grow back.
+
+        Returns:
+            The number of loads that grew back.
         """
         regrown = 0
         for source in self.food_sources:
