@@ -296,7 +296,7 @@ def test_parameters_change_without_other_kernels_and_in_an_episode(clean):
     other = task.replace(rules={"weaker": {"amount": 7}})
     assert task.compiled(learning=False) == other.compiled(learning=False)
     colony.begin_episode()
-    SetTask((("rules.weaker.amount", 7.0),)).apply(Interventions(colony))
+    Interventions(colony).apply(SetTask((("rules.weaker.amount", 7.0),)))
     assert colony.task == other
     plain = Colony(world, other, None, 0, 8, sharing="frozen")
     plain.begin_episode()
