@@ -23,17 +23,16 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from typing import Any
 
     import numpy as np
+    from paper import baselines as bounds
     from paper import figures, page, process
-    from paper.claims import assess, claims_markdown, claims_rows
+    from paper.claims import assess, claims_rows
     from paper.comparison import PAPER_WORLD, Comparison, Row
     from paper.page import Example, Seen
-    from paper.report import report, table2_markdown
+    from paper.report import report
     from paper.table2 import example_name, examples, summarise, summarise_behaviours, table2
 
     from taichi_ants import AntsError, Task, TrainingConfig, files, learners, train, worlds
-    from taichi_ants.analysis import style
     from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
-    from taichi_ants.analysis.bounds import baselines as bounds
     from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
     from taichi_ants.engines.runs.training import evaluate
     from taichi_ants.files import archives
@@ -250,15 +249,11 @@ def tables(plan: Plan, results: Results) -> str:
         "baselines": [baseline._asdict() for baseline in baselines],
     }.items():
         files.write_csv(folder / f"{name}.csv", table, list(table[0]))
-    files.write_text(folder / "table2.md", table2_markdown(comparison, lines))
-    files.write_text(folder / "claims.md", claims_markdown(audit, comparison.world))
     of_runs = {name: arrays[name] for name in (*LONE, "behaviours", "policy_returns")}
     curves = {f"curve_{name}": curve for name, curve in comparison.curves.items()}
     archives.write(folder / "runs.npz", {**of_runs, **curves})
     save_policies(folder / "policies", comparison, chosen)
-    shown = Seen()
-    with style.all_or_none(folder / "figures", folder / "renders"):
-        shown = seen()
+    shown = seen()
     facts = {"World": comparison.world, **setting_facts(settings_of(study.points, study.seeds))}
     links = [path.name for path in folder.iterdir()] + [MANIFEST, REPORT]
     facts |= made_facts(results.made)

@@ -81,9 +81,6 @@ class Study:
             starts = [*zip(worlds, self.seeds, strict=False), *((drawn, 0) for drawn in pool or ())]
             for drawn, seed in starts:
                 arguments.checked_world(drawn, True, *who).start(seed, ants)
-        for point in self.points:
-            if isinstance(point.world, Drawn):
-                point.check_worlds(map(point.world.of, self.seeds))
 
     @cached_property
     def keys(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from taichi_ants import files
-from taichi_ants.analysis import designs, sensitivity, style, sweeps
+from taichi_ants.analysis import sensitivity, sweeps
 from taichi_ants.analysis.findings import Contrast, above, judge
 from taichi_ants.analysis.statistics import known_means
 from taichi_ants.errors import AntsError, shown
@@ -251,9 +251,8 @@ def tables(sweep: Sweep, results: Results) -> str:
         ]
         files.write_csv(folder / SENSITIVITY, of_all, fields)
     if results.figures:
-        with style.all_or_none(folder / FIGURES):
-            files.check_writable_folder(folder / FIGURES)
-            _draw(sweep, first, values[first], indices.get(first, []), folder / FIGURES)
+        files.check_writable_folder(folder / FIGURES)
+        _draw(sweep, first, values[first], indices.get(first, []), folder / FIGURES)
     return report
 
 
@@ -304,7 +303,7 @@ def _draw(
         else:
             logs = {n for n, axis in axes.items() if isinstance(axis, Range) and axis.log}
             names = list(design.varying(axes))
-            designs.draw(path, settings, names, logs, values[grid], label)
+            sweeps.draw_design(path, settings, names, logs, values[grid], label)
     if indices:
         path = folder / f"sensitivity_{measure}.png"
         sensitivity.draw(path, indices, label, values.shape[1])

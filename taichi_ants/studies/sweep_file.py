@@ -93,7 +93,8 @@ class Base(NamedTuple):
         """
         settings = {**self.fixed, **row}
         learner = settings.get("training.learner")
-        known = _known(self.kind, learners.get(str(learner)).hyperparameters if learner else None)
+        more: Any = learners.get(str(learner)).hyperparameters if learner else None
+        known = _known(self.kind, more)
         of_events = re.compile(rf"({'|'.join(protocol.EVENTS)})\.\d+\.")
         for name in settings:
             # The world checks its settings, named groups and events check theirs.
