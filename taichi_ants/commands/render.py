@@ -42,6 +42,9 @@ KINDS = {  # description and example of each subcommand
 }
 
 
+STOPPED = "Stopped; nothing was left behind."
+
+
 def _size(text: str) -> tuple[int, int]:
     width, cross, height = text.lower().partition("x")
     if not (cross and width.isdecimal() and height.isdecimal()):
@@ -100,9 +103,6 @@ def add_options(parser: Parser, flags: Container[str], **defaults: Any) -> None:
     add_settings(parser, TRAINING)
 
 
-STOPPED = "Stopped; nothing was left behind."
-
-
 def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
     """Return the settings of the command line."""
     parser = Parser(__doc__)
@@ -115,9 +115,6 @@ def parse_arguments(arguments: list[str] | None = None) -> argparse.Namespace:
         flags = OPTIONS.keys() - (_MANY if kind == "episode" else _LONE)
         add_options(of_kind, flags, kind=kind, **_DEFAULTS[kind])
     settings = parse(parser, arguments)
-    for flag in ("follow", "title") if not settings.overlay else ():
-        if getattr(settings, flag, None) is not None:
-            parser.error(f"--{flag} has no effect with --no-overlay, so use only one")
     if settings.kind == "colony" and settings.frame_interval is None:
         # A page shows the action of each ant only if it records every tick.
         settings.frame_interval = 1 if is_page(settings) else 4
@@ -130,8 +127,6 @@ def parse(parser: Parser, arguments: list[str] | None = None) -> argparse.Namesp
     for flag in given.values():
         if flag.startswith(_OF_TRAINING) and getattr(settings, "policy", None):
             parser.error(f"{flag} configures training, but --policy replaces it, so use only one")
-        if flag in ("--size", "--fps", "--no-overlay") and is_page(settings):
-            parser.error(f"{flag} has no effect on a page, so leave it out or write a .gif file")
     return settings
 
 

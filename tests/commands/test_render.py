@@ -5,14 +5,13 @@ from __future__ import annotations
 import re
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
 import gallery
 import numpy as np
 import pytest
-from command_lines import EXPERIMENTS, ROOT, assert_one_sentence, call, environment, start
+from command_lines import ROOT, assert_one_sentence, call, start
 from command_lines import run as process
 from PIL import Image
 
@@ -104,10 +103,6 @@ WRONG = {
         ["colony", "--policy", "a.npz", "--episodes", "5"],
         "--episodes configures",
     ),
-    "view of a plain picture": (
-        ["colony", "--no-overlay", "--follow", "0"],
-        "--follow has no effect with --no-overlay",
-    ),
     "hyperparameter of another": (
         ["episode", "--training.n-steps", "2", "--out", "{}/a.gif"],
         "`training.n_steps` is not a setting of sarsa",
@@ -148,24 +143,6 @@ def test_stopped_midway_it_leaves_nothing_behind(
     assert running.returncode == status
     assert errors == "Stopped; nothing was left behind.\n"
     assert files_in(tmp_path) == []
-
-
-def test_help_needs_little(run, kernels) -> None:
-    for kind in ("episode", "colony"):
-        _, out, _ = run(kind, "--help")
-        assert "--training.learner" in out
-        example = re.search(rf"Example: .*?\b({kind}\b.*)", out)[1].split()
-        assert render.parse_arguments(example).kind == kind
-    heavy = "import sys; sys.path.insert(0, sys.argv[1]); import render; "
-    heavy += "print({'taichi', 'matplotlib', 'PIL', 'av', 'numpy'} & set(sys.modules))"
-    loaded = subprocess.run(
-        [sys.executable, "-c", heavy, str(EXPERIMENTS)],
-        env=environment(kernels),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert loaded.stdout == "set()\n"
 
 
 def test_the_gallery_is_there_and_small() -> None:

@@ -30,7 +30,6 @@ from taichi_ants.analysis.statistics import bootstrap_interval
 from taichi_ants.studies.points import EVALUATION_SEEDS, RunPoint
 from taichi_ants.studies.sweep import plan, sweep_of
 from taichi_ants.task import foraging, observations, paper
-from taichi_ants.worlds import registry
 
 RUNS = """
 kind = "runs"
@@ -339,19 +338,6 @@ def test_what_findings_say(shift, margin, word, tmp_path):
     assert [(p, one["finding"]) for p, one in found.items()] == [(0, word)]
 
 
-def test_a_preset_of_ones_own_and_its_settings_can_be_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(registry.WORLDS, "yours", dict(registry.WORLDS.yours))
-
-    def line(seed, length=3):
-        return worlds.World((length, 2, 2), (0, 0, 0), foods=[(length - 1, 0, 0)])
-
-    worlds.register("line", line)
-    text = RUNS.replace("[vary]", '[world]\npreset = "line"\n[vary]\nworld.length = [4, 6]')
-    (tmp_path / "a.toml").write_text(text)
-    points = plan({"file": tmp_path / "a.toml"}).study.points
-    assert {point.world for point in points} == {line(0, 4), line(0, 6)}
-
-
 def test_a_sweep_begins_with_a_preset_of_the_task(sweep):
     text = FOLLOWING.replace('["trail_follower", "random"]', '["random"]')
     Path("a.toml").write_text(
@@ -464,20 +450,6 @@ def test_ranges_of_events_are_checked_and_whole(tmp_path):
         (tmp_path / "my.toml").write_text(text.replace("from = 5", end, 1))
         with pytest.raises(AntsError, match=said):
             plan({"file": tmp_path / "my.toml"})
-
-
-def test_ranges_of_entries_of_groups_are_checked_and_whole(tmp_path):
-    text = PROTOCOL.replace("at.1.remove_ants = [0.0, 0.5]", "task.fields.home.level = {R}")
-    text = text.replace("[training]", '[task.fields.home]\ndeposited_when = "always"\n\n[training]')
-    text = 'design = "random"\nsamples = 4\n' + text
-    (tmp_path / "my.toml").write_text(text.replace("R", "from = 5, to = 50"))
-    points = plan({"file": tmp_path / "my.toml"}).study.points
-    levels = {one.task.fields["home"].level for one in points}
-    assert len(levels) > 1
-    assert all(type(level) is int for level in levels)
-    (tmp_path / "my.toml").write_text(text.replace("R", "from = 0, to = 50"))
-    with pytest.raises(AntsError, match=r"`task\.fields\.home\.level` is 0; it must be between 1"):
-        plan({"file": tmp_path / "my.toml"})
 
 
 @pytest.mark.parametrize("name", WRONG_EVENTS)

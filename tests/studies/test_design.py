@@ -137,24 +137,6 @@ def test_declared_whole_numbers_need_no_key():
     assert all(type(row[name]) is int for row in rows for name in ("ants", "task.pheromone.level"))
 
 
-def test_seeds_of_worlds_are_whole_numbers():
-    text = COLONY.replace("task.noise.slip = { from = 0", "world.seed = { from = 0").replace(
-        "to = 0.5 }", "to = 90 }"
-    )
-    text = text.replace("[task]", '[world]\npreset = "open"\n[task]')
-    rows = sweep_of(files.tomllib.loads(text)).settings
-    assert {type(row["world.seed"]) for row in rows} == {int}
-
-
-def test_no_setting_has_the_name_of_a_key_of_ranges():
-    from taichi_ants import worlds
-    from taichi_ants.settings import all_of
-    from taichi_ants.task import Task
-
-    of_worlds = [one for name in worlds.names() for one in worlds.settings_of(name)]
-    assert not {one.name for one in (*all_of(Task), *of_worlds)} & {"from", "to"}
-
-
 SLIP, HALF = "{ from = 0, to = 0.5 }", '{ from = 10, to = 1000, scale = "log" }'
 WRONG = {
     "design": ('"sobol"', '"halton"', ["design is 'halton'", "latin_hypercube, sobol, random"]),

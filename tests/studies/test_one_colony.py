@@ -8,7 +8,6 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from taichi_ants import AntsError, Colony, Task, TrainingConfig, worlds
 from taichi_ants.engines.colony.layout import WorldRow
@@ -82,27 +81,6 @@ def test_a_stopped_colony_ends_at_a_whole_tick_with_all_its_files(tmp_path, caps
     assert (end.value.code, colony.ticks) == (143, 2)
     assert Colony.load(save).ticks == 2
     assert (tmp_path / "a.gif").exists()
-
-
-def test_a_colony_with_pictures_far_apart_hears_a_signal_between_them(tmp_path) -> None:
-    """With `--frame-interval 1000000` it used to be heard at the next picture, minutes later."""
-    shares = []
-
-    def progress(share: float) -> None:
-        shares.append(share)
-        if len(shares) == 3:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    colony, other = begun(), begun()
-    path = str(tmp_path / "a.gif")
-    with pytest.raises(SystemExit), stoppable(), held() as stopped:
-        live(colony, 10**7, progress, stopped, render=path, frame_interval=10**6)
-    assert 3 < colony.ticks < 100
-    other.tick(colony.ticks)
-    assert colony == other
-    assert len(shares) == 4
-    with Image.open(path) as picture:
-        assert picture.n_frames == 2  # the start, and how it was when it was stopped
 
 
 def test_the_summary_counts_in_words() -> None:
