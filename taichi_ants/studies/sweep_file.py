@@ -188,8 +188,11 @@ def axes_of(kind: str, table: Any, fixed: Settings) -> dict[str, Axis]:
         if isinstance(values, dict):
             declaration = declaration_of(name, fixed)
             of_points = (f.name for f in fields(KINDS[kind]) if "int" in str(f.type))
-            whole = name in ("world.seed", *of_points)
-            axes[name] = Range.of(name, values, declaration.kind is int if declaration else whole)
+            whole = declaration.kind is int if declaration else name in ("world.seed", *of_points)
+            axes[name] = limits = Range.of(name, values, whole)
+            if declaration:
+                for end in (limits.low, limits.high):  # which drawn points lack
+                    declaration.checked(end)
         else:
             _check_once(name, values)
             axes[name] = Choices(tuple(values))

@@ -155,7 +155,7 @@ def test_a_difference_is_named_with_its_place(copy, capsys, monkeypatch):
     monkeypatch.setattr(archive, "packages", lambda: {**known, "numpy": "0", "scipy": None})
     status, out, err = call("reproduce", ["copy.zip", "--trust-code"], capsys)
     assert status == 1
-    assert f"DIFFERENT  runs.csv (first difference at byte {at}, line 2)" in out
+    assert "DIFFERENT  runs.csv (first difference in line 2)" in out
     assert "DIFFERENT  more.txt (is only in the archive)" in out
     assert "2 of 4 files differ: the study is not reproduced.\n" in out
     versions = f"numpy 0 instead of {known['numpy']}, scipy None instead of {known['scipy']}"

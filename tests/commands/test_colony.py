@@ -71,7 +71,7 @@ def task(pheromone=Pheromone(), life=Life(regrowth=0)):  # noqa: B008 - both are
         ),
         (
             ["live", "--policy", "x", "--task.observation", "paper"],
-            "--task.observation has no effect with --policy",
+            "the file of --policy determines the observation",
         ),
         (["live", "--task.pheromone.half-live", 5], "is not a setting; choose half_life"),
         (["live", "--task.life.births", "maybe"], "is 'maybe'; it must be True or False"),

@@ -164,7 +164,9 @@ def test_results_of_other_physics_are_refused(sweep, monkeypatch):
     monkeypatch.setattr("taichi_ants.studies.command.PHYSICS", 99)
     status, _, err = sweep(RUNS, "a")
     assert status == 2
-    assert "contains results of other settings (physics is 1 instead of 99); choose another" in err
+    assert (
+        "contains results that this study lacks (physics is 1 instead of 99); choose another" in err
+    )
 
 
 def test_a_folder_of_something_else_is_left_alone(sweep):
@@ -293,9 +295,9 @@ def test_status_and_tables_of_work_in_progress(sweep, capsys, monkeypatch):
     assert Path("a/runs.csv").read_text().splitlines() == final
     _, out, _ = call("status", ["a"], capsys)
     assert "finished: results with 24 runs, since" in out
-    status, out, err = call("status", ["nothing", "a", "none"], capsys)
+    status, out, err = call("status", ["nothing"], capsys)
     assert status == 2
-    assert err.count("has no results; name the folder of a study") == 2
+    assert "has no results; name the folder of a study" in err
 
 
 def test_the_time_left_is_that_of_the_last_process(sweep, monkeypatch):

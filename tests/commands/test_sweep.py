@@ -493,7 +493,10 @@ def test_a_training_is_allowed_if_a_part_of_the_sweep_learns():
     ("more", "message"),
     [
         ({"evaluation_epsilon": 1.5}, "epsilon is 1.5; it must be a number between 0 and 1"),
-        ({"task": {"choice": "deneubourg"}, "evaluation_epsilon": 0.1}, "ants do not explore"),
+        (
+            {"task": {"choice": "deneubourg"}, "evaluation_epsilon": 0.1},
+            "evaluation_epsilon has no effect",
+        ),
         ({"kind": "runs", "evaluation_epsilon": 0.1}, "of kind 'runs', but of 'colony'"),
     ],
 )

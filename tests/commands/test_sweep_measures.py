@@ -71,7 +71,7 @@ def run(level=250, table=None, **asked):
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (BY_TRAIL.replace("episodes = 0", ""), "but episodes is 50; set episodes = 0 and leave"),
+        (BY_TRAIL.replace("episodes = 0", ""), "episodes has no effect if `task.choice.rule` is"),
         (
             FILE.replace("[vary]", "[task.fields.home]\n[vary]\ntask.fields.hom.level = [1, 2]"),
             "`task.fields.hom` is in [vary], but the file has no table [task.fields.hom]; choose h",
@@ -210,7 +210,11 @@ training.learning_rate = [0.1, 0.2]
         ("episodes = 0", "episodes = 2", ["'trail_follower'", "set episodes = 0"]),
         ('"trail_follower"', '"none.npz"', ["cannot read 'none.npz'"]),
         ("[vary]", "[vary]\nmeasure_every = [5, 6]", ["measure_every cannot vary"]),
-        ('"entropy", "deliveries", "path_length"', '"per_ant"', ["no measure has a series"]),
+        (
+            '"entropy", "deliveries", "path_length"',
+            '"per_ant"',
+            ["with a measure that has a series"],
+        ),
     ],
 )
 def test_mistakes_end_in_one_sentence(old, new, words, sweep):
@@ -265,7 +269,12 @@ def test_runs_without_a_value_are_left_out_and_counted(tmp_path):
     def write(values, figures):
         found, present = {"entropy.trail": values}, np.ones((3, 12), bool)
         how = {"figures": figures, "parquet": False, "part": False, "folder": tmp_path}
-        return tables(sweep, SimpleNamespace(**how, present=present, read=lambda *_, arrays: found))
+        return tables(
+            sweep,
+            SimpleNamespace(
+                **how, study=sweep.study, present=present, read=lambda *_, arrays: found
+            ),
+        )
 
     report = write(values, figures=True)
     rows = numbers_in(tmp_path / "summary.csv")

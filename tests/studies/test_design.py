@@ -141,7 +141,7 @@ SLIP, HALF = "{ from = 0, to = 0.5 }", '{ from = 10, to = 1000, scale = "log" }'
 WRONG = {
     "design": ('"sobol"', '"halton"', ["design is 'halton'", "latin_hypercube, sobol, random"]),
     "samples": ("samples = 8", "", ["samples is None"]),
-    "samples of a grid": ('design = "sobol"', "", ["samples needs a design"]),
+    "samples of a grid": ('design = "sobol"', "", ["samples is for the designs latin_hypercube"]),
     "reversed": (SLIP, "{ from = 0.5, to = 0 }", ["slip is from 0.5 to 0; both must be a number"]),
     "key": (
         SLIP,
