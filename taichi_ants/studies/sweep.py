@@ -148,20 +148,14 @@ def sweep_of(file: Settings) -> Sweep:
     margin = file.get("margin", 0)
     if type(margin) not in (int, float) or not 0 <= margin < math.inf:
         raise AntsError(f"margin is {shown(margin)}; it must be a number of at least 0.")
-    against = None
-    if "against" in file:
-        if drawn.kind != GRID:
-            raise AntsError(f"against is for a grid, but design is {drawn.kind!r}; leave it out.")
-        given = file["against"]
-        pairs = list(flat(given).items()) if isinstance(given, dict) else []
-        if len(pairs) != 1 or not any(pairs[0] in row.items() for row in rows):
-            raise AntsError(
-                f"against is {shown(given)}; it must be one setting with one of its values in "
-                "[vary]."
-            )
-        (against,) = pairs
-    elif "margin" in file:
-        raise AntsError("margin requires against; add against, or leave margin out.")
+    against: Any = flat(file["against"]) if isinstance(file.get("against"), dict) else {}
+    (against,) = against.items() if len(against) == 1 else [None]
+    of_grid = drawn.kind == GRID and any(against in row.items() for row in rows)
+    if ("against" in file or "margin" in file) and not of_grid:
+        raise AntsError(
+            f"against is {shown(file.get('against'))}; with a grid, it must be one setting with "
+            "one of its values in [vary], which margin requires."
+        )
     every, arrays = base.reading.get("measure_every"), base.measures
     if every is not None:
         arrays += tuple(f"{SERIES}{name}" for name in base.reading["measures"])
@@ -182,18 +176,13 @@ def _measured(
     arrays = {key: array[0] for key, array in outcome.items()}
     run, columns = Run.of_colony(arrays, point.ants, point.ticks), Arrays()
     for measure in (finished.of_runs(kind, name) for name in wanted):
-        of_run = {measure.name: measure.computed(run)} if measure.of == RUN else {}
-        columns |= of_run or _ends(arrays, measure.name)
+        if measure.of == RUN:
+            columns[measure.name] = measure.computed(run)
+            continue
+        for key in parts_of(f"{SERIES}{measure.name}", arrays):
+            # The mean over rollouts with a value at their last ticks, float64 (seeds,).
+            columns[key.removeprefix(SERIES)] = known_means(arrays[key][..., -1])
     return {name: array[None] for name, array in columns.items()}
-
-
-def _ends(outcome: Arrays, name: str) -> Arrays:
-    """Return the mean over rollouts of a registered measure at their last ticks, float64 (seeds,).
-
-    A measure with parts has several arrays. Rollouts without a value do not count.
-    """
-    several = parts_of(f"{SERIES}{name}", outcome)
-    return {key.removeprefix(SERIES): known_means(outcome[key][..., -1]) for key in several}
 
 
 def tables(sweep: Sweep, results: Results) -> str:

@@ -175,7 +175,7 @@ WRONG = {
     "grid": ('design = "sobol"\nsamples = 8', "", ["half_life.steps is None", "steps = 5"]),
     "sensitivity": ("sobol", "random", ["sensitivity = true with the design 'random'"]),
     "not a power": ("samples = 8", "samples = 9", ["samples = 9", "a power of 2"]),
-    "against": ("[task]", "against.task.noise.slip = 0\n[task]", ["against is for a grid"]),
+    "against": ("[task]", "against.task.noise.slip = 0\n[task]", ["with a grid, it must be"]),
 }
 
 
