@@ -39,7 +39,7 @@ def values(interventions: Interventions) -> dict[str, Value]:
     - deposit: the `level` of `Pheromone`; slope, cap, half_life, diffusion: as in `Pheromone`.
     - evaporation: 1 if trails evaporate, else 0.
     """
-    colony, pheromone = interventions.colony, interventions.colony.pheromone
+    colony, pheromone = interventions.colony, interventions.colony.pheromones[0]
     values = {"ants": Value(max(interventions.living, 1), 1, colony.capacity, 1, "ants")}
     if colony.task.choice.needs_table:
         values["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")

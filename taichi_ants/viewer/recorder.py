@@ -103,7 +103,7 @@ class Recorder:
     ) -> None:
         expect("colony", colony, Colony)
         expect("title", title, str)
-        check_one_of("pheromone", pheromone, (TRAIL, *colony.fields))
+        check_one_of("pheromone", pheromone, (TRAIL, *colony.task.fields))
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         self.pheromone = pheromone
         start = colony.snapshot(world)
@@ -202,8 +202,8 @@ class Recorder:
         for name, entries in (("castes", colony.task.castes), ("kinds of food", colony.task.foods)):
             if entries:
                 lines[name] = ", ".join(entries)
-        if colony.fields:
-            hidden = [name for name in (TRAIL, *colony.fields) if name != self.pheromone]
+        if colony.task.fields:
+            hidden = [name for name in (TRAIL, *colony.task.fields) if name != self.pheromone]
             lines["pheromone"] = f"{self.pheromone}; hidden: {', '.join(hidden)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
@@ -244,7 +244,7 @@ class Recorder:
         colony, slots = self.colony, self._living()
         states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
         before, ahead = self._tables(), np.zeros(len(slots), bool)
-        if colony.draws_ahead:
+        if colony.model.draws_next_action:
             ahead = colony.next_actions[self.world, slots] >= 0
         colony.tick()
         # Slots of ants that died still hold their data.

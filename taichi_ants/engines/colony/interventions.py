@@ -140,7 +140,7 @@ class _World:
     def lay_trail(self, cells: Cells, level: int, field: str = TRAIL) -> Change:
         """Set the trail, or a further field, of cells other than rocks."""
         cells = self.index(cells)
-        number = [TRAIL, *self.colony.fields].index(field)
+        number = [TRAIL, *self.colony.task.fields].index(field)
         yield
         self._lay(cells[self.view("walls")[cells] == 0], level, number)
 
@@ -386,7 +386,7 @@ class _World:
     def _change_food_sources(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
         """Let the food sources follow a change of cells; see `food_sources.changed`."""
         colony, arrays, room = self.colony, self.colony.arrays, self.colony.n_food_sources
-        if colony.food_changes:
+        if colony.model.food_changes:
             worlds = range(len(colony.worlds))
             sources = [food_sources.of_world(arrays, w, room) for w in worlds]
             offsets = colony.grid.offsets

@@ -2,17 +2,16 @@
 
 A rule of choice reads what the ant sees before its action. A rule of deposits that reads other
 pheromones reads those that ants lay before it with the deposits of this tick, see
-`Variant.lays_in_turn`. A rule of rewards runs when the ant observes at the end of a tick, before it
+`Model.lays_in_turn`. A rule of rewards runs when the ant observes at the end of a tick, before it
 learns, so it reads levels after the tick.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import taichi as ti
 
 from taichi_ants.engines.colony.columns import individual, nest_of
-from taichi_ants.engines.colony.own_rules import OwnRule
 from taichi_ants.engines.colony.steps import (
     cell_ahead,
     cue_level,
@@ -23,8 +22,9 @@ from taichi_ants.engines.colony.steps import (
     trait,
 )
 from taichi_ants.engines.colony.trail import level_of
-from taichi_ants.engines.own_rules import for_kernels
+from taichi_ants.engines.own_rules import bounded_function, for_kernels
 from taichi_ants.learners.memory import values_of
+from taichi_ants.rules import Rule
 from taichi_ants.rules.inputs import AHEAD, LEVELS, field_of
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.rules.actions import step_towards
@@ -33,6 +33,39 @@ from taichi_ants.task.rules.vision import code_in_view
 
 _CODE, _IS_TRUE, _IS_OPEN, _NEARER = range(4)  # the results of `cell_ahead`
 _WORDS = 4294967296.0
+
+
+class OwnRule:
+    """A rule in kernels: its function, and the place of its parameters in `rule_numbers`."""
+
+    def __init__(self, rule: Rule, column: int) -> None:
+        self.inputs, self.function = tuple(rule.inputs), bounded_function(rule)
+        self.places = range(column, column + len(rule.parameters))
+
+    def bound(self, c: Any) -> Callable[..., Any]:
+        """Return a function of inputs by name, for kernels; it ignores inputs that are not read."""
+
+        def call(**inputs: Any) -> Any:
+            numbers = [_number(c, column) for column in self.places]
+            return self.function(*(inputs[name] for name in self.inputs), *numbers)
+
+        return for_kernels(call)
+
+
+def own_rules(rules: Sequence[Rule]) -> dict[Rule | None, OwnRule | None]:
+    """Return the rules of a task in kernels, and None for None."""
+    own: dict[Rule | None, OwnRule | None] = {None: None}
+    column = 0
+    for rule in rules:
+        own[rule] = OwnRule(rule, column)
+        column += len(rule.parameters)
+    return own
+
+
+@ti.func
+def _number(c: ti.template(), column: ti.template()):
+    """Return a parameter of a rule."""
+    return c.rule_numbers[column]
 
 
 def choice(rule: OwnRule | None) -> Callable[..., Any] | None:
@@ -139,7 +172,7 @@ def _made(
             inputs[name] = make[name]()
         else:
             if name.startswith(LEVELS):
-                number = v.field_numbers[field_of(name)]
+                number = v.field_names.index(field_of(name))
                 inputs[name] = _levels(c, v, cues, w, ant, number, seen, paper_state, tick)
             else:
                 inputs[name] = _level(c, v, name, _place(c, w, ant), tick)
@@ -158,7 +191,7 @@ def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> dict[str, Callable[
 
 def _level(c: Any, v: Any, name: str, index: Any, tick: Any) -> Any:
     """Return the level of a cell in the pheromone that an input names."""
-    return level_of(v.field(c, v.field_numbers[field_of(name)]), index, tick)
+    return level_of(v.field(c, v.field_names.index(field_of(name))), index, tick)
 
 
 @ti.func

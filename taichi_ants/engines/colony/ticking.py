@@ -134,4 +134,5 @@ class TickingColony(ColonyState):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without Taichi's objects, so that copies and pickles work."""
-        return {name: value for name, value in vars(self).items() if name != "_stepper"}
+        made = "_stepper", "model"
+        return {name: value for name, value in vars(self).items() if name not in made}
