@@ -44,10 +44,10 @@ class Variant:
         # The mark of an ant that wants no other cell.
         self.idle = STANDS if model.traffic.shared else 0
         own = own_inputs.own_rules(model.rules)
-        self.own_choice = own_inputs.choice(own[model.choice_rule])
-        self.own_reward = own_inputs.reward(own[model.reward_rule])
-        deposits = [own_inputs.deposit(own[rule]) for rule in model.deposit_rules]
-        evaporations = [own[rule] for rule in model.evaporation_rules]
+        self.own_choice = model.choice_rule and own[model.choice_rule].choose
+        self.own_reward = model.reward_rule and own[model.reward_rule].pay
+        deposits = [rule and own[rule].lay for rule in model.deposit_rules]
+        evaporations = [rule and own[rule].evaporate for rule in model.evaporation_rules]
         # The arguments of `trail.pheromone_of` by number.
         self.pheromones = tuple(
             zip(model.dense_by_number, model.views, deposits, evaporations, strict=True)

@@ -50,7 +50,7 @@ def pheromone_of(
     dense: bool,
     view: str,
     own_deposit: Callable[..., Any] | None,
-    own_evaporation: Any,
+    own_evaporation: Callable[..., Any] | None,
 ) -> PheromoneArrays:
     """Return a pheromone with the arrays and numbers of an argument pack."""
     end = f"_{number}" if number else ""
@@ -63,7 +63,7 @@ def pheromone_of(
         *(getattr(c, name + end) for name in _NUMBERS),
         deposited_when=getattr(c, f"deposited_when{end}") if number else None,
         own_deposit=own_deposit,
-        own_evaporation=own_evaporation and own_evaporation.bound(c),
+        own_evaporation=own_evaporation,
     )
 
 
@@ -158,7 +158,7 @@ def evaporate(c: ti.template(), v: ti.template(), index, tick):
     for field in ti.static(v.dense_fields(c)):
         if ti.static(field.own_evaporation):
             if c.ground[index] != OBSTACLE:  # rocks and the outside hold no trail
-                level = field.own_evaporation(level=field.levels[index], tick=tick)
+                level = field.own_evaporation(c, field.levels[index], tick)
                 field.levels[index] = ti.cast(level, ti.f32)
         else:
             field.levels[index] = pheromone.evaporated(field.levels[index], field.decay)
