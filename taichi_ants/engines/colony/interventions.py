@@ -23,7 +23,7 @@ import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import wraps
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,7 +36,6 @@ from taichi_ants.engines.colony.layout import (
     Stage,
     WorldRow,
 )
-from taichi_ants.engines.colony.ticking import TickingColony
 from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, checked_whole, count, entries_of, shown
 from taichi_ants.grid.constants import (
@@ -52,6 +51,9 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
 
 Cells = np.ndarray | str  # flat indices (n,), or the name of a region
 Change = Iterator[None]  # yields once, between its checks and its effects
@@ -431,7 +433,7 @@ class Interventions:
     """
 
     def __init__(
-        self, colony: TickingColony, worlds: Sequence[int] | None = None, lasting: bool = True
+        self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None
