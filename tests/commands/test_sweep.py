@@ -217,7 +217,7 @@ WRONG = {
         "[against]\ntask.rewards.shaping = 7\n[task]",
         ["against is", "in [vary]"],
     ),
-    "margin alone": ("seeds =", "margin = 1\nseeds =", ["against is None", "which margin requires"]),
+    "margin alone": ("seeds =", "margin = 1\nseeds =", ["which margin requires"]),
     "against text": ("seeds =", 'against = "paper"\nseeds =', ["against is 'paper'"]),
     "measure twice": ('"greedy_deliveries"', '"return_last50"', ["'return_last50' more than once"]),
     "value twice": ("[1, 0]", "[1, 1]", ["task.rewards.shaping has 1 more than once"]),
