@@ -18,7 +18,7 @@ from taichi_ants.runtime import available_threads
 from taichi_ants.studies.executors import RESUME, LostWorkersError
 
 _LOOK_EVERY, _PATIENCE, _RETRIES = 5.0, 3.0, 3  # seconds between looks, and for an answer
-_LEAST = 16  # workers for which there is work in advance
+_LEAST = 64  # workers for which there is work in advance
 # Ray reads them when it starts: it sends no statistics, and prints fatal errors only.
 _ENVIRONMENT = {
     "RAY_USAGE_STATS_ENABLED": "0",
