@@ -1,4 +1,4 @@
-"""The models of golden hashes: colonies, trainings and protocols, drawn by the tests' generators."""
+"""The models of golden hashes: colonies, trainings and protocols, drawn as for other tests."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Group(NamedTuple):
     loads: bool = False
     castes: int | list[tuple[str, str]] = 0
     labour: bool = False
-    rules: dict[str, Any] = {}
+    rules: dict[str, Any] | None = None
 
 
 def _group(names: str, **options: Any) -> Group:
