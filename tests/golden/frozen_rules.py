@@ -1,4 +1,4 @@
-"""Rules for golden hashes: those of tests, and two more, which other tests do not see."""
+"""Rules for golden hashes: those of the tests, and two that other tests do not see."""
 
 from __future__ import annotations
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from taichi_ants import arguments
 from taichi_ants.engines.colony.episodes import ColonyEpisodes
 from taichi_ants.engines.colony.layout import WorldRow
 from taichi_ants.engines.colony.state import checked_worlds
@@ -15,7 +14,7 @@ from taichi_ants.engines.colony.ticking import TickingColony
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, checked_whole, shown
 from taichi_ants.measures.measure import Measure
-from taichi_ants.measures.series import Recorder
+from taichi_ants.measures.series import Recorder, stops
 from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.world import World
@@ -83,14 +82,13 @@ class Colony(TickingColony):
         episodes = checked_whole("episodes", episodes)
         ticks = checked_whole("ticks", ticks, most=MAX_STEPS)
         places = self._checked_places(worlds, episodes)
-        arguments.check_progress(progress)
         recorder, timetable = Recorder(measures, every), Timetable(self, protocol, ticks)
         outcomes = []
         for episode in range(episodes):
             self.begin_episode(ticks, places[episode])
             recorder.begin(episode)
             with timetable:
-                for stop in recorder.stops(ticks):
+                for stop in stops(ticks, recorder.every):
                     for _ in timetable.pieces(self._stepper, stop - self.ticks):
                         if progress is not None:
                             progress((episode + self.ticks / ticks) / episodes)
