@@ -310,7 +310,7 @@ MUTATIONS = [
     ("studies/sweep.py", "array[at, of].astype(float)", "array[at, 0].astype(float)", GROWING),
     # Recorder and viewer.
     ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
-    ("viewer/recorder.py", "+ 8 * carrying", "+ 8 * ~carrying", RECORDING),
+    ("viewer/recorder.py", "[order] + 8 * carrying", "[order] + 8 * ~carrying", RECORDING),
     ("viewer/recorder.py", "*rates, *counts, clock)", "*rates, *counts, tick)", RECORDING),
     ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
     ("viewer/recorder.py", "        late._forget()\n", "", SESSION),
@@ -322,7 +322,7 @@ MUTATIONS = [
         RECORDING,
     ),
     ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
-    ("viewer/recorder.py", "= ticks, colony.episode", "= ticks, 0", SESSION),
+    ("viewer/recorder.py", "self._ended = ticks,", "self._ended = 0,", SESSION),
     # Server.
     ("live/server.py", "self.in_flight >= _MOST_IN_FLIGHT", "self.in_flight < 0", SERVER),
     ("live/server.py", "not (knows or (", "not (True or (", SERVER),
