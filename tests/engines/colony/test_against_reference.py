@@ -56,9 +56,7 @@ KERNELS = [
 
 
 def both(drawn: RandomColony) -> tuple[Colony, ReferenceColony]:
-    rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
-    given = (drawn.world, drawn.task, drawn.training, drawn.seed)
-    return Colony(*given, **rules), ReferenceColony(*given, **rules)
+    return Colony(*drawn.model, **drawn.options), ReferenceColony(*drawn.model, **drawn.options)
 
 
 def without_rocks(world: World) -> World:
@@ -73,9 +71,9 @@ SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 
 def marked(kernels, quick, long):
     """Kernels with marks; golden hashes show that the results of the longest stay."""
-    for k, one in enumerate(kernels):
-        later = pytest.mark.long if k in long else pytest.mark.slow
-        yield pytest.param(one, marks=() if k in quick else later)
+    later = [pytest.mark.long if k in long else pytest.mark.slow for k in range(len(kernels))]
+    marks = [() if k in quick else mark for k, mark in enumerate(later)]
+    return [pytest.param(one, marks=mark) for one, mark in zip(kernels, marks, strict=True)]
 
 
 @pytest.mark.parametrize("kernel", marked(KERNELS, QUICK, LONG), ids=str)
