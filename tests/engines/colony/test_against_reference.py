@@ -56,9 +56,7 @@ KERNELS = [
 
 
 def both(drawn: RandomColony) -> tuple[Colony, ReferenceColony]:
-    rules = {**drawn.population, "sharing": drawn.sharing, "q_values": drawn.q_values}
-    given = (drawn.world, drawn.task, drawn.training, drawn.seed)
-    return Colony(*given, **rules), ReferenceColony(*given, **rules)
+    return Colony(*drawn.model, **drawn.options), ReferenceColony(*drawn.model, **drawn.options)
 
 
 def without_rocks(world: World) -> World:
@@ -67,22 +65,18 @@ def without_rocks(world: World) -> World:
 
 
 # The others come later: what they add, the tests of independent runs and of pages have as well.
-QUICK = (0, 1, 10, 13)
+QUICK, LONG = (0, 1, 10, 13), (2, 3, 6, 7, 8, 14)
 SLOW = [one for k, one in enumerate(KERNELS) if k not in QUICK]
 
-OPTIMISED = ("dyna_q", "independent", "ants_seen", False)
+
+def marked(kernels, quick, long):
+    """Kernels with marks; golden hashes show that the results of the longest stay."""
+    later = [pytest.mark.long if k in long else pytest.mark.slow for k in range(len(kernels))]
+    marks = [() if k in quick else mark for k, mark in enumerate(later)]
+    return [pytest.param(one, marks=mark) for one, mark in zip(kernels, marks, strict=True)]
 
 
-def marks_of(k: int) -> list[pytest.MarkDecorator]:
-    if KERNELS[k] == OPTIMISED:
-        return [pytest.mark.optimised]
-    return [] if k in QUICK else [pytest.mark.slow]
-
-
-MARKED = [pytest.param(one, marks=marks_of(k)) for k, one in enumerate(KERNELS)]
-
-
-@pytest.mark.parametrize("kernel", MARKED, ids=str)
+@pytest.mark.parametrize("kernel", marked(KERNELS, QUICK, LONG), ids=str)
 def test_every_tick_in_crowded_micro_worlds(kernel):
     """Two episodes each: something goes on between them, in every other case in another world."""
     learner, sharing, observation, dense, *rules = kernel
@@ -133,9 +127,6 @@ NESTS = [
     ("sarsa_lambda", "independent", "ants_seen", False, "blocking", "half", 4, 1, True),
     ("q_learning", "frozen", "other_nest_ants", False, "right_of_way", "half", 2, 2, True),
 ]
-QUICK_NESTS = [
-    one if k in (0, 3) else pytest.param(one, marks=pytest.mark.slow) for k, one in enumerate(NESTS)
-]
 
 
 def with_strangers(view):
@@ -149,7 +140,7 @@ def with_strangers(view):
     return index
 
 
-@pytest.mark.parametrize("kernel", QUICK_NESTS, ids=str)
+@pytest.mark.parametrize("kernel", marked(NESTS, (0, 3), (2,)), ids=str)
 def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers):
     """Deliveries by nest and kind, loads, regrowth, births by nest: two episodes each."""
     learner, sharing, observation, dense, traffic, view, nests, kinds, loads = kernel
@@ -206,13 +197,9 @@ CASTES = [
     ("sarsa_lambda", "independent", "ants_seen", False, "right_of_way", "half", 2, True, 2, {}),
     ("q_learning", "frozen", "queues", False, "following", UNDER, 2, True, 1, SOFT),
 ]  # fmt: skip
-QUICK_CASTES = [
-    one if k in (0, 2) else pytest.param(one, marks=pytest.mark.slow)
-    for k, one in enumerate(CASTES)
-]
 
 
-@pytest.mark.parametrize("kernel", QUICK_CASTES, ids=str)
+@pytest.mark.parametrize("kernel", marked(CASTES, (0, 2), (1, 3)), ids=str)
 def test_every_tick_with_castes_and_division_of_labour(kernel):
     """Numbers, tables, cues and deposits of castes, births, thresholds and idle ants."""
     learner, sharing, observation, dense, traffic, view, castes, labour, nests, more = kernel
