@@ -271,7 +271,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         self.check()
-        for fault in self.faults():
+        for fault in self._faults():
             raise AntsError(fault)
 
     def __repr__(self) -> str:
@@ -300,26 +300,22 @@ class Settings:
         for setting in declared(type(self)):
             object.__setattr__(self, setting.name, setting.checked(getattr(self, setting.name)))
         for setting in declared(type(self)):
-            if setting.rule.only is not None:
-                self._fill_or_refuse(setting)
+            if setting.rule.only is None:
+                continue
+            other, *values = setting.rule.only
+            value = getattr(self, setting.name)
+            if getattr(self, other) in values:
+                if value is None:
+                    object.__setattr__(self, setting.name, setting.rule.usual)
+            elif value != setting.default:
+                raise AntsError(
+                    f"`{setting.path}` is {shown(value)}; leave it out unless `{other}` is "
+                    f"{_either(map(repr, values))}."
+                )
 
-    def faults(self) -> Iterator[str]:
+    def _faults(self) -> Iterator[str]:
         """Yield messages about combinations of values that are not allowed."""
         yield from ()
-
-    def _fill_or_refuse(self, setting: DeclaredSetting) -> None:
-        """Refuse a setting that has no effect; replace None by the usual value if it has one."""
-        assert setting.rule.only is not None
-        other, *values = setting.rule.only
-        value = getattr(self, setting.name)
-        if getattr(self, other) in values:
-            if value is None and setting.rule.usual is not None:
-                object.__setattr__(self, setting.name, setting.rule.usual)
-        elif value != setting.default:
-            raise AntsError(
-                f"`{setting.path}` is {shown(value)}; leave it out unless `{other}` is "
-                f"{_either(map(repr, values))}."
-            )
 
     def uses(self) -> dict[str, str]:
         """Return the features in use, each with the words of messages about it.

@@ -49,8 +49,7 @@ class Threshold(Settings, path="task.castes.NAME.threshold"):
         Setting(only=("distribution", *DISTRIBUTIONS[2:])),
     ] = None
 
-    def faults(self) -> Iterator[str]:
-        """Yield messages about combinations of values that are not allowed."""
+    def _faults(self) -> Iterator[str]:
         value, spread = self.value or 0.0, self.spread or 0.0
         if self.distribution == "uniform" and spread > value:
             yield (
@@ -140,8 +139,7 @@ class Caste(Settings, path="task.castes.NAME"):
         default_factory=Threshold
     )
 
-    def faults(self) -> Iterator[str]:
-        """Yield messages about combinations of values that are not allowed."""
+    def _faults(self) -> Iterator[str]:
         path, spread, epsilon = self.path, self.epsilon_spread, self.epsilon
         if self.share is not None and self.ants is not None:
             yield f"`{path}.ants` is {self.ants}, but `share` is {self.share}; give one of them."

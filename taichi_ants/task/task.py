@@ -59,8 +59,7 @@ class Traffic(Settings, path="task.traffic"):
         ),
     ] = False
 
-    def faults(self) -> Iterator[str]:
-        """Yield messages about combinations of values that are not allowed."""
+    def _faults(self) -> Iterator[str]:
         if self.carriers_first and not self.shared:
             yield (
                 "`task.traffic.carriers_first` is True; leave it out unless `swap` or `follow` is "
@@ -190,8 +189,7 @@ class Task(Settings, path="task"):
         others = {name: self.rules[name] for name in self.rules if name not in used}
         object.__setattr__(self, "rules", Named({**used, **others}))
 
-    def faults(self) -> Iterator[str]:
-        """Yield messages about combinations of values that are not allowed."""
+    def _faults(self) -> Iterator[str]:
         choice, life, labour = self.choice, self.life, self.labour
         without_states = choice.rule == "deneubourg" or (choice.own_rule and self.noise.misread)
         if without_states and self.observation != "paper":

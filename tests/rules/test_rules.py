@@ -12,7 +12,6 @@ import pytest
 from taichi_ants import (
     AntsError,
     Colony,
-    Field,
     Interventions,
     Pheromone,
     Task,
@@ -25,7 +24,7 @@ from taichi_ants import (
 from taichi_ants.engines import own_rules as own_rules_of_kernels
 from taichi_ants.interventions import SetTask
 from taichi_ants.reference import own_observations
-from taichi_ants.rules import exp, log, pick, power, registry
+from taichi_ants.rules import pick, registry
 from taichi_ants.rules.inputs import KINDS
 from taichi_ants.task import Choice, Observation, observations
 from taichi_ants.task.observations import registry as seen
@@ -52,13 +51,6 @@ def test_a_task_names_rules_and_their_parameters():
     assert task.pheromone.dense
     assert not task.choice.needs_table
     assert Choice("restless").needs_table
-
-
-def test_functions_of_rules_equal_the_real_ones():
-    for x in (1e-6, 0.3, 1.0, 2.5, 40.0):
-        assert exp(x) == pytest.approx(np.exp(x), rel=1e-12)
-        assert log(x) == pytest.approx(np.log(x), rel=1e-12, abs=1e-15)
-        assert power(x, 1.7) == pytest.approx(x**1.7, rel=1e-12)
 
 
 INF, NAN, LAST = float("inf"), float("nan"), 1 - 2**-32  # LAST is the largest input `random`
@@ -273,19 +265,6 @@ def test_refusals_name_the_rule(make, says):
     with pytest.raises(AntsError) as caught:
         make()
     assert says in str(caught.value)
-
-
-def reads_a_field(levels_home):
-    return 0 * levels_home[0]
-
-
-def test_a_rule_that_reads_a_field_needs_it(clean):
-    rules.register("choice")(reads_a_field)
-    with pytest.raises(
-        AntsError, match=r"'reads_a_field' reads is 'home'; it must be one of trail"
-    ):
-        Task(choice="reads_a_field")
-    Task(choice="reads_a_field", fields={"home": Field()})
 
 
 def test_parameters_change_without_other_kernels_and_in_an_episode(clean):
