@@ -11,13 +11,9 @@ from bridge import crossings, point, task
 from bridge_report import (
     BRIDGES,
     DESIGNS,
-    EQUAL,
     LATE,
-    SHORT_LEFT,
-    SHORT_RIGHT,
     WINDOWS,
     Design,
-    bridges,
     late_shares,
 )
 from PIL import Image
@@ -100,21 +96,6 @@ def test_colonies_learn_where_the_short_branch_lies_on_either_side() -> None:
     assert 0.4 < drawn.mean() < 0.6
     assert one.training.initial_q > 0
     assert one.training.next_epsilon(one.training.epsilon) < one.training.epsilon
-
-
-def test_a_design_is_a_task_and_bridges() -> None:
-    assert len(set(DESIGNS)) == len(DESIGNS)
-    for design in DESIGNS:
-        rules = task(design)
-        assert rules.observation == {"queueing": "queues", "foraging": "ants"}[design.rules]
-        assert rules.pheromone.fades_after == 50
-        assert rules.life.regrowth == 0
-    assert task(Design(evaporation="20")).pheromone.half_life == 20
-    assert task(Design(evaporation="none")).pheromone.evaporation == "none"
-    assert tuple(bridges(Design())) == BRIDGES
-    assert tuple(bridges(Design(aside=0))) == (SHORT_RIGHT, SHORT_LEFT, EQUAL, LATE)
-    assert LATE not in bridges(Design(ants=8))
-    assert bridges(Design())[EQUAL].get("aside", 0) == 0
 
 
 SEEDS = (3, 4, 5)
