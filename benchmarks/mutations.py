@@ -182,14 +182,14 @@ MUTATIONS = [
     ("task/rules/vision.py", "2 * level >= ti.max", "2 * level > ti.max", COLONY),
     ("task/rules/vision.py", "ti.max(strongest, 1)", "ti.max(strongest, 0)", RUNS),
     ("task/rules/vision.py", "nearer >> 1 & 1", "nearer >> 2 & 1", RUNS),
-    ("task/observations/queues.py", "code = 6", "code = 5", COLONY),
+    ("task/observations/built_in.py", "code = 6", "code = 5", COLONY),
     (
-        "task/observations/trail_levels.py",
+        "task/observations/built_in.py",
         "level < view.strongest -",
         "level <= view.strongest -",
         "tests/engines/test_views.py",
     ),
-    ("task/observations/ants_seen.py", "view.ants[k] != 0", "view.ants[k] == 1", COLONY),
+    ("task/observations/built_in.py", "5 * index + code", "5 * index + view.codes[k]", COLONY),
     ("task/rewards.py", "[[Event.ENTERED_EMPTY, Event.PUSHED]]", "[Event.ENTERED_EMPTY]", TRAFFIC),
     # Engines.
     ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
@@ -383,7 +383,7 @@ MUTATIONS = [
     ("settings.py", 'branch[part] = {"": inner}', "branch[part] = {}", SETTINGS),
     # Features, and what supports them.
     ("features.py", ".intersection(supports):", ":", FEATURES),
-    ("settings.py", "if value == one.default:", "if True:", FEATURES),
+    ("settings.py", "if value == setting.default:", "if True:", FEATURES),
     # Designs.
     ("studies/design.py", "margin = 0.5 if self.whole else 0.0", "margin = 0.0", DESIGN),
     ("studies/design.py", "math.log(low) * (1 - share)", "math.log(low) * share", DESIGN),

@@ -11,16 +11,6 @@ from taichi_ants.grid.constants import HEADING_STEPS
 from taichi_ants.grid.hexgrid import AxialGrid
 
 
-@pytest.mark.parametrize(
-    ("ranges", "count"),
-    [((10, 10, 10), 271), ((1, 1, 1), 1), ((2, 2, 2), 7), ((7, 7, 1), 49), ((4, 1, 1), 4)],
-)
-def test_counts(ranges: tuple, count: int) -> None:
-    grid = AxialGrid(ranges)
-    assert grid.count == count
-    assert grid.exists.sum() == count
-
-
 def test_existing_cells_are_those_of_the_definition() -> None:
     ranges = (3, 2, 4)
     expected = {

@@ -50,14 +50,3 @@ def test_numbers_count_the_cells_in_lexicographic_order(world_ranges: tuple) -> 
     grid = AxialGrid(world_ranges)
     cells_there = sorted(map(tuple, grid.cells(np.flatnonzero(grid.exists)).tolist()))
     assert grid.number(cells_there).tolist() == list(range(grid.count))
-
-
-@given(cells, headings)
-def test_pixels_run_clockwise_from_the_top(cell: tuple, heading: int) -> None:
-    centre = hexgrid.centre_of(cell, 1.0)
-    dx, dy = hexgrid.centre_of(neighbours(cell)[heading], 1.0) - centre
-    # Clockwise on a screen whose y grows downwards: a mirrored or transposed mapping fails here.
-    clockwise = np.degrees(np.arctan2(dx, -dy)) % 360
-    assert np.isclose(clockwise, 60 * heading, atol=1e-6) or np.isclose(
-        clockwise, 360 + 60 * heading
-    )

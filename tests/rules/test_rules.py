@@ -57,25 +57,18 @@ def test_a_task_names_rules_and_their_parameters():
 INF, NAN, LAST = float("inf"), float("nan"), 1 - 2**-32  # LAST is the largest input `random`
 PICKS = [  # weights, random number, index
     ((1, 1, 2), 0, 0),
-    ((1, 1, 2), 0.2499, 0),
     ((1, 1, 2), 0.25, 1),
     ((1, 1, 2), 0.5, 2),
-    ((1, 1, 2), LAST, 2),
     ((0, 1, 0), 0, 1),  # closed cells on both sides
     ((0, 1, 0), LAST, 1),
     ((1, 0, 1), 0.5, 2),  # the closed cell lies between
-    ((1, 0, 0), LAST, 0),
     ((1, 0, 0), 1, 0),  # as after rounding
     ((1, 1, 0), 1, 1),
-    ((0, 1, 1), -1, 1),
     ((0.1, 0.2, 0), 1 - 2**-53, 1),
     ((1e16, 1, 0), LAST, 0),
     ((0, 0, 0), 0.3, -1),
     ((-5, NAN, 0), 0.3, -1),
-    ((-5, 2, NAN), LAST, 1),
-    ((1e-301, 1e-300, 0), 0, 1),
     ((1, INF, 1), 0.3, 1),
-    ((INF, 0, INF), 0.5, 2),
     ((1e308, 1e308, 1e308), 0.4, 1),
     ((1, 1, 1), NAN, 0),
 ]
@@ -129,11 +122,6 @@ evaporation: has the argument `levl`, which is not an input
 def wrong(levl):
     return levl
 
-evaporation: `import math`, is not allowed
-def wrong(level):
-    import math
-    return math.floor(level)
-
 evaporation: `'level'`, is not a number
 def wrong(level):
     return "level" if level else 0
@@ -142,17 +130,9 @@ evaporation: ZeroDivisionError: float division by zero for level=
 def wrong(level):
     return 1 / (level - level)
 
-deposit: x must be above 0
-def wrong(level):
-    return power(0 - level, 0.5)
-
 evaporation: `nowhere`, is not defined
 def wrong(level):
     return level + nowhere
-
-evaporation: `level & 3`, is not allowed
-def wrong(level):
-    return level & 3
 
 evaporation: `not level`, is not a number; use it as a condition, as in
 def wrong(level):

@@ -1,7 +1,5 @@
 """What a world holds, its arrays, and where its ants start."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hexagons import distance
@@ -11,7 +9,7 @@ from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.reference.ants import starts
-from taichi_ants.task.constants import EMPTY, FOOD, OBSTACLE, QUEEN
+from taichi_ants.task.constants import EMPTY
 from taichi_ants.worlds import World
 from taichi_ants.worlds.world import STARTS as WHERE
 
@@ -45,39 +43,6 @@ def test_contents_are_stored_in_normal_form() -> None:
     assert world.obstacles.tolist() == [[0, 0, 0], [2, 0, 1]]
     assert world.trails.tolist() == [[0, 0, 1, 3], [0, 2, 2, 25]]
     assert world.ants.tolist() == [[0, 0, 1, 5], [1, 0, 0, 2]]
-
-
-def test_ground_and_trail_levels() -> None:
-    world = small()
-    index = world.grid.index
-    ground, levels = world.ground(), world.trail_levels()
-    assert ground.dtype == np.uint8
-    assert levels.dtype == np.int32
-    assert ground[index((0, 0, 0))] == QUEEN
-    assert ground[index((2, 0, 0))] == FOOD
-    assert (ground[index([(0, 2, 0), (0, 0, 2)])] == OBSTACLE).all()
-    assert (ground[~world.grid.exists] == OBSTACLE).all()
-    assert (ground == EMPTY).sum() == 19 - 4
-    assert levels[index([(1, 0, 0), (1, 1, 0)])].tolist() == [7, 7]
-    assert levels.sum() == 14
-
-
-def test_distances_and_closer_by_hand() -> None:
-    world = World((10, 10, 10), (0, 9, 9))
-    distances, closer = world.distances(), world.closer()
-    assert distances.dtype == np.int32
-    assert closer.dtype == np.uint8
-    index = world.grid.index
-    assert distances[index([(0, 9, 9), (0, 8, 8), (9, 0, 0), (0, 0, 9)])].tolist() == [0, 1, 18, 9]
-    assert (distances[~world.grid.exists] == 0).all()
-    assert (closer[~world.grid.exists] == 0).all()
-    # Straight above the queen only the way down is nearer; elsewhere two ways can be.
-    assert closer[index((0, 8, 8))] == 1 << 3
-    assert closer[index((9, 0, 0))] == 1 << 3
-    assert closer[index((0, 0, 9))] == 1 << 2
-    assert closer[index((0, 0, 0))] == 1 << 3
-    assert closer[index((1, 1, 0))] == 1 << 3 | 1 << 4
-    assert closer[index((0, 9, 9))] == 0
 
 
 def test_the_papers_world() -> None:
@@ -141,11 +106,3 @@ def test_ants_that_are_spread_start_on_any_free_cells_by_the_seed(seed: int) -> 
     assert far.mean() == pytest.approx(world.distances()[world.grid.exists].mean(), rel=0.1)
     with pytest.raises(AntsError, match="where is 'moon'; it must be one of nest, spread"):
         world.start(seed, 2, "moon")
-
-
-def test_reachable_foods() -> None:
-    # A corridor: queen, empty, food, food, empty, food.
-    corridor = World((8, 1, 1), (0, 0, 0), foods=[(2, 0, 0), (3, 0, 0), (5, 0, 0)])
-    assert corridor.reachable_foods().tolist() == [True, False, False]
-    assert dataclasses.replace(corridor, foods=[(1, 0, 0)]).reachable_foods().tolist() == [False]
-    assert World((8, 1, 1), (0, 0, 0)).reachable_foods().shape == (0,)
