@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cache, partial
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 from taichi_ants.errors import shown
 from taichi_ants.rules.inputs import LABOUR
@@ -25,7 +25,6 @@ from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]
-DELIVERIES: tuple[str, ...] = get_args(Delivery)
 _CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not pheromones
 
 
