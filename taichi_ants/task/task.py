@@ -13,7 +13,7 @@ from taichi_ants.errors import shown
 from taichi_ants.rules.inputs import LABOUR
 from taichi_ants.rules.registry import registered, words
 from taichi_ants.rules.rule import Parameters, Rule
-from taichi_ants.settings import Named, Setting, Settings
+from taichi_ants.settings import Named, Setting, Settings, declared
 from taichi_ants.task import observations
 from taichi_ants.task.caste import ALL, NOTHING, Caste, shares_in
 from taichi_ants.task.choice import Choice, Noise
@@ -25,6 +25,13 @@ from taichi_ants.task.pheromone import Pheromone
 from taichi_ants.task.rewards import Rewards
 
 Delivery = Literal["terminates", "truncates"]
+# Settings of castes that need a table of action values, or certain rules of choice.
+_OF_TABLES = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
+_OF_CHOICE = {
+    setting.name: setting.rule.only[1:]
+    for setting in declared(Choice)
+    if setting.rule.only and setting.name in Caste.__dataclass_fields__
+}
 _CUES = {"outbound_cue": (), "homing_cue": (COMPASS,)}  # with cues that are not pheromones
 
 
@@ -234,7 +241,8 @@ class Task(Settings, path="task"):
         nests = {caste.nest for caste in self.castes.values() if caste.nest is not None}
         for nest in (nests or {0}) if self.castes else ():
             shares_in(self.castes, nest)  # raises AntsError
-        unused = self._unused_of_castes
+        unused = [] if choice.needs_table else [*_OF_TABLES]
+        unused += [name for name, rules in _OF_CHOICE.items() if choice.rule not in rules]
         for name, caste in self.castes.items():
             if caste.threshold.exists and not labour.divides:
                 yield (
@@ -316,19 +324,6 @@ class Task(Settings, path="task"):
         """Whether ants are born or die."""
         spans = [self.life.lifespan, *(caste.lifespan for caste in self.castes.values())]
         return self.life.births or any(span is not None for span in spans)
-
-    @property
-    def _unused_of_castes(self) -> set[str]:
-        """The settings of castes that the rule of choice does not use."""
-        learning = ("policy", "epsilon", "epsilon_spread", "learning_rate", "discount")
-        rules = {
-            "greedy": learning,
-            "softmax": (*learning, "temperature"),
-            "deneubourg": ("k", "exponent"),
-        }
-        usual = rules["greedy"] if self.choice.needs_table else ()  # for your own rules
-        used = rules.get(self.choice.rule, usual)
-        return {name for of_rule in rules.values() for name in of_rule}.difference(used)
 
     def cues_of(self, caste: Caste | None) -> tuple[int, int]:
         """Return the numbers of the outbound and the homing cue of a caste, or of the task."""
