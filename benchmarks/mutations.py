@@ -376,7 +376,7 @@ MUTATIONS = [
     ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
     ("studies/sweep.py", "outcome[key][..., -1]", "outcome[key][..., 0]", SWEEPS),
     # Settings.
-    ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
+    ("settings.py", "converted <= above", "converted < above", SETTINGS),
     ("settings.py", "elif value != setting.default:", "elif False:", SETTINGS),
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "changed[setting.name] = setting.default", "pass", SETTINGS),
