@@ -241,7 +241,7 @@ def to_text(world: World) -> str:
         ("a trail under the queen or food", bool(hidden)),
     ):
         if is_there:
-            raise AntsError(f"a map cannot show {what}; remove it from the world.")
+            raise AntsError(f"a map cannot show {what}; change this in the world.")
     marks = [(world.grid.cells(np.flatnonzero(world.grid.exists)), EMPTY)]
     kinds = world.kinds_by_cell()[world.grid.index(world.foods)]
     marks += [(world.obstacles, OBSTACLE)]
