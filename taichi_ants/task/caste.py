@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from numbers import Real
 from typing import Annotated, Any, Literal, get_args
 
@@ -135,9 +135,7 @@ class Caste(Settings, path="task.castes.NAME"):
         str | None, Setting("what ants with food see as S; off: the cue of the task")
     ] = None
     lifespan: Annotated[Ticks, Setting("age at which an ant dies; off: that of the task")] = None
-    threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = field(
-        default_factory=Threshold
-    )
+    threshold: Annotated[Threshold, Setting("response thresholds of the ants")] = Threshold()
 
     def _faults(self) -> Iterator[str]:
         path, spread, epsilon = self.path, self.epsilon_spread, self.epsilon

@@ -126,10 +126,10 @@ class Task(Settings, path="task"):
     observation: Annotated[str, Setting("observation of an ant", choices=observations.names)] = (
         "paper"
     )
-    rewards: Annotated[Rewards, Setting("reward of each event")] = field(default_factory=Rewards)
+    rewards: Annotated[Rewards, Setting("reward of each event")] = Rewards()
     pheromone: Annotated[
         Pheromone, Setting("rules by which trails are laid, evaporate and spread")
-    ] = field(default_factory=Pheromone)
+    ] = Pheromone()
     fields: Annotated[Named[Field], Setting("further pheromones, by name")] = field(
         default_factory=Named
     )
@@ -142,9 +142,7 @@ class Task(Settings, path="task"):
             "what ants with food see as S: compass (nearer cells), trail, or the name of a field"
         ),
     ] = COMPASS
-    traffic: Annotated[Traffic, Setting("rules for entering a cell with an ant on it")] = field(
-        default_factory=Traffic
-    )
+    traffic: Annotated[Traffic, Setting("rules for entering a cell with an ant on it")] = Traffic()
     turns_at_queen: Annotated[bool, Setting("turn ants around after a delivery")] = False
     delivery: Annotated[
         Delivery,
@@ -157,15 +155,9 @@ class Task(Settings, path="task"):
     evaporation_in_evaluation: Annotated[
         bool, Setting("evaporate trails while ants follow a fixed policy")
     ] = True
-    life: Annotated[Life, Setting("changes of ants and food in colonies")] = field(
-        default_factory=Life
-    )
-    choice: Annotated[Choice, Setting("rule by which ants choose actions")] = field(
-        default_factory=Choice
-    )
-    noise: Annotated[Noise, Setting("failures of actions and observations")] = field(
-        default_factory=Noise
-    )
+    life: Annotated[Life, Setting("changes of ants and food in colonies")] = Life()
+    choice: Annotated[Choice, Setting("rule by which ants choose actions")] = Choice()
+    noise: Annotated[Noise, Setting("failures of actions and observations")] = Noise()
     foods: Annotated[
         Named[Food],
         Setting("kinds of food, in the order of their numbers in worlds; colonies only"),
@@ -174,9 +166,7 @@ class Task(Settings, path="task"):
         Named[Caste],
         Setting("castes of ants, in the order of their numbers; colonies only"),
     ] = field(default_factory=Named)
-    labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = field(
-        default_factory=Labour
-    )
+    labour: Annotated[Labour, Setting("rule by which ants start and stop foraging")] = Labour()
     reward: Annotated[
         str,
         Setting(
