@@ -102,10 +102,10 @@ def from_text(text: str, source: str = "the map") -> World:
     )
 
 
-def ranges_of(text: str, source: str = "the map") -> tuple[int, int, int]:
+def ranges_of(text: str) -> tuple[int, int, int]:
     """Return the ranges of the world drawn in `text`, without building it."""
-    *_, drawn = _read(text, source)
-    return _placed(drawn, source)[0]
+    *_, drawn = _read(text, "the map")
+    return _placed(drawn, "the map")[0]
 
 
 class _Character(NamedTuple):
