@@ -290,9 +290,10 @@ class Task(Settings, path="task"):
 
     def replace(self, /, **changes: Any) -> Task:
         """Return the task with changes; rules that it no longer uses lose their parameters."""
-        bare = copy.copy(self)
-        object.__setattr__(bare, "rules", Named())
-        parameters = changes.pop("rules", {})
+        bare, parameters = self, changes.pop("rules", {})
+        if self.rules:
+            bare = copy.copy(self)
+            object.__setattr__(bare, "rules", Named())
         task = super(Task, bare).replace(**changes)
         kept = {name: self.rules.get(name, default) for name, default in task.rules.items()}
         object.__setattr__(task, "rules", Named(kept))
