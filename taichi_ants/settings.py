@@ -261,8 +261,9 @@ class Settings:
 
     def __new__(cls, /, *values: Any, **named: Any) -> Any:
         known = cls.__dataclass_fields__  # type: ignore[attr-defined]
-        for name in named.keys() - known.keys():
-            raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
+        for name in named:  # Python's own message has no path and no similar names
+            if name not in known:
+                raise AntsError(f"`{_below(cls.path, name)}` {not_a_setting(name, known)}")
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
