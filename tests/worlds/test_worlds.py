@@ -1,12 +1,15 @@
-"""What a world holds, its arrays, and where its ants start."""
+"""What a world holds and computes, and where its ants start."""
 
 import numpy as np
 import pytest
-from hexagons import distance
+from hexagons import distance, neighbours
+from hypothesis import given
+from hypothesis import strategies as st
 
 from taichi_ants import worlds
 from taichi_ants.errors import AntsError
 from taichi_ants.grid.constants import STREAM_START_CELL, STREAM_START_HEADING
+from taichi_ants.grid.hexgrid import AxialGrid
 from taichi_ants.grid.randomness import stream_state
 from taichi_ants.reference.ants import starts
 from taichi_ants.task.constants import EMPTY
@@ -106,3 +109,37 @@ def test_ants_that_are_spread_start_on_any_free_cells_by_the_seed(seed: int) -> 
     assert far.mean() == pytest.approx(world.distances()[world.grid.exists].mean(), rel=0.1)
     with pytest.raises(AntsError, match="where is 'moon'; it must be one of nest, spread"):
         world.start(seed, 2, "moon")
+
+
+@st.composite
+def crowded_worlds(draw: st.DrawFn) -> World:
+    """Worlds in which rocks and foods block many ways."""
+    ranges = draw(st.tuples(*[st.integers(1, 6)] * 3))
+    grid = AxialGrid(ranges)
+    cells = grid.cells(np.flatnonzero(grid.exists)).tolist()
+    kinds = draw(st.lists(st.sampled_from("..##F"), min_size=len(cells), max_size=len(cells)))
+    kinds[draw(st.integers(0, len(cells) - 1))] = "Q"
+    listed = {kind: [c for c, k in zip(cells, kinds, strict=True) if k == kind] for kind in "#FQ"}
+    return World(ranges, listed["Q"][0], foods=listed["F"], obstacles=listed["#"])
+
+
+@given(crowded_worlds())
+def test_foods_are_reachable_where_a_walk_leads(world: World) -> None:
+    ground = world.ground()
+
+    def beside(cell: tuple) -> list[tuple]:
+        around = [tuple(n) for n in neighbours(cell).tolist()]
+        return [n for n in around if (np.array(n) < world.ranges).all()]
+
+    def empty(cell: tuple) -> bool:
+        return ground[world.grid.index(cell)] == EMPTY
+
+    reached: set[tuple] = set()
+    frontier = [cell for cell in beside(world.queen) if empty(cell)]
+    while frontier:
+        cell = frontier.pop()
+        if cell not in reached:
+            reached.add(cell)
+            frontier += [other for other in beside(cell) if empty(other)]
+    expected = [not reached.isdisjoint(beside(tuple(food))) for food in world.foods.tolist()]
+    assert world.reachable_foods().tolist() == expected
