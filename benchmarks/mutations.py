@@ -182,14 +182,14 @@ MUTATIONS = [
     ("task/rules/vision.py", "2 * level >= ti.max", "2 * level > ti.max", COLONY),
     ("task/rules/vision.py", "ti.max(strongest, 1)", "ti.max(strongest, 0)", RUNS),
     ("task/rules/vision.py", "nearer >> 1 & 1", "nearer >> 2 & 1", RUNS),
-    ("task/observations/queues.py", "code = 6", "code = 5", COLONY),
+    ("task/observations/built_in.py", "code = 6", "code = 5", COLONY),
     (
-        "task/observations/trail_levels.py",
+        "task/observations/built_in.py",
         "level < view.strongest -",
         "level <= view.strongest -",
         "tests/engines/test_views.py",
     ),
-    ("task/observations/ants_seen.py", "view.ants[k] != 0", "view.ants[k] == 1", COLONY),
+    ("task/observations/built_in.py", "5 * index + code", "5 * index + view.codes[k]", COLONY),
     ("task/rewards.py", "[[Event.ENTERED_EMPTY, Event.PUSHED]]", "[Event.ENTERED_EMPTY]", TRAFFIC),
     # Engines.
     ("engines/runs/kernels.py", "step + 1 == a.max_steps", "step == a.max_steps", RUNS),
@@ -375,7 +375,7 @@ MUTATIONS = [
     ("analysis/results.py", "- values[1])", "- values[0])", RESULTS_OF_RUNS),
     ("studies/sweep.py", "outcome[key][..., -1]", "outcome[key][..., 0]", SWEEPS),
     # Settings.
-    ("settings.py", "value > rule.above", "value >= rule.above", SETTINGS),
+    ("settings.py", "converted <= above", "converted < above", SETTINGS),
     ("settings.py", "elif value != setting.default:", "elif False:", SETTINGS),
     ("settings.py", " and math.isfinite(value)", "", SETTINGS),
     ("settings.py", "changed[setting.name] = setting.default", "pass", SETTINGS),
