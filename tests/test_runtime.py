@@ -198,7 +198,7 @@ tiny = sys.float_info.min
 trained()
 
 import taichi as ti
-from taichi_ants.engines.arguments import Launch
+from taichi_ants.engines.launch import Launch
 
 assert tiny / 2 > 0.0 and np.float64(tiny) / 2 > 0.0
 

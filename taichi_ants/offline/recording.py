@@ -9,9 +9,7 @@ import numpy as np
 
 from taichi_ants import arguments, runtime
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.runs.engine import Progress, Runs
-from taichi_ants.engines.runs.results import RunState
-from taichi_ants.engines.runs.traces import record_steps
+from taichi_ants.engines.runs.engine import Progress, Runs, RunState, record_steps
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.features import CASTES, CHOICE, COLONY, FOODS, refuse_unsupported
 from taichi_ants.learners.config import TrainingConfig

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
-from taichi_ants.engines.runs.traces import RolloutArguments, Trace, rollout
+from taichi_ants.engines.runs.results import RolloutArguments, Trace
+from taichi_ants.engines.runs.training import rollout
 from taichi_ants.errors import AntsError, checked_whole, expect
 from taichi_ants.grid.constants import STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state

@@ -17,7 +17,7 @@ from taichi_ants.analysis.behaviour import (
     WALKS,
     classify,
 )
-from taichi_ants.engines.runs.traces import trace_policies
+from taichi_ants.engines.runs.training import trace_policies
 from taichi_ants.learners import policies
 from taichi_ants.learners.config import TrainingConfig
 from taichi_ants.task.constants import FORWARD, GIVE, LEFT, PICK_UP, RIGHT, SEES_CUE
@@ -112,7 +112,7 @@ def test_traces_of_many_policies_are_single_rollouts():
 def test_traces_come_in_pieces_of_bounded_size(monkeypatch):
     tables = [table for table, _ in CASES.values()]
     (whole,) = trace_policies(paper(), tables, range(7), 50)
-    monkeypatch.setattr("taichi_ants.engines.runs.traces.MAX_ROLLOUT_STEPS", 3 * 50)
+    monkeypatch.setattr("taichi_ants.engines.runs.engine.MAX_ROLLOUT_STEPS", 3 * 50)
     pieces = list(trace_policies(paper(), tables, range(7), 50))
     assert [np.unique(piece.episodes).tolist() for piece in pieces] == [[0, 1, 2], [3, 4, 5], [6]]
     for name in ("episodes", "steps", "states", "q_values"):

@@ -154,7 +154,7 @@ class BatchedEnvironments:
         """Return the launch of a rollout with observations of `width` numbers."""
         if (follows, width) not in self._launches:
             runtime.start()  # configures Taichi before the imports below
-            from taichi_ants.engines.arguments import Launch
+            from taichi_ants.engines.launch import Launch
             from taichi_ants.engines.runs.rollout_kernel import WIDTH, rollout_kernel
             from taichi_ants.engines.runs.step import Rules
 

@@ -1,4 +1,4 @@
-"""Arguments of the kernel of independent runs, and the loop over its launches.
+"""The state of independent runs, the arguments of their kernel, and the loop over its launches.
 
 A launch cannot be interrupted, so it should take about a second even if every episode uses all of
 its steps. Within that bound, few large launches are best, because threads wait for the last run of
@@ -21,16 +21,19 @@ from taichi_ants.engines.layout import (
     N_SETTINGS,
     OUTCOMES,
     SETTINGS,
+    STEPS,
+    TRACE,
     compass_of,
     pack_cells,
+    padded,
 )
-from taichi_ants.engines.runs.results import RunState
-from taichi_ants.grid.constants import STREAM_ROLLOUT
+from taichi_ants.grid.constants import STREAM_ANT, STREAM_ROLLOUT
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig
-from taichi_ants.learners.learner import Learner
+from taichi_ants.learners.learner import Learner, Memory
+from taichi_ants.records import Record
 from taichi_ants.task import Task
-from taichi_ants.task.constants import N_ACTIONS
+from taichi_ants.task.constants import N_ACTIONS, ROW
 from taichi_ants.worlds.world import World
 
 Progress = Callable[[float], None]  # called with the share of the work that is done, 0 to 1
@@ -40,6 +43,84 @@ _STEP_NS = 25  # a step of Q-learning on one thread of a slow core
 _WORKSPACE_BYTES = 256 * 2**20
 _MOST_NUMBERS = 2**30  # in one array of a launch, because kernels use 32-bit indices
 _PARALLEL_RUNS_ON_GPU = 4096
+MAX_ROLLOUT_STEPS = 1_000_000  # that a launch records
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RunState(Record):
+    """The state of runs after their last episode, from which training resumes, bit for bit.
+
+    Attributes (leading axes: the runs, for example (configurations, seeds)):
+        q: float32 (..., 1 + tables, n_states, 8), the table by which the ant acts, then further
+            tables of the learner; a row has 5 action values and 3 unused numbers.
+        floats, integers: float32 and int32 (..., k), the memory of the learner, as large as any
+            learner here needs, in multiples of 8; see `taichi_ants.learners.Memory`.
+        random_states: uint64 (...,), the ants' random streams.
+        epsilon, learning_rate: float64 (...,), values for the next episode.
+    """
+
+    q: np.ndarray
+    floats: np.ndarray
+    integers: np.ndarray
+    random_states: np.ndarray
+    epsilon: np.ndarray
+    learning_rate: np.ndarray
+
+    @classmethod
+    def empty(
+        cls,
+        shape: tuple[int, ...],
+        n_states: int,
+        memory: Memory = Memory(),  # noqa: B008
+    ) -> RunState:
+        """Return a state of zeros for runs of this shape."""
+        return cls(
+            q=np.zeros((*shape, 1 + memory.tables, n_states, ROW), dtype=np.float32),
+            floats=np.zeros((*shape, memory.floats), dtype=np.float32),
+            integers=np.zeros((*shape, memory.integers), dtype=np.int32),
+            random_states=np.zeros(shape, dtype=np.uint64),
+            epsilon=np.zeros(shape, dtype=np.float64),
+            learning_rate=np.zeros(shape, dtype=np.float64),
+        )
+
+    @classmethod
+    def initial(
+        cls, configs: Sequence[TrainingConfig], seeds: Sequence[int], n_states: int
+    ) -> RunState:
+        """Return the state of new runs, with leading axes (configurations, seeds)."""
+        state = cls.empty((len(configs), len(seeds)), n_states, memory_for(configs, n_states))
+        state.random_states[:] = stream_state(words_of(seeds), STREAM_ANT, 0)
+        for config, q, epsilon, rate in zip(
+            configs, state.q, state.epsilon, state.learning_rate, strict=True
+        ):
+            q[..., :N_ACTIONS] = config.initial_q
+            epsilon[:], rate[:] = config.epsilon, config.learning_rate
+        return state
+
+    def part(self, configs: slice | list[int]) -> RunState:
+        """Return the runs of some configurations, in arrays (runs, ...).
+
+        The arrays are views if `configs` is a slice, else copies.
+        """
+        n, arrays = self.epsilon[configs].size, vars(self).items()
+        return RunState(
+            **{name: array[configs].reshape(n, *array.shape[2:]) for name, array in arrays}
+        )
+
+    def put(self, configs: slice | list[int], part: RunState) -> None:
+        """Overwrite the runs of some configurations with a part that has copies, not views."""
+        for name, array in vars(self).items():
+            new = getattr(part, name)
+            if not np.may_share_memory(array, new):
+                array[configs] = new.reshape(array[configs].shape)
+
+
+def memory_for(configs: Sequence[TrainingConfig], n_states: int) -> Memory:
+    """Return a memory size that suffices for each of the learners, which must be registered."""
+    memories = [
+        astuple(learners.get(config.learner).memory_for(config, n_states)) for config in configs
+    ]
+    return padded(Memory(*np.max(memories, axis=0).tolist()))
 
 
 @dataclass(frozen=True)
@@ -119,7 +200,7 @@ class Launcher:
         self, world: World, task: Task, max_steps: int, runs: Runs, traced: bool = False
     ) -> None:
         # Imported here, because Taichi must be configured first; see `runtime`.
-        from taichi_ants.engines.arguments import Launch
+        from taichi_ants.engines.launch import Launch
         from taichi_ants.engines.runs.kernels import run_kernel
         from taichi_ants.engines.runs.step import EXTRA_CELLS, Rules
 
@@ -202,6 +283,45 @@ def do_episodes(
         seconds += clock() - began
         outcomes[:, some, part] = block
     return seconds
+
+
+def record_steps(
+    world: World,
+    task: Task,
+    max_steps: int,
+    runs: Runs,
+    episodes: int,
+    progress: Progress | None = None,
+    tables: np.ndarray | None = None,
+) -> Iterator[dict[str, np.ndarray]]:
+    """Yield the steps of the next episodes of many runs, in pieces, and update the runs' state.
+
+    A piece has the columns `TRACE`, with episodes numbered from 0 in each run. Further arrays (n,)
+    are "runs", int64, the number of the run; "chances", float64, the probability of each action;
+    and "td_errors", float32. Pieces of a run are in order. If `tables` is given, the kernel writes
+    the table after each step of the piece into it.
+    """
+    runtime.start()
+    launcher = Launcher(world, task, max_steps, runs, traced=True)
+    keeps = {} if tables is None else {"keeps_tables": 1, "trace_tables": tables}
+    # A step needs ten times as much memory as a cell of the world.
+    most_runs = MAX_ROLLOUT_STEPS // max(max_steps, world.grid.size // 10)
+    runs_each = max(1, min(len(runs), most_runs))
+    episodes_each = max(1, MAX_ROLLOUT_STEPS // (runs_each * max_steps))
+    for some, part in pieces(len(runs), episodes, runs_each, episodes_each, progress):
+        n_runs, n_episodes = some.stop - some.start, part.stop - part.start
+        capacity = n_episodes * max_steps  # the most steps of a run
+        integers = np.empty((n_runs * capacity, len(TRACE)), np.int32)
+        chances, errors = np.empty(n_runs * capacity), np.empty(n_runs * capacity, np.float32)
+        outcomes = np.zeros((len(OUTCOMES), n_runs, n_episodes), np.int32)
+        arrays = {"trace": integers, "trace_errors": errors, "trace_chances": chances}
+        launcher.launch(some, part, outcomes=outcomes, **arrays, **keeps)
+        steps_of_run = outcomes[STEPS].sum(axis=1)
+        taken = (np.arange(capacity) < steps_of_run[:, None]).reshape(-1)
+        columns = dict(zip(TRACE, integers[taken].T, strict=True))
+        columns["episodes"] += part.start
+        columns["runs"] = np.repeat(np.arange(some.start, some.stop), steps_of_run)
+        yield {**columns, "chances": chances[taken], "td_errors": errors[taken]}
 
 
 def size_of_launch(
