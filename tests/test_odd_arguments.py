@@ -20,7 +20,6 @@ from taichi_ants import (
     train,
 )
 from taichi_ants import worlds as places
-from taichi_ants.analysis import statistics
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.learners.policies import Policy
@@ -70,8 +69,6 @@ ODD = {
     "a page's path": lambda _: check_page(None),
     "a frame": lambda _: frame(SCALAR),
     "what a notebook shows": lambda _: notebook(RAGGED),
-    "one dimension": lambda _: statistics.bootstrap_interval(np.arange(5.0)),
-    "one dimension of Student's": lambda _: statistics.student_interval(np.arange(5.0)),
     "numbers of worlds": lambda _: Interventions(
         Colony(WORLD, None, None, range(3), 2, sharing="frozen"), RAGGED
     ),

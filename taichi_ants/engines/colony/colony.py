@@ -14,7 +14,7 @@ from taichi_ants.engines.colony.ticking import TickingColony
 from taichi_ants.engines.colony.timetable import Timetable
 from taichi_ants.errors import AntsError, checked_whole, shown
 from taichi_ants.measures.measure import Measure
-from taichi_ants.measures.series import Recorder
+from taichi_ants.measures.series import Recorder, stops
 from taichi_ants.protocol import ProtocolEvent
 from taichi_ants.task.constants import MAX_STEPS
 from taichi_ants.worlds.world import World
@@ -88,7 +88,7 @@ class Colony(TickingColony):
             self.begin_episode(ticks, places[episode])
             recorder.begin(episode)
             with timetable:
-                for stop in recorder.stops(ticks):
+                for stop in stops(ticks, recorder.every):
                     for _ in timetable.pieces(self._stepper, stop - self.ticks):
                         if progress is not None:
                             progress((episode + self.ticks / ticks) / episodes)

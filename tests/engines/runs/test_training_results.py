@@ -80,7 +80,7 @@ def test_damaged_arrays(stored, tmp_path, name, value, said):
         ({"seeds": [1, 1, 2]}, "more than once"),
         ({"task": {"delivery": "never"}}, "`task.delivery` is 'never'"),
         ({"task": {"observation": "paper"}}, "of shape (2, 3, n, 128, 8)"),
-        ({"world": {**WORLD, "ranges": [0, 1, 2]}}, "ranges are"),
+        ({"world": {**WORLD, "ranges": [0, 1, 2]}}, "ranges contains 0; all must lie"),
     ],
 )
 def test_damaged_facts(stored, tmp_path, changes, said):
