@@ -24,6 +24,7 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     from taichi_ants import AntsError, Colony, Life, Task, files
     from taichi_ants.engines.colony.interventions import Interventions
+    from taichi_ants.interventions import Clear, Place
     from taichi_ants.studies import command_line
     from taichi_ants.studies.command import run_study
     from taichi_ants.studies.command_line import whole_number
@@ -31,7 +32,6 @@ with stoppable():  # Ctrl-C also works during these slow imports
     from taichi_ants.studies.points import ColonyPoint
     from taichi_ants.studies.study import Study
     from taichi_ants.task import foraging, queueing
-    from taichi_ants.task.constants import EMPTY, OBSTACLE
     from taichi_ants.worlds import double_bridge
     from taichi_ants.worlds.double_bridge import ROOM_RADIUS, bridge_paths
 
@@ -177,11 +177,11 @@ def crossings(colony: Colony, bridge: dict[str, Any], ticks: int, opens: int = 0
     room, branch = np.full(len(world), _QUEEN_ROOM), np.full(len(world), _SHORT)
     colony.begin_episode(ticks)
     if opens:
-        short, interventions = colony.grid.index(branches[0]), Interventions(colony)
-        interventions.put(short, OBSTACLE)
+        short, interventions = colony.grid.index(branches[0]).tolist(), Interventions(colony)
+        interventions.apply(Place("rock", short))
     while colony.ticks < ticks:
         if opens and colony.ticks == opens:
-            interventions.put(short, EMPTY)
+            interventions.apply(Clear(short))
         window = colony.ticks * WINDOWS // ticks
         until = opens if colony.ticks < opens else ticks
         colony.tick(min(_LOOK_EVERY, until - colony.ticks))

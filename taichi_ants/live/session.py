@@ -225,7 +225,7 @@ class Session:
             self.changes.append(len(self.edits))
         self.edits.append((self.steps, plain))
         try:
-            intervention.apply(self.interventions)
+            self.interventions.apply(intervention)
         except AntsError:
             self.edits.pop()
             del self.changes[len(self.changes) - begins :]

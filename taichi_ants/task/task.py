@@ -385,56 +385,14 @@ class Task(Settings, path="task"):
             **self.noise.numbers,
         }
 
-    def pheromone_while(self, learning: bool) -> Pheromone:
-        """Return the pheromone for learning or evaluation, without evaporation if that is off."""
-        falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
-        return self.pheromone if falls else self.pheromone.lasting
+    def pheromones_while(self, learning: bool) -> tuple[Pheromone, ...]:
+        """Return the trail, then the fields, for learning or evaluation, by number.
 
-    def fields_while(self, learning: bool) -> dict[str, Field]:
-        """Return the fields while ants learn or do not, with or without evaporation."""
+        They do not evaporate if that is off.
+        """
         falls = self.evaporation_in_training if learning else self.evaporation_in_evaluation
-        return {name: field if falls else field.lasting for name, field in self.fields.items()}
-
-    def compiled(self, learning: bool) -> dict[str, Any]:
-        """Return what kernels are compiled for, while ants learn or do not; see `Features`."""
-        pheromones = self.pheromone_while(learning), *self.fields_while(learning).values()
-        cues = self.all_cues
-        outbound, homing = cues[0]
-        facts = {
-            "observation": self.sees,
-            "dense": tuple(pheromone.dense for pheromone in pheromones),
-            # Only the views of cues are compiled.
-            "views": tuple(
-                pheromone.view if any(number in pair for pair in cues) else "half"
-                for number, pheromone in enumerate(pheromones)
-            ),
-            "outbound": outbound,
-            "homing": homing,
-            "carriers_follow": self.number_of(self.choice.carriers_follow or COMPASS),
-            "reads": tuple(self.number_of(name) for name in self.sees.reads),
-            "traffic": self.traffic,
-            "ants_change": self.ants_change,
-            "food_changes": self.food_changes,
-            "choice": self.choice.rule,
-            "slips": self.noise.slip > 0,
-            "misreads": self.noise.misread > 0,
-            "n_kinds": max(1, len(self.foods)),
-            "has_foods": bool(self.foods),
-            "has_loads": self.has_loads,
-            "n_castes": len(self.castes),
-            "cues": cues if len(cues) > 1 else (),
-            "has_labour": self.labour.divides,
-            "epsilon_varies": any(caste.epsilon_spread for caste in self.castes.values()),
-        }
-        if self.rules:
-            facts |= {
-                "rules": self.own_rules,
-                "reward": self.reward,
-                "deposits": tuple(pheromone.deposit for pheromone in pheromones),
-                "evaporations": tuple(pheromone.evaporation for pheromone in pheromones),
-                "fields": (TRAIL, *self.fields),
-            }
-        return facts
+        pheromones = self.pheromone, *self.fields.values()
+        return pheromones if falls else tuple(pheromone.lasting for pheromone in pheromones)
 
     def number_of(self, cue: str) -> int:
         """Return the number of a pheromone: 0 for the trail, 1 for the first field; -1: compass."""

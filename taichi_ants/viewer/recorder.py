@@ -96,7 +96,7 @@ class Recorder:
     ) -> None:
         expect("colony", colony, Colony)
         expect("title", title, str)
-        check_one_of("pheromone", pheromone, (TRAIL, *colony.fields))
+        check_one_of("pheromone", pheromone, (TRAIL, *colony.task.fields))
         self.colony, self.world, self._title, self._follow = colony, world, title, follow
         self.pheromone = pheromone
         self.grid, self._n_states = colony.snapshot(world).grid, colony.task.n_states
@@ -184,8 +184,8 @@ class Recorder:
             "castes": ", ".join(task.castes),
             "kinds of food": ", ".join(task.foods),
         }
-        if colony.fields:
-            hidden = [name for name in (TRAIL, *colony.fields) if name != self.pheromone]
+        if colony.task.fields:
+            hidden = [name for name in (TRAIL, *colony.task.fields) if name != self.pheromone]
             lines["pheromone"] = f"{self.pheromone}; hidden: {', '.join(hidden)}"
         if self._learns:
             lines["learner"] = learners.label(config.learner)
@@ -223,7 +223,7 @@ class Recorder:
         colony, slots = self.colony, self._living()
         states, numbers = colony.states[self.world, slots], colony.numbers[self.world, slots]
         before, ahead = self._tables(), np.zeros(len(slots), bool)
-        if colony.draws_ahead:
+        if colony.model.draws_next_action:
             ahead = colony.next_actions[self.world, slots] >= 0
         colony.tick()
         # Slots of ants that died still hold their data.

@@ -1,4 +1,4 @@
-"""The models of golden hashes: colonies, trainings and protocols, drawn by the tests' generators."""
+"""The models of golden hashes: colonies, trainings and protocols, from generators of the tests."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from random_colonies import RandomColony, random_colony, random_training, with_n
 from random_worlds import random_world
 
 from taichi_ants import AntsError, Colony, Interventions, World, protocol
+from taichi_ants.interventions import AddAnts, RemoveAnts
 from taichi_ants.task import Pheromone, Rewards, Task
 from taichi_ants.task.constants import EMPTY
 
@@ -38,7 +39,7 @@ class Group(NamedTuple):
     loads: bool = False
     castes: int | list[tuple[str, str]] = 0
     labour: bool = False
-    rules: dict[str, Any] = {}
+    rules: dict[str, Any] = {}  # noqa: RUF012 - nobody writes it
 
 
 def _group(names: str, **options: Any) -> Group:
@@ -248,5 +249,5 @@ def disturb(colony: Colony) -> None:
     """Add two ants to each world and remove one, where there is room."""
     interventions = Interventions(colony, lasting=False)
     with contextlib.suppress(AntsError):
-        interventions.add_some(2, None)
-    interventions.remove_some(1, None)
+        interventions.apply(AddAnts(number=2))
+    interventions.apply(RemoveAnts(number=1))

@@ -1,4 +1,4 @@
-"""Rules for golden hashes: those of the tests, and two of their own; other tests do not see them."""
+"""Rules for golden hashes: those of the tests, and two that other tests do not see."""
 
 from __future__ import annotations
 

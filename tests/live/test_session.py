@@ -327,7 +327,7 @@ def test_sessions_replay_each_form_of_an_intervention(edit, tmp_path):
     twin = Session(GATED)
     twin.advance(5)
     before = twin.interventions.state()
-    interventions.from_dict(edit).apply(twin.interventions)
+    twin.interventions.apply(interventions.from_dict(edit))
     session.apply(edit)
     assert session.interventions.state() == twin.interventions.state() != before
     session.save(tmp_path / "session.npz")

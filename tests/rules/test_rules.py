@@ -28,6 +28,7 @@ from taichi_ants.reference import own_observations
 from taichi_ants.rules import exp, log, pick, power, registry
 from taichi_ants.rules.inputs import KINDS
 from taichi_ants.task import Choice, Observation, observations
+from taichi_ants.task.model import Model
 from taichi_ants.task.observations import registry as seen
 from taichi_ants.testing import check_observation, check_rule
 
@@ -294,9 +295,9 @@ def test_parameters_change_without_other_kernels_and_in_an_episode(clean):
     world = worlds.open_world(1, ranges=(8, 8, 8))
     colony = Colony(world, task, None, 0, 8, sharing="frozen")
     other = task.replace(rules={"weaker": {"amount": 7}})
-    assert task.compiled(learning=False) == other.compiled(learning=False)
+    assert Model(task, learns=False) == Model(other, learns=False)
     colony.begin_episode()
-    SetTask((("rules.weaker.amount", 7.0),)).apply(Interventions(colony))
+    Interventions(colony).apply(SetTask((("rules.weaker.amount", 7.0),)))
     assert colony.task == other
     plain = Colony(world, other, None, 0, 8, sharing="frozen")
     plain.begin_episode()

@@ -118,7 +118,7 @@ def test_a_recording_of_several_nests(sharing):
     for tick in range(30):
         queens.append(colony.snapshot().queens.tolist())
         if tick == 9:
-            Place("queen", [[0, 6, 0]], nest=1).apply(Interventions(colony))
+            Interventions(colony).apply(Place("queen", [[0, 6, 0]], nest=1))
             frames.append(recorder.snapshot())
             queens.append(colony.snapshot().queens.tolist())
         frames.append(recorder.tick())
