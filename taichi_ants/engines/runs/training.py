@@ -21,9 +21,7 @@ from taichi_ants.engines.runs.engine import (
     Progress,
     Runs,
     RunState,
-    do_episodes,
     memory_for,
-    record_steps,
 )
 from taichi_ants.engines.runs.results import RolloutArguments, Rollouts, Trace, TrainingResult
 from taichi_ants.errors import AntsError, checked_whole, expect
@@ -125,10 +123,11 @@ def _train(
         chosen, n = [configs[c] for c in group], len(group)
         # A slice copies nothing.
         where = slice(group[0], group[0] + n) if group[-1] - group[0] == n - 1 else group
-        runs = Runs.learning(chosen, seeds, result.state.part(where))
+        own = result.state.part(where)
+        runs = Runs.learning(result.world, result.task, result.max_steps, chosen, seeds, own)
         into = outcomes[:, where].reshape(len(OUTCOMES), len(runs), episodes)  # a view, or a copy
         part = progress and partial(_report, progress, done, n, len(configs))
-        seconds += do_episodes(result.world, result.task, result.max_steps, runs, into, part)
+        seconds += runs.do_episodes(into, part)
         outcomes[:, where] = into.reshape(len(OUTCOMES), n, len(seeds), episodes)
         check_finite(runs.state.q, chosen, seeds)
         result.state.put(where, runs.state)
@@ -181,9 +180,9 @@ def evaluate(
     epsilon = arguments.checked_share("epsilon", epsilon)
     runtime.start(threads, arch)
     flat = tables.reshape(-1, *tables.shape[-2:])
-    runs = Runs.following(flat, run_seeds, np.arange(rollouts), epsilon)
+    runs = Runs.following(world, task, max_steps, flat, run_seeds, range(rollouts), epsilon)
     outcomes = np.empty((3, len(runs), rollouts), np.int32)
-    do_episodes(world, task, max_steps, runs, outcomes, progress)
+    runs.do_episodes(outcomes, progress)
     returns, steps, deliveries = outcomes.reshape(3, *shape, rollouts)
     of_tables = tuple(run_seeds[: shape[-1] if shape else 1].tolist())
     return Rollouts(returns, steps, deliveries, of_tables)
@@ -208,10 +207,10 @@ def rollout(
     seeds = arguments.checked_seeds_for(seed, ())
     number = checked_whole("number", number, least=0)
     epsilon = arguments.checked_share("epsilon", epsilon)
-    runs = Runs.following(table[None], seeds, np.array([number]), epsilon)
+    runs = Runs.following(world, task, max_steps, table[None], seeds, [number], epsilon)
     seed, kept = int(seeds[0]), table.copy()
     made_by = RolloutArguments(world, task, seed, max_steps, number, kept, epsilon)
-    return next(_followed(world, task, runs, max_steps, made_by))
+    return next(_followed(runs, made_by))
 
 
 def trace_policies(
@@ -227,19 +226,16 @@ def trace_policies(
     """
     task, max_steps = arguments.checked_run(world, task, max_steps)
     tables = checked_values(q_values, task)
-    runs = Runs.following(tables, np.array(seeds, dtype=object), np.zeros(1, dtype=int), 0.0)
-    yield from _followed(world, task, runs, max_steps)
+    yield from _followed(Runs.following(world, task, max_steps, tables, seeds, [0], epsilon=0.0))
 
 
-def _followed(
-    world: World, task: Task, runs: Runs, max_steps: int, made_by: RolloutArguments | None = None
-) -> Iterator[Trace]:
+def _followed(runs: Runs, made_by: RolloutArguments | None = None) -> Iterator[Trace]:
     """Yield the traces of one rollout of each policy; its number is that of the episode."""
-    _check_length(max_steps, MAX_ROLLOUT_STEPS)
-    for steps in record_steps(world, task, max_steps, runs, episodes=1):
+    _check_length(runs.max_steps, MAX_ROLLOUT_STEPS)
+    for steps in runs.record(episodes=1):
         values = runs.state.q[steps["runs"], 0, steps["states"], :N_ACTIONS]
         steps["episodes"] = steps["runs"].astype(np.int32)
-        yield _trace(world, steps, q_values=values, arguments=made_by)
+        yield _trace(runs.world, steps, q_values=values, arguments=made_by)
 
 
 def trace_training(
@@ -262,10 +258,10 @@ def trace_training(
         raise AntsError(f"config has {len(several)} configurations; pass a single one.")
     _check_length(episodes * max_steps, min(MAX_ROLLOUT_STEPS, MAX_TABLE_ROWS // task.n_states))
     seeds = arguments.checked_seeds_for(seed, ()).tolist()
-    runs = Runs.learning(several, seeds, RunState.initial(several, seeds, task.n_states).part([0]))
+    runs = Runs.learning(world, task, max_steps, several, seeds)
     before = runs.state.q[:, 0, :, :N_ACTIONS].copy()
     tables = np.empty((episodes * max_steps, *runs.state.q.shape[2:]), dtype=np.float32)
-    (steps,) = record_steps(world, task, max_steps, runs, episodes, tables=tables)
+    (steps,) = runs.record(episodes, tables=tables)
     n = len(steps["states"])
     after = tables[:n, :, :N_ACTIONS]
     values = np.concatenate([before, after[:-1]])[np.arange(n), steps["states"]]
