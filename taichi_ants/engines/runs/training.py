@@ -123,8 +123,8 @@ def _train(
         chosen, n = [configs[c] for c in group], len(group)
         # A slice copies nothing.
         where = slice(group[0], group[0] + n) if group[-1] - group[0] == n - 1 else group
-        own = result.state.part(where)
-        runs = Runs.learning(result.world, result.task, result.max_steps, chosen, seeds, own)
+        state = result.state.part(where)
+        runs = Runs.learning(result.world, result.task, result.max_steps, chosen, seeds, state)
         into = outcomes[:, where].reshape(len(OUTCOMES), len(runs), episodes)  # a view, or a copy
         part = progress and partial(_report, progress, done, n, len(configs))
         seconds += runs.do_episodes(into, part)
