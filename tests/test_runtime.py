@@ -148,13 +148,15 @@ def said_by(work):
 assert in_a_fork(trained) == "done"
 table = trained().q_values[0, 0]
 colony = Colony(paper(), None, config, ants=4)
+colony.begin_episode()
+snapshot = colony.snapshot()
 scene = Scene(paper().grid, (200, 160))
 for work in (
     trained,
     lambda: rollout(paper(), table),
     lambda: Colony(paper(), None, config, ants=4),
     lambda: colony.run(1, 10),
-    lambda: scene.draw(colony.snapshot()),
+    lambda: scene.draw(snapshot),
 ):
     said = in_a_fork(work)
     assert said.startswith("this process was forked") and '"spawn"' in said, said
