@@ -75,8 +75,7 @@ class Episode:
     @classmethod
     def play(cls, world: World, q_values: np.ndarray, **rules: Any) -> Episode:
         """Return rollout 0 of a policy; `rules` and errors are those of `rollout`."""
-        epsilon = rules.get("epsilon", 0.0)
-        name = f"epsilon {epsilon:g}" if epsilon else "greedy"
+        name = f"epsilon {rules['epsilon']:g}" if rules.get("epsilon") else "greedy"
         return cls(rollout(world, q_values, **rules), name)
 
     @property
