@@ -33,8 +33,8 @@ with stoppable():  # Ctrl-C also works during these slow imports
 
     from taichi_ants import AntsError, Task, TrainingConfig, files, learners, train, worlds
     from taichi_ants.analysis.behaviour import BEHAVIOURS, classify
-    from taichi_ants.engines.runs.traces import MAX_ROLLOUT_STEPS, trace_policies
-    from taichi_ants.engines.runs.training import evaluate
+    from taichi_ants.engines.runs.engine import MAX_ROLLOUT_STEPS
+    from taichi_ants.engines.runs.training import evaluate, trace_policies
     from taichi_ants.files import archives
     from taichi_ants.learners.policies import save_policy
     from taichi_ants.measures.finished import LONE, Run, values_of

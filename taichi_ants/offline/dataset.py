@@ -124,16 +124,11 @@ class Dataset(Record):
         ages = np.arange(len(self)) - self.begins[self.episode]
         return np.bincount(self.episode, weights=discount**ages * self.reward)
 
-    def first(self, transitions: int | None = None, episodes: int | None = None) -> Dataset:
-        """Return the first transitions or episodes of each run; a cut episode is truncated."""
-        keep = np.ones(len(self), bool)
+    def first(self, transitions: int) -> Dataset:
+        """Return the first transitions of each run; a cut episode is truncated."""
         # The first row of each row's run.
         first = np.searchsorted(self.run, np.arange(len(self.seeds)))[self.run]
-        if transitions is not None:
-            keep &= np.arange(len(self)) - first < checked_whole("transitions", transitions)
-        if episodes is not None:
-            keep &= self.episode - self.episode[first] < checked_whole("episodes", episodes)
-        return self._take(keep)
+        return self._take(np.arange(len(self)) - first < checked_whole("transitions", transitions))
 
     def of_run(self, run: int) -> Dataset:
         """Return the data of one seed, which keeps its number; AntsError if it has no data."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from taichi_ants.engines.colony.colony import Colony
 from taichi_ants.engines.colony.timetable import Timetable
-from taichi_ants.engines.runs.traces import rollout
+from taichi_ants.engines.runs.training import rollout
 from taichi_ants.errors import AntsError, checked_whole, count
 from taichi_ants.studies.command import opened
 from taichi_ants.studies.points import ColonyPoint, key_of

@@ -21,7 +21,7 @@ from taichi_ants import (
     save_policy,
     worlds,
 )
-from taichi_ants.engines.runs.results import RunState
+from taichi_ants.engines.runs.engine import RunState
 from taichi_ants.live.session import Session
 from taichi_ants.live.setup import Setup
 from taichi_ants.offline.dataset import COLUMNS
