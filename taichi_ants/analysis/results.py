@@ -17,7 +17,7 @@ import numpy as np
 
 from taichi_ants.analysis import style
 from taichi_ants.analysis.findings import means_in_words
-from taichi_ants.analysis.statistics import RESAMPLES, bootstrap_interval
+from taichi_ants.analysis.statistics import bootstrap_interval, estimates
 from taichi_ants.analysis.tables import Table, plain_text, sentence
 from taichi_ants.errors import AntsError, check_one_of, checked_whole, expect, shown
 from taichi_ants.measures.tidy import Measured, Tidy, checked_measure, last_rows, parts_of
@@ -157,7 +157,7 @@ def summary(result: Tidy, last: int | None = None) -> Summary:
         raise AntsError(_NO_NUMBERS)
     for name in table.values:
         for group, values in zip(table.groups, of_seeds(table, name, last), strict=True):
-            mean, low, high = (float(bound[0]) for bound in _means(values[None]))
+            ((mean, low, high, *_),) = estimates(values[None], uses_iqm=False)
             rows.append({
                 "configuration": group, "measure": name, "unit": table.units.get(name, ""),
                 "seeds": int(np.count_nonzero(~np.isnan(values))),
@@ -207,7 +207,8 @@ def plot(
         for axes, name in zip(panels, names, strict=True):
             for number, (x, values) in enumerate(curves(table, name, across)):
                 colour = style.COLOURS[number % len(style.COLOURS)]
-                mean, low, high = _means(values, _RESAMPLES)
+                rows = estimates(values, uses_iqm=False, resamples=_RESAMPLES)
+                mean, low, high = np.array([row[:3] for row in rows]).reshape(-1, 3).T
                 marker = "o" if len(x) < 2 else None
                 axes.plot(
                     x, mean, color=colour, marker=marker, label=style.label(table.groups[number])
@@ -305,21 +306,3 @@ def curves(table: Measured, measure: str, across: str) -> Iterator[tuple[np.ndar
                 sums[begin:end, seed] += value
                 counts[begin:end, seed] += 1
         yield x, np.divide(sums, counts, out=np.full(sums.shape, math.nan), where=counts > 0)
-
-
-def _means(values: np.ndarray, resamples: int = RESAMPLES) -> tuple[np.ndarray, ...]:
-    """Return the mean and the ends of its interval by row (rows, seeds), without nan."""
-    known = ~np.isnan(values)
-    intervals = np.full((3, len(values)), math.nan)
-    whole = known.all(axis=1)
-    if whole.any():
-        intervals[:, whole] = (
-            values[whole].mean(axis=1),
-            *bootstrap_interval(values[whole], resamples=resamples),
-        )
-    for row in np.flatnonzero(known.any(axis=1) & ~whole):
-        some = values[row, known[row]][None]
-        intervals[:, row] = np.ravel(
-            [some.mean(axis=1), *bootstrap_interval(some, resamples=resamples)]
-        )
-    return tuple(intervals)
