@@ -27,7 +27,7 @@ from taichi_ants.report.page import Picture, Player, Shown, Statement, Statement
 from taichi_ants.studies.command_line import progress_bar
 from taichi_ants.studies.points import RunPoint
 from taichi_ants.task import Task
-from taichi_ants.viewer import record_episode
+from taichi_ants.viewer import record_trace
 
 STEPS = 80  # the longest recording; a delivery takes 34 steps, walking to and fro on the trail 38
 SIZE = 720, 480  # of animations
@@ -100,7 +100,7 @@ def begin(
         )
         share = f"{thousands(done[code])} of {thousands(comparison.behaviours.size)}"
         words = f"{sentence(DEFINITIONS[code])}: {share} final policies. Shown: {whose}."
-        recording = process.begin(record_episode, episode, BEHAVIOURS[code])
+        recording = process.begin(record_trace, episode.trace, BEHAVIOURS[code])
         recorded.append((sentence(BEHAVIOURS[code]), words, recording))
         if code == DELIVERS:
             title = f"{variant.label}: policy"

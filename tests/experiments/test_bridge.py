@@ -20,7 +20,7 @@ from PIL import Image
 
 from taichi_ants import AntsError, Colony, TrainingConfig
 from taichi_ants.learners.policies import trail_follower
-from taichi_ants.worlds.double_bridge import branch_cells, double_bridge, junction_cells
+from taichi_ants.worlds.double_bridge import bridge_paths, double_bridge
 
 TICKS = 100
 BRIDGE = {"short": 10, "long": 13, "mirrored": True, "aside": 1}
@@ -30,8 +30,8 @@ class Scripted:
     """A colony of ants that stand where a script says: (place, load) of each ant by tick."""
 
     def __init__(self, script: list[dict[int, tuple[str, int]]]) -> None:
-        grid, (nest, food) = double_bridge(**BRIDGE).grid, junction_cells(**BRIDGE)
-        short, long = (cells[len(cells) // 4] for cells in branch_cells(**BRIDGE))
+        grid, ((nest, food), branches) = double_bridge(**BRIDGE).grid, bridge_paths(**BRIDGE)
+        short, long = (cells[len(cells) // 4] for cells in branches)
         places = {"nest": nest, "food": food, "short": short, "long": long}
         self.places = {name: int(grid.index(cell)) for name, cell in places.items()}
         assert len(set(self.places.values())) == 4
@@ -85,7 +85,7 @@ def test_nobody_takes_the_short_branch_before_it_opens(opens: int) -> None:
     assert (before[0] == 0) == (opens > 0)
     if opens:
         assert before[1] > 10
-    short = place.grid.index(branch_cells(**BRIDGE)[0])
+    short = place.grid.index(bridge_paths(**BRIDGE)[1][0])
     assert not (colony.arrays["walls"][short]).any()
 
 
