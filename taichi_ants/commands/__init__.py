@@ -23,13 +23,10 @@ COMMANDS = {  # modules of this package with their help
 }
 
 
-def run(
-    name: str, arguments: Sequence[str] | None = None, program: str | None = None, **more: object
-) -> None:
+def run(name: str, arguments: Sequence[str] | None = None, program: str | None = None) -> None:
     """Run a command and exit; Ctrl-C also works during its imports.
 
-    `program` is the name of the command in --help, by default that of the script; `more` are
-    further arguments of the command's `main`.
+    `program` is the name of the command in --help, by default that of the script.
     """
     # Commands use all cores themselves, so OpenBLAS should not start threads; it reads this at the
     # import of NumPy.
@@ -38,7 +35,7 @@ def run(
         from taichi_ants.studies.command_line import Parser
 
         Parser.program = program
-        import_module(f"{__name__}.{name.replace('-', '_')}").main(arguments, **more)
+        import_module(f"{__name__}.{name.replace('-', '_')}").main(arguments)
 
 
 def main() -> None:

@@ -486,15 +486,6 @@ def test_help_is_quick_and_needs_no_taichi(tmp_path):
     assert "learners, observations, worlds, measures or rules" in " ".join(done.stdout.split())
 
 
-def test_the_script_of_observations_takes_the_options_of_a_sweep(tmp_path):
-    script = [sys.executable, EXPERIMENTS / "observations.py", "--help"]
-    done = subprocess.run(script, env=environment(tmp_path), capture_output=True, text=True)
-    assert done.returncode == 0
-    assert "--no-figures" in done.stdout
-    assert "FILE " not in done.stdout.replace("--plugin FILE ", "")
-    assert "results/sweep-observations)" in " ".join(done.stdout.split())
-
-
 def test_what_observations_gain_is_asked_of_all_of_them():
     asked = read_sweep(EXPERIMENTS / "sweeps" / "observations.toml")
     for grid in asked.grids:
