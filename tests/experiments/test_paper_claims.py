@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from paper.claims import (
     CLAIMS,
@@ -185,19 +183,6 @@ def test_claims_that_lack_configurations_are_not_tested_and_the_rest_is() -> Non
     }
 
 
-def test_short_training_leaves_out_what_needs_more() -> None:
-    assert untested(assess(build({"truncates": unchanged}, episodes=60))) == {
-        "curves-early-variance",
-        "curves-sarsa-falls-fastest",
-        "curves-deliveries-quick",
-        "planning-no-gain-return",
-        "planning-no-gain-length",
-        "overall-improvement",
-        "overall-improvement-reliable",
-    }
-    assert untested(assess(build({"truncates": unchanged}, episodes=49))) == BY_ID.keys()
-
-
 def only(comparison: Comparison, name: str, setting: str = "truncates") -> Finding:
     """What becomes of one claim."""
     return assess(comparison, [BY_ID[name]])[BY_ID[name]][setting]
@@ -239,12 +224,6 @@ def test_levels_are_corrected_for_all_intervals_of_all_tested_claims() -> None:
             assert one.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * intervals))
     shares = only(comparison, "overall-improvement-reliable")
     assert shares.level == pytest.approx(1 - (1 - SIMULTANEOUS_LEVEL) / (2 * 4))
-
-
-def test_in_another_world_nothing_is_tested() -> None:
-    garden = replace(build({"truncates": unchanged}), world="garden.txt")
-    audit = assess(garden)
-    assert untested(audit) == BY_ID.keys()
 
 
 def test_the_tables_hold_the_findings() -> None:
