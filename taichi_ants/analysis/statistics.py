@@ -107,11 +107,6 @@ class Estimator(NamedTuple):
     iqm_ci_high: float = math.nan
     left_out: int = 0
 
-    @property
-    def apart(self) -> bool:
-        """Whether the mean lies outside of the interval of the IQM."""
-        return self.mean < self.iqm_ci_low or self.mean > self.iqm_ci_high
-
 
 def estimates(
     values: np.ndarray, uses_iqm: bool = True, resamples: int = RESAMPLES

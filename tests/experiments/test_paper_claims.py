@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from paper.claims import (
-    CLAIMS,
-    Audit,
-    assess,
-    claims_rows,
-)
+from paper.claims import CLAIMS, Audit, assess, claims_rows
 from paper.comparison import (
     DYNA_P3,
     DYNA_P5,
@@ -153,11 +148,7 @@ def test_where_nothing_differs_no_difference_is_claimed(seeds: int) -> None:
     errors = 0
     for number in range(12):
         comparison = build(
-            {"truncates": unchanged},
-            seeds=seeds,
-            noise=20,
-            truth=level_truth,
-            random_seed=number,
+            {"truncates": unchanged}, seeds=seeds, noise=20, truth=level_truth, random_seed=number
         )
         found = set(verdicts(assess(comparison, directed)).values())
         errors += not found <= {Verdict.UNDECIDED, Verdict.EQUIVALENT}

@@ -6,14 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from paper.comparison import (
-    DYNA_P3,
-    FIGURE_1,
-    SARSA,
-    VARIANTS,
-    Comparison,
-    Variant,
-)
+from paper.comparison import DYNA_P3, FIGURE_1, SARSA, VARIANTS, Comparison, Variant
 from paper.table2 import (
     Line,
     best_of,
