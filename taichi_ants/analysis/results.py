@@ -111,15 +111,8 @@ def compare(
         AntsError: The seeds differ, a result does not have the measure or the configuration, or no
             seed has a value in both results.
     """
-    expect("a", a, Tidy)
-    expect("b", b, Tidy)
-    tables = a.measured(), b.measured()
-    if tables[0].seeds != tables[1].seeds:
-        raise AntsError(
-            f"the seeds of a are {shown(tables[0].seeds)}, those of b are "
-            f"{shown(tables[1].seeds)}; compare results with the same seeds in the same order."
-        )
     values = []
+    tables = _tables_of({"a": a, "b": b}).values()
     for table, number in zip(tables, configurations, strict=True):
         most = len(table.groups) - 1
         group = checked_whole("a configuration", number, least=0, most=max(0, most))
@@ -188,9 +181,7 @@ def plot(
         expect("path", path, str, Path)
         check_one_of("the suffix of path", Path(path).suffix, (".png",))
     named = results if isinstance(results, Mapping) else {"result": results}
-    for name, result in named.items():
-        expect(name, result, Tidy)
-    table = _together({name: result.measured() for name, result in named.items()})
+    table = _together(_tables_of(named))
     names = [part for name in measures for part in parts_of(table, name)] or list(table.plotted)
     if not names:
         raise AntsError(_NO_NUMBERS)
@@ -228,20 +219,27 @@ def plot(
     return figure
 
 
+def _tables_of(results: Mapping[str, Tidy]) -> dict[str, Measured]:
+    """Return the tables of results by name; AntsError unless all have the same seeds."""
+    for name, result in results.items():
+        expect(name, result, Tidy)
+    tables = {name: result.measured() for name, result in results.items()}
+    first, *others = tables
+    for name in others:
+        if tables[name].seeds != tables[first].seeds:
+            raise AntsError(
+                f"the seeds of {name!r} are {shown(tables[name].seeds)}, those of {first!r} are "
+                f"{shown(tables[first].seeds)}; use the same seeds in the same order."
+            )
+    return tables
+
+
 def _together(tables: Mapping[str, Measured]) -> Measured:
     """Return named tables as one, whose configurations are those of all tables."""
-    if not tables:
-        raise AntsError("there are no results; give at least one.")
-    first = next(iter(tables.values()))
-    if len(tables) == 1:
-        return first
-    for name, table in tables.items():
-        if table.seeds != first.seeds:
-            raise AntsError(
-                f"the seeds of {name!r} are {shown(table.seeds)}, those of {next(iter(tables))!r} "
-                f"are {shown(first.seeds)}; draw results with the same seeds in the same order."
-            )
     every = tables.values()
+    first = next(iter(every))
+    if len(every) == 1:
+        return first
     common = [name for name in first.values if all(name in table.values for table in every)]
     groups = [f"{name} {group}".strip() for name, table in tables.items() for group in table.groups]
     ends = list(itertools.accumulate(len(table.groups) for table in every))

@@ -74,14 +74,7 @@ class ColonyWorlds(Ants):
         # Events and states of the last step, before worlds have begun again.
         self._results = np.zeros(0, np.uint8), np.zeros(0, np.int32)
 
-    def begin(self, which: np.ndarray, seeds: Sequence[int | None] | None = None) -> None:
-        """Begin an episode in the worlds `which`, bool (W,).
-
-        `seeds` has an entry for each of the W worlds. A world with a seed is reset completely; None
-        continues its random numbers.
-        """
-        if seeds is None:
-            seeds = [None] * len(which)
+    def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
         new = np.array([seed is not None for seed in seeds]) & which
         if new.any():
             # As for one ant, seeds count modulo 2**64.
@@ -126,7 +119,7 @@ class ColonyWorlds(Ants):
         if mode is not AutoresetMode.SAME_STEP:
             begins = waiting & (mode is AutoresetMode.NEXT_STEP)
         if begins.any():
-            self.begin(begins)
+            self.begin(begins, [None] * len(begins))
         truncated = np.repeat(over, self.colony.capacity)
         return self.rewards.reshape(-1), terminated.reshape(-1), truncated
 

@@ -6,7 +6,7 @@ import operator
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.error import ResetNeeded
@@ -33,9 +33,6 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import GIVE, N_ACTIONS, N_STATES, PICK_UP
 from taichi_ants.task.states import state_from_index
 from taichi_ants.worlds import World, build, from_text
-
-if TYPE_CHECKING:
-    from taichi_ants.rendering import Scene
 
 Place = str | os.PathLike[str] | World
 Worlds = Place | Sequence[Place]
@@ -92,11 +89,15 @@ class Ants(ABC):
             limit = checked_whole("max_episode_steps", arguments.max_episode_steps)
             self.max_steps = min(self.max_steps, limit)
         self.shown = Shown(task.sees, arguments.observation_format)
-        self._scene: Scene | None = None
+        self._scene: Any = None  # of `draw`
 
     @abstractmethod
     def begin(self, which: np.ndarray, seeds: Sequence[int | None]) -> None:
-        """Begin an episode in the worlds `which`, bool (W,), with their seeds if they have one."""
+        """Begin an episode in the worlds `which`, bool (W,).
+
+        `seeds` has an entry for each of the W worlds. A world with a seed is reset completely; None
+        continues its random numbers.
+        """
 
     @abstractmethod
     def advance(
