@@ -29,9 +29,10 @@ def table_of(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 def column(values: Sequence[Any]) -> np.ndarray:
     """Return a column of numbers or flags as an array of their type, others as Python objects."""
-    if len({*map(type, values)} - {float}) == 0 or {*map(type, values)} in ({int}, {bool}):
+    kinds = {*map(type, values)}
+    if not kinds - {float} or kinds in ({int}, {bool}):
         found = np.array(values)
-        if found.dtype.kind != "O":  # that of whole numbers beyond 64 bits
+        if kinds != {int} or found.dtype.kind in "iu":  # not of whole numbers beyond 63 bits
             return found
     found = np.empty(len(values), object)
     found[:] = values

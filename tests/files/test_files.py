@@ -19,6 +19,7 @@ import pytest
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
+from taichi_ants.files.tables import column
 
 NOBODY = 65534
 
@@ -437,3 +438,8 @@ def test_large_whole_numbers_of_a_table_stay_different(tmp_path):
     read = [row["seed"] for row in files.read_csv(tmp_path / "a.csv")]
     assert read == numbers
     assert [type(one) for one in read] == [int, int, int, float, float]
+
+
+def test_whole_numbers_of_a_column_stay_exact() -> None:
+    for values in ((3, -4), (2**63,), (1, 2**63), (-1, 2**64)):
+        assert column(values).tolist() == [*values]
