@@ -15,10 +15,10 @@ from paper import comparison as paper
 from paper import figures, process, report
 from paper.baselines import Baseline
 from paper.claims import Audit, headlines
-from paper.comparison import Comparison
+from paper.comparison import DEFINITIONS, Comparison, counts
 from paper.table2 import Line, example_name, summarise_behaviours
 from taichi_ants import files
-from taichi_ants.analysis.behaviour import BEHAVIOURS, DEFINITIONS, DELIVERS, counts
+from taichi_ants.analysis.behaviour import BEHAVIOURS, DELIVERS
 from taichi_ants.analysis.drawings import Drawing
 from taichi_ants.analysis.tables import sentence, thousands
 from taichi_ants.errors import count
