@@ -310,10 +310,10 @@ MUTATIONS = [
     ("studies/sweep.py", "array[at, of].astype(float)", "array[at, 0].astype(float)", GROWING),
     # Recorder and viewer.
     ("viewer/recorder.py", "executed + 16 *", "executed + 8 *", RECORDING),
-    ("viewer/recorder.py", "headings + 8 * carrying", "headings + 8 * ~carrying", RECORDING),
+    ("viewer/recorder.py", "[order] + 8 * carrying", "[order] + 8 * ~carrying", RECORDING),
     ("viewer/recorder.py", "*rates, *counts, clock)", "*rates, *counts, tick)", RECORDING),
     ("viewer/recorder.py", "colony.delivered[self.world] + totals", "0 * totals", SESSION),
-    ("viewer/recorder.py", "np.full_like(self._table, np.nan)", "self._table.copy()", SESSION),
+    ("viewer/recorder.py", "        late._forget()\n", "", SESSION),
     ("viewer/recorder.py", "[new] = False", "[new] = True", RECORDING),
     (
         "viewer/recorder.py",
@@ -322,14 +322,14 @@ MUTATIONS = [
         RECORDING,
     ),
     ("viewer/frames.py", '"u2" if size < 2**16', '"u2" if size < 2**17', RECORDING),
-    ("viewer/recorder.py", "self._ended = numbers[1],", "self._ended = 0,", SESSION),
+    ("viewer/recorder.py", "self._ended = ticks,", "self._ended = 0,", SESSION),
     # Server.
     ("live/server.py", "self.in_flight >= _MOST_IN_FLIGHT", "self.in_flight < 0", SERVER),
     ("live/server.py", "not (knows or (", "not (True or (", SERVER),
     ("live/server.py", "len(host) == 1 and host[0] in hosts", "len(host) == 1", SERVER),
     ("live/server.py", "self._runs and bool(self._pages)", "self._runs", SERVER),
     ("live/server.py", "self._joined < _MOST_PAGES", "self._joined <= _MOST_PAGES", SERVER),
-    ("live/server.py", 'request["do"] in _CHANGES', "False", SERVER),
+    ("live/server.py", 'request.get("do") in _CHANGES', "False", SERVER),
     ("live/server.py", "in_a_row or before.same(session)", "in_a_row", SERVER),
     # Worlds and the grid.
     (

@@ -50,7 +50,6 @@ _MOST_PAGES = 24
 _MOST_TEXT = 2**18  # bytes of a request
 _MOST_UPLOAD = 2**22  # bytes of a session file
 _MOST_IN_FLIGHT = 12  # frames sent to a page before it has drawn the first of them
-_MOST_WAITING = 2**27  # bytes buffered for a page that does not read
 _FEW = 4  # with fewer frames per episode, each frame shows another episode
 _PHASES = 24  # number of such frames that together show the course of an episode
 _STATE_EVERY = 0.5  # seconds
@@ -99,14 +98,11 @@ class Page:
         self.behind = False  # if True, the next frame must be a complete one
 
     def send(self, *messages: str | bytes) -> None:
-        """Send messages without waiting; disconnect pages that never read."""
+        """Send messages without waiting; pings disconnect pages that never read."""
         from websockets.asyncio.server import broadcast
 
         for message in messages:
             broadcast([self.connection], message)
-        transport = self.connection.transport
-        if transport.get_write_buffer_size() > _MOST_WAITING:
-            transport.abort()
 
     def show(self, frame: bytes) -> None:
         """Send a frame of changes, unless too many frames are unseen: then the page is behind."""
