@@ -91,19 +91,6 @@ def test_each_pixel_has_the_colour_of_its_cell(ranges, size) -> None:
     assert share_that_agrees(frame[::-1, ::-1]) < 0.6
 
 
-def test_a_picture_of_cells_owes_nothing_to_those_before_it() -> None:
-    """The last one is kept, and given to callers who draw on it."""
-    grid, others = AxialGrid((4, 3, 3)), random_colours(AxialGrid((4, 3, 3)))
-    used, of_cells = Rasteriser(grid, 90, 80), others[::-1].copy()
-    for colours_now in (of_cells, of_cells, others, of_cells):
-        frame = used.draw_cells(colours_now)
-        assert np.array_equal(frame, Rasteriser(grid, 90, 80).draw_cells(colours_now))
-        frame[:] = 0
-    of_cells[grid.exists] = 0x336699  # in place
-    expected = Rasteriser(grid, 90, 80).draw_cells(of_cells)
-    assert np.array_equal(used.draw_cells(of_cells), expected)
-
-
 def test_a_straight_edge_is_exact() -> None:
     """Two cells, one above the other: the line between them covers as much as it is wide."""
     grid = AxialGrid((2, 1, 1))
