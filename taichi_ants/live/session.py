@@ -328,7 +328,7 @@ class Session:
         return session._follow(self.edits[len(session.edits) : last], steps, changes), steps
 
     @classmethod
-    def snapshots(cls, log: Log, most: int = 1000) -> Iterator[tuple[Session, bytes]]:
+    def snapshots(cls, log: Log, most: int) -> Iterator[tuple[Session, bytes]]:
         """Yield about `most` snapshots of a replay: the session, and a frame of changes.
 
         If there are fewer steps and edits, each step and each edit has a snapshot.

@@ -20,14 +20,14 @@ from learning import (
 )
 from named_states import parse_state
 from PIL import Image
-from policy_sheet import clarity, learned, policy_sheet, usual_spread
+from policy_sheet import clarity, policy_sheet, usual_spread
 
 from taichi_ants import AntsError, TrainingConfig
 from taichi_ants.learners.policies import random_policy, save_policy, trail_follower
 from taichi_ants.rendering import Episode, save_animation, text
 from taichi_ants.rendering.colours import CELL_FOOD, CHOSEN
 from taichi_ants.task import Task, observations
-from taichi_ants.task.constants import ACTION_NAMES, PICK_UP, RIGHT
+from taichi_ants.task.constants import PICK_UP, RIGHT
 from taichi_ants.task.states import REACHABLE_STATES
 from taichi_ants.worlds import paper
 
@@ -135,29 +135,6 @@ def test_the_usual_spread() -> None:
     assert usual_spread(table, Task().sees) == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize(
-    "values",
-    [
-        (0.0, 0.0, 1.97e-5, 0.0, 0.0),
-        (-0.002, 0.0, -0.001, -0.001, -0.001),  # the best is the one that was never tried
-    ],
-)
-def test_a_hairline_is_no_clear_choice(values) -> None:
-    assert clarity(np.array(values), 0.4) < 0.01
-    assert not learned(np.array(values), 0.4)
-    assert learned(np.array(values), 100 * 2.5e-6)
-    table = random_policy()
-    table[parse_state("foraging E F E")] = (0.0, 0.0, 0.0, 0.8, 0.0)
-    blank = policy_sheet(table)
-    place = parse_state("foraging O O O")
-    table[place] = values
-    hardly = policy_sheet(table)
-    table[place] = (0.0, 0.8, 0.0, 0.0, 0.0)
-    clear = policy_sheet(table)
-    assert (hardly == blank).all()
-    assert coloured(clear, CHOSEN).sum(axis=1).max() > 60
-
-
 def all_known() -> np.ndarray:
     """A table in which something was learned in each state that an ant can come into."""
     table = random_policy()
@@ -236,19 +213,6 @@ def test_letters_of_their_own_are_explained_on_the_sheet_and_in_the_panel(name, 
     assert beside.get("", "") == task.sees.letters
     assert {word.strip(",") for word in task.sees.letters.split()} >= strange
     assert bool(strange) == (name != "paper")
-
-
-@pytest.mark.parametrize("best", [(0, 1, 3), (0, 1, 2, 4), (0, 1, 2, 3)])
-def test_no_tie_is_cut_off(best, monkeypatch) -> None:
-    table, written = random_policy(), []
-    table[parse_state("foraging E F E"), list(best)] = 1.0
-    monkeypatch.setattr(text, "write", lambda *given, **more: written.append((given, more)))
-    policy_sheet(table)
-    (found,) = ((given, more) for given, more in written if " / " in given[1])
-    (tile, words, _, _, size, *_), more = found
-    assert words == " / ".join(ACTION_NAMES[action] for action in best)
-    assert size >= text.SMALLEST
-    assert text.width(words, size) <= more.get("room", tile.shape[1])
 
 
 # The command lines.

@@ -215,8 +215,8 @@ def test_a_page_that_joins_late_sees_what_the_others_see(name):
 def test_a_recording_holds_what_happened(edited):
     session = edited("foraging")
     before = session.interventions.state()
-    whole = recording(session.log(), most_frames=10_000)
-    few = recording(session.log(), most_frames=50)
+    whole = recording(Session.snapshots(session.log(), 10_000))
+    few = recording(Session.snapshots(session.log(), 50))
     for one in (whole, few):
         last = list(played(unpacked(one.to_bytes())))[-1]
         snapshot = session.colony.snapshot()
@@ -248,7 +248,7 @@ def test_exports_are_files_of_the_project(edited, tmp_path):
         colony.tick(9)
         again.colony.tick(9)
         assert colony == again.colony, name
-    assert gif_bytes(session.log(), most_frames=4).startswith(b"GIF89a")
+    assert gif_bytes(Session.snapshots(session.log(), 4)).startswith(b"GIF89a")
 
 
 WRONG = [
@@ -379,7 +379,7 @@ def test_a_recording_counts_what_was_delivered_between_its_frames(edited):
         counted += delivered() * ("episode" in edit or not edit)
         if edit:
             again.apply(edit)
-    few = recording(session.log(), most_frames=20)
+    few = recording(Session.snapshots(session.log(), 20))
     types = few.header["types"]
     told = [
         unpack(types, frame)["clock"][CLOCK.index("delivered")]

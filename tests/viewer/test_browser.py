@@ -290,19 +290,6 @@ def test_light_and_dark(browser, episode):
     dark.press("t")
     assert dark.read(look) == "dark"
     dark.close()
-    light = Page(browser, episode[0], color_scheme="light", reduced_motion="reduce")
-    assert light.read(look) == "light"
-    light.tab.keyboard.press("Space")  # ants do not glide
-    shares = (
-        "stage => { const s = []; const draw = viewer.stage.draw.bind(viewer.stage);"
-        "viewer.stage.draw = (m, share, marks) => { s.push(share); draw(m, share, marks); };"
-        "return new Promise((done) => setTimeout(() => done(s), 400)); }"
-    )
-    assert set(light.read(shares)) <= {0}
-    light.tab.keyboard.press("Space")
-    light.tab.emulate_media(color_scheme="dark")
-    light.tab.wait_for_function("document.documentElement.dataset.theme === 'dark'")
-    light.close()
 
 
 def test_cells_have_the_colours_of_what_they_hold(crowd, colony):
