@@ -17,7 +17,6 @@ from taichi_ants import interventions as language
 from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.errors import AntsError
 from taichi_ants.interventions import Intervention
-from taichi_ants.task import Pheromone
 
 Edit = dict[str, Any]
 
@@ -55,10 +54,15 @@ def values(interventions: Interventions) -> dict[str, Value]:
     for name, largest in (("slope", 100), ("cap", 10_000)):
         if (number := getattr(pheromone, name)) is not None:
             values[name] = Value(int(number), 1, max(largest, int(number)), 1, _path(name))
-    falls = pheromone.evaporation != "none"
-    if _with_evaporation(interventions, not falls)[0].dense == pheromone.dense:
-        edits = {str(n): _switch(interventions, n == 1) for n in (0, 1)}
-        values["evaporation"] = Value(int(falls), 0, 1, 1, "task", edits)
+    falls, given = pheromone.evaporation != "none", colony.task.pheromone
+    if given.evaporation == "none":
+        given = replace(given, evaporation="linear")
+    if (given.lasting if falls else given).dense == pheromone.dense:
+        flag = "evaporation_in_training" if colony.learns else "evaporation_in_evaluation"
+        switches: dict[str, Edit] = {str(n): {"task": {flag: bool(n)}} for n in (0, 1)}
+        if colony.task.pheromone.evaporation == "none":
+            switches["1"]["task"]["pheromone.evaporation"] = "linear"
+        values["evaporation"] = Value(int(falls), 0, 1, 1, "task", switches)
     if pheromone.half_life is not None:
         half_life = float(pheromone.half_life)
         values["half_life"] = Value(
@@ -74,22 +78,6 @@ def values(interventions: Interventions) -> dict[str, Value]:
 
 def _path(name: str) -> str:
     return f"task.pheromone.{name}"
-
-
-def _switch(interventions: Interventions, falls: bool) -> Edit:
-    """Return the edit that switches evaporation on (1 per tick if the task has none) or off."""
-    learns = interventions.colony.learns
-    flag = "evaporation_in_training" if learns else "evaporation_in_evaluation"
-    none = falls and interventions.colony.task.pheromone.evaporation == "none"
-    return {"task": {flag: falls, **({"pheromone.evaporation": "linear"} if none else {})}}
-
-
-def _with_evaporation(interventions: Interventions, falls: bool) -> tuple[Pheromone, Pheromone]:
-    """Return pheromones with or without evaporation: that of the colony, and that of its task."""
-    pheromone = interventions.colony.task.pheromone
-    if falls and pheromone.evaporation == "none":
-        pheromone = replace(pheromone, evaporation="linear")
-    return (pheromone if falls else pheromone.lasting), pheromone
 
 
 def checked(edit: object, interventions: Interventions) -> Intervention:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -232,14 +232,6 @@ class ReferenceColony:
         least = min(training.min_learning_rate, training.learning_rate)
         self.learning_rate = max(least, self.learning_rate * training.learning_rate_decay)
         self.records.append(self.record)
-
-    def run_episode(self, ticks: int) -> Iterator[list[Transition]]:
-        """Yield the transitions of each tick of an episode of `ticks`, or less if it ends early."""
-        self.begin_episode()
-        while self.record.ticks < ticks and not self.over:
-            self.tick(last=self.record.ticks == ticks - 1)
-            yield self.transitions
-        self.end_episode()
 
     def tick(self, last: bool = False) -> None:
         """Advance the colony by one tick, after which the episode ends if `last`."""

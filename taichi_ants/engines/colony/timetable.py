@@ -12,7 +12,6 @@ from taichi_ants.engines.colony.interventions import Interventions
 from taichi_ants.engines.colony.stepping import Stepper
 from taichi_ants.engines.colony.ticking import TickingColony
 from taichi_ants.errors import AntsError
-from taichi_ants.interventions import SetPolicy
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 
 
@@ -38,12 +37,6 @@ class Timetable:
             for event in self._events
             if isinstance(event, When)
         }
-        if self._events:
-            self._check_colony()
-
-    def _check_colony(self) -> None:
-        """Raise an AntsError if an intervention cannot happen in this colony."""
-        colony = self._colony
         for event in self._events:
             for intervention in event.interventions:
                 everywhere = isinstance(event, When) and intervention.in_all_worlds
@@ -61,9 +54,7 @@ class Timetable:
         self._interventions = Interventions(colony, lasting=False)
         self._done: dict[int, np.ndarray] = {}  # by event: the worlds in which it has happened
         self._before = colony.task, colony.training, colony.epsilon, colony.learning_rate
-        replaces = any(
-            isinstance(x, SetPolicy) for event in self._events for x in event.interventions
-        )
+        replaces = any(event.policy for event in self._events)
         self._q = colony.arrays["q"].copy() if replaces else None
 
     def __exit__(self, *_: object) -> None:
