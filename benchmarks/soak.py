@@ -56,7 +56,7 @@ def faults(colony: Colony) -> list[str]:
     stored = arrays["nests"][NestRow.STORE, 0] + world[WorldRow.BIRTHS]
     foods = np.count_nonzero(ground == FOOD) + ants["carries"].sum(dtype=int)
     came, walls = len(colony.worlds[0].foods) + world[WorldRow.REGROWN], arrays["walls"] != 0
-    trails = arrays["level"] if colony.pheromone.dense else arrays["trail"]
+    trails = arrays["level"] if colony.pheromones[0].dense else arrays["trail"]
     food_sources = arrays["food_sources"][:, : world[WorldRow.FOOD_SOURCES]]
     ages, lifespan = ants.get("age", np.zeros(1)), colony.task.life.lifespan
     outcome = colony.outcome()  # checks that action values are finite

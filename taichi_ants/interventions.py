@@ -38,6 +38,7 @@ from taichi_ants.settings import (
 )
 from taichi_ants.task import Task
 from taichi_ants.task.field import TRAIL
+from taichi_ants.task.model import Model
 from taichi_ants.task.pheromone import MAX_DEPOSIT
 
 if TYPE_CHECKING:
@@ -337,7 +338,7 @@ class SetTask(Intervention, path="task"):
                 "the task cannot change the share, ants, nest or policy of a caste in an episode, "
                 "or whether it has thresholds; change its other numbers."
             )
-        if task.compiled(learns) != changed.compiled(learns):
+        if Model(task, learns) != Model(changed, learns):
             old, new = flat(task.as_dict()), flat(changed.as_dict())
             names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
             changes = (f"{name} from {old.get(name)!r} to {new.get(name)!r}" for name in names)

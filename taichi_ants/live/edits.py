@@ -40,7 +40,7 @@ def values(interventions: Interventions) -> dict[str, Value]:
     - deposit: the `level` of `Pheromone`; slope, cap, half_life, diffusion: as in `Pheromone`.
     - evaporation: 1 if trails evaporate, else 0.
     """
-    colony, pheromone = interventions.colony, interventions.colony.pheromone
+    colony, pheromone = interventions.colony, interventions.colony.pheromones[0]
     living = int(np.count_nonzero(colony.living[0]))
     values = {"ants": Value(max(living, 1), 1, colony.capacity, 1, "ants")}
     if colony.task.choice.needs_table:

@@ -110,7 +110,7 @@ class RunPoint:
     def __post_init__(self) -> None:
         (config,) = arguments.checked_configs(self.training)
         object.__setattr__(self, "training", config)
-        arguments.checked_lone_task(self.task)
+        arguments.checked_task(self.task, *arguments.ALONE)
         _check_policy(self.policy, self.episodes)
         more = "" if self.policy else "; 0 requires a policy"
         checked_whole("episodes", self.episodes, 0 if self.policy else 1, otherwise=more)

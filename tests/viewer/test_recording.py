@@ -28,7 +28,6 @@ from taichi_ants.viewer import (
     Recorder,
     Recording,
     record_colony,
-    record_episode,
     record_trace,
 )
 from taichi_ants.viewer.frames import types_of
@@ -219,8 +218,6 @@ def test_what_cannot_be_recorded_says_why():
         record_colony(colony, -1)
     with pytest.raises(AntsError, match="follow is 3; it must be from 0 to 0"):
         record_colony(colony, 1, follow=3)
-    with pytest.raises(AntsError, match="episode is None"):
-        record_episode(None)
     trace = rollout(worlds.paper(), trail_follower())
     object.__setattr__(trace, "arguments", None)
     with pytest.raises(AntsError, match="does not contain its world and settings"):

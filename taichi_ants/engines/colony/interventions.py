@@ -22,7 +22,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,7 +36,6 @@ from taichi_ants.engines.colony.layout import (
     Stage,
     WorldRow,
 )
-from taichi_ants.engines.colony.ticking import TickingColony
 from taichi_ants.engines.layout import note_best_actions
 from taichi_ants.errors import AntsError, count, entries_of, shown
 from taichi_ants.grid.constants import (
@@ -52,6 +51,9 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World
+
+if TYPE_CHECKING:
+    from taichi_ants.engines.colony.colony import Colony
 
 Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
@@ -114,7 +116,7 @@ class _World:
         """Set the trail, or a further field, of cells other than rocks."""
         everywhere = np.flatnonzero(self.colony.grid.exists)
         cells = everywhere if change.cells is None else self._index(change.cells)
-        number = [TRAIL, *self.colony.fields].index(change.field)
+        number = [TRAIL, *self.colony.task.fields].index(change.field)
         yield
         self._lay(cells[self.view("walls")[cells] == 0], change.level, number)
 
@@ -390,7 +392,7 @@ class _World:
     def _change_food_sources(self, cells: np.ndarray, what: int, kind: int = 0) -> None:
         """Let the food sources follow a change of cells; see `food_sources.changed`."""
         colony, arrays, room = self.colony, self.colony.arrays, self.colony.n_food_sources
-        if colony.food_changes:
+        if colony.model.food_changes:
             worlds = range(len(colony.worlds))
             sources = [food_sources.of_world(arrays, w, room) for w in worlds]
             offsets = colony.grid.offsets
@@ -421,7 +423,7 @@ class Interventions:
     """
 
     def __init__(
-        self, colony: TickingColony, worlds: Sequence[int] | None = None, lasting: bool = True
+        self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None

@@ -7,7 +7,7 @@ order is that of `taichi_ants.reference.ReferenceColony.tick`.
 """
 
 from collections.abc import Callable, Iterator
-from functools import cache, partial
+from functools import cache
 from itertools import chain, groupby
 from typing import Any, NamedTuple
 
@@ -17,13 +17,8 @@ from taichi.lang.any_array import AnyArray
 from taichi_ants.engines import views
 from taichi_ants.engines.colony import columns, learning, life, own_inputs, steps, trail
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order, Stage, WorldRow
-from taichi_ants.engines.colony.own_rules import own_rule
-from taichi_ants.learners.learner import Learner
 from taichi_ants.learners.memory import guarded, read_rates
-from taichi_ants.rules import Rule
-from taichi_ants.task import Traffic
-from taichi_ants.task.constants import ROW
-from taichi_ants.task.observations import Observation
+from taichi_ants.task.model import Model
 from taichi_ants.task.rules.conflicts import STANDS
 
 ANTS, CELLS, WORLD = "ants", "cells", "world"
@@ -41,135 +36,39 @@ class Phase(NamedTuple):
     do: Callable[..., None]
 
 
-class Features(NamedTuple):
-    """The features of a model that decide what is compiled, and nothing else.
-
-    With `own_tables` there is a table for each slot, not one for each world; for the others, see
-    `ColonyState` and `Pheromone`. `dense` and `views` have an entry for each pheromone, the trail
-    first. The cues, `carriers_follow` and `reads` are numbers of pheromones. -1 is the compass, or
-    means that ants with food follow their cue. A model does not pay for features that it does not
-    use: kernels without births, deaths or food that changes are faster, and compile much faster.
-    """
-
-    learner: Learner | None
-    own_tables: bool
-    is_given_actions: bool
-    observation: Observation
-    dense: tuple[bool, ...]
-    views: tuple[str, ...]
-    outbound: int
-    homing: int
-    carriers_follow: int
-    reads: tuple[int, ...]  # of the observation
-    traffic: Traffic
-    ants_change: bool
-    food_changes: bool
-    n_nests: int = 1
-    n_kinds: int = 1
-    has_foods: bool = False
-    has_loads: bool = False
-    choice: str = "greedy"
-    slips: bool = False
-    misreads: bool = False
-    n_castes: int = 0  # 0: ants have no castes
-    cues: tuple[tuple[int, int], ...] = ()  # of all castes, outbound and homing, if they differ
-    has_labour: bool = False
-    epsilon_varies: bool = False  # between the ants of a caste
-    rules: tuple[Rule, ...] = ()  # your own rules, in the order of their parameters
-    reward: str = "by_event"
-    deposits: tuple[str, ...] = ()  # the rules of each pheromone, if any is your own
-    evaporations: tuple[str, ...] = ()
-    fields: tuple[str, ...] = ()  # the names of all pheromones, if one of your rules reads them
-
-
-class Cues(NamedTuple):
-    """The cues of some ants while kernels compile: numbers of pheromones, and their views.
-
-    Ants with food follow the pheromone `followed`, see `steps.cue_level`.
-    """
-
-    outbound: int
-    homing: int
-    followed: int
-    has_compass: bool
-    half: bool
-    homing_view: str
-
-
-def cues_of(features: Features, outbound: int, homing: int) -> Cues:
-    """Return the cues with these numbers; -1 is the compass."""
-    half, followed, view = features.views[outbound] == "half", homing, ""
-    if homing < 0:
-        followed = features.carriers_follow if features.carriers_follow >= 0 else outbound
-    else:
-        view = features.views[homing]
-    return Cues(outbound, homing, followed, homing < 0, half, view)
-
-
 class Variant:
-    """The compile-time properties of a kernel, `v` in functions: features and what follows."""
+    """A model with the functions and types of its kernels; `v` in functions."""
 
-    def __init__(self, features: Features) -> None:
-        vars(self).update(features._asdict())
-        learner, observation = features.learner, features.observation
-        self.dense = any(features.dense)
-        self.pheromones = tuple(zip(features.dense, features.views, strict=True))
-        pairs = features.cues or ((features.outbound, features.homing),)
-        self.cues = tuple(cues_of(features, *pair) for pair in pairs)
-        cues = {number for cue in self.cues for number in (cue.outbound, cue.followed)}
+    def __init__(self, model: Model) -> None:
+        vars(self).update(vars(model))
         # The mark of an ant that wants no other cell.
-        self.idle = STANDS if self.traffic.shared else 0
-        self.n_groups = self.n_nests * max(1, self.n_castes)  # in a world: nests by castes
-        # Whether deliveries are counted by nest and kind.
-        self.counts_by_nest_and_kind = self.n_nests > 1 or self.n_kinds > 1
-        # Only then can slots before the last ant be vacant; see `ColonyState.slots_matter`.
-        self.slots_matter = features.ants_change or features.own_tables or features.is_given_actions
-        named, none = partial(own_rule, features.rules), ("",) * len(features.dense)
-        self.own_choice = own_inputs.choice(named(features.choice))
-        self.own_reward = own_inputs.reward(named(features.reward))
-        self.has_own_choice = self.own_choice is not None
-        self.has_own_reward = self.own_reward is not None
-        self.own_deposits = tuple(map(own_inputs.deposit, map(named, features.deposits or none)))
-        self.own_evaporations = tuple(map(named, features.evaporations or none))
-        self.field_numbers = {name: number for number, name in enumerate(features.fields)}
-        # Whether pheromones are laid one after the other, because rules of deposits read others.
-        lay = [rule for rule in features.rules if rule.kind == "deposit"]
-        self.lays_in_turn = any(rule.fields for rule in lay)
-        self.reads_stimulus = any("stimulus" in rule.inputs for rule in features.rules)
-        self.learner = learner
-        self.draws_next_action = learner is not None and learner.draws_next_action
-        # Each ant learns into its own table, or all ants of a world into one table.
-        self.independent = learner is not None and self.own_tables
-        self.together = learner is not None and not self.own_tables
-        self.begins = self.independent and learner.begin is not None
-        self.plans_together = self.together and learner.plans
-        if learner is not None:
-            self.read_rates = read_rates(learner.hyperparameters)
-        if self.together:
-            self.td_error = guarded(learner.td_error)
-        self.n_numbers = observation.n_states * ROW  # of a table: state-action pairs, and unused
-        self.n_pairs = self.n_numbers * self.n_groups  # of all tables that ants of a world share
-        self.is_papers = observation.name == "paper"
-        # The paper's state is the state index, unless ants misread cells.
-        self.sees_paper_state = self.is_papers and not self.misreads
-        # Whether the cell of an ant must show that the ant carries food.
-        under_carriers = any(features.views[cue] == "strongest_under_carriers" for cue in cues)
-        self.sees_ants = not self.is_papers or under_carriers
-        sees_dense = any(features.dense[cue] for cue in cues)
-        self.level_type = ti.f32 if sees_dense else ti.i32
-        if not self.is_papers:
-            self.encode = views.encode_function(observation)
-            reads_dense = tuple(features.dense[number] for number in self.reads)
-            self.view_type = views.view_type(observation, sees_dense, reads_dense)
+        self.idle = STANDS if model.traffic.shared else 0
+        own = own_inputs.own_rules(model.rules)
+        self.own_choice = model.choice_rule and own[model.choice_rule].choose
+        self.own_reward = model.reward_rule and own[model.reward_rule].pay
+        deposits = [rule and own[rule].lay for rule in model.deposit_rules]
+        evaporations = [rule and own[rule].evaporate for rule in model.evaporation_rules]
+        # The arguments of `trail.pheromone_of` by number.
+        self.pheromones = tuple(
+            zip(model.dense_by_number, model.views, deposits, evaporations, strict=True)
+        )
+        if model.learner is not None:
+            self.read_rates = read_rates(model.learner.hyperparameters)
+        if model.together:
+            self.td_error = guarded(model.learner.td_error)
+        self.level_type = ti.f32 if model.sees_dense else ti.i32
+        if not model.is_papers:
+            self.encode = views.encode_function(model.observation)
+            reads_dense = tuple(model.dense_by_number[number] for number in model.reads)
+            self.view_type = views.view_type(model.observation, model.sees_dense, reads_dense)
 
     def field(self, c: Any, number: int) -> trail.PheromoneArrays:
         """Return the arrays and numbers of a pheromone; 0 is the trail."""
-        own = self.own_deposits[number], self.own_evaporations[number]
-        return trail.pheromone_of(c, number, *self.pheromones[number], *own)
+        return trail.pheromone_of(c, number, *self.pheromones[number])
 
     def dense_fields(self, c: Any) -> list[trail.PheromoneArrays]:
         """Return the arrays and numbers of the dense pheromones."""
-        return [self.field(c, k) for k, (dense, _) in enumerate(self.pheromones) if dense]
+        return [self.field(c, number) for number, dense in enumerate(self.dense_by_number) if dense]
 
     def further_fields(self, c: Any) -> list[trail.PheromoneArrays]:
         """Return the arrays and numbers of the pheromones other than the trail."""

@@ -2,17 +2,18 @@
 
 A rule of choice reads what the ant sees before its action. A rule of deposits that reads other
 pheromones reads those that ants lay before it with the deposits of this tick, see
-`Variant.lays_in_turn`. A rule of rewards runs when the ant observes at the end of a tick, before it
+`Model.lays_in_turn`. A rule of rewards runs when the ant observes at the end of a tick, before it
 learns, so it reads levels after the tick.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import accumulate
 from typing import Any
 
 import taichi as ti
 
 from taichi_ants.engines.colony.columns import individual, nest_of
-from taichi_ants.engines.colony.own_rules import OwnRule
 from taichi_ants.engines.colony.steps import (
     cell_ahead,
     cue_level,
@@ -23,8 +24,9 @@ from taichi_ants.engines.colony.steps import (
     trait,
 )
 from taichi_ants.engines.colony.trail import level_of
-from taichi_ants.engines.own_rules import for_kernels
+from taichi_ants.engines.own_rules import bounded_function, for_kernels
 from taichi_ants.learners.memory import values_of
+from taichi_ants.rules import Rule
 from taichi_ants.rules.inputs import AHEAD, LEVELS, field_of
 from taichi_ants.task.constants import EMPTY
 from taichi_ants.task.rules.actions import step_towards
@@ -33,33 +35,32 @@ from taichi_ants.task.rules.vision import code_in_view
 
 _CODE, _IS_TRUE, _IS_OPEN, _NEARER = range(4)  # the results of `cell_ahead`
 _WORDS = 4294967296.0
+Make = dict[str, Callable[[], Any]]  # functions that return the inputs of a rule
 
 
-def choice(rule: OwnRule | None) -> Callable[..., Any] | None:
-    """Return a function for kernels that returns an action, i32; see `steps.draw_by_cues`."""
-    if rule is None:
-        return None
+class OwnRule:
+    """A rule in kernels, with a method for each kind of rule.
 
+    The parameters of the rule begin at a place in `rule_numbers`.
+    """
+
+    def __init__(self, rule: Rule, first: int) -> None:
+        self.inputs, self.function = tuple(rule.inputs), bounded_function(rule)
+        self.places = range(first, first + len(rule.parameters))
+
+    @for_kernels
     def choose(
-        c: Any,
-        v: Any,
-        cues: Any,
-        w: Any,
-        ant: Any,
-        state: Any,
-        paper_state: Any,
-        tick: Any,
+        self, c: Any, v: Any, cues: Any, w: Any, ant: Any, state: Any, paper_state: Any, tick: Any,
         bits: Any,
-    ) -> Any:
-        seen = state if v.is_papers else paper_state
-        carries = trait(c.carries, ant)
+    ) -> Any:  # fmt: skip
+        """Return an action, i32; see `steps.draw_by_cues`."""
+        carries, seen = trait(c.carries, ant), state if v.is_papers else paper_state
+        sight = c, v, cues, w, ant, seen, paper_state
         make = {
             "values": lambda: _values(c, v, w, ant, state),
-            "codes": lambda: _ahead(c, v, cues, w, ant, seen, paper_state, _CODE),
-            "is_open": lambda: _ahead(c, v, cues, w, ant, seen, paper_state, _IS_OPEN),
-            "nearer": lambda: _ahead(c, v, cues, w, ant, seen, paper_state, _NEARER) * carries,
-            "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, paper_state, tick),
-            "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick),
+            "codes": lambda: _ahead(*sight, _CODE),
+            "is_open": lambda: _ahead(*sight, _IS_OPEN),
+            "nearer": lambda: _ahead(*sight, _NEARER) * carries,
             "carries": lambda: carries,
             "paper_state": lambda: seen,
             "epsilon": lambda: _share(explore_below_of(c, v, w, ant)),
@@ -67,21 +68,16 @@ def choice(rule: OwnRule | None) -> Callable[..., Any] | None:
             "random_2": lambda: _share(high_word(bits)),
             **_of_ants(c, v, w, ant, tick),
         }
-        return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, paper_state, tick))
+        return self.result(c, make | _of_levels(self.inputs, *sight, carries, tick))
 
-    return for_kernels(choose)
-
-
-def deposit(rule: OwnRule | None) -> Callable[..., Any] | None:
-    """Return a function for kernels that returns a level, f64; see `trail.deposit`."""
-    if rule is None:
-        return None
-
+    @for_kernels
     def lay(
-        c: Any, v: Any, w: Any, ant: Any, level: Any, index: Any, carried: Any, carries: Any,
+        self, c: Any, v: Any, w: Any, ant: Any, level: Any, index: Any, carried: Any, carries: Any,
         event: Any, paper_state: Any, tick: Any,
     ) -> Any:  # fmt: skip
-        make = {
+        """Return a level, f64; see `trail.deposit`."""
+        make: Make = {name: partial(_level, c, v, name, index, tick) for name in self.inputs}
+        make |= {
             "level": lambda: level,
             "carried": lambda: carried,
             "carries": lambda: carries,
@@ -89,21 +85,18 @@ def deposit(rule: OwnRule | None) -> Callable[..., Any] | None:
             "paper_state": lambda: paper_state,
             **_of_ants(c, v, w, ant, tick),
         }
-        inputs = {
-            name: make[name]() if name in make else _level(c, v, name, index, tick)
-            for name in rule.inputs
-        }
-        return rule.bound(c)(**inputs)
+        return self.result(c, make)
 
-    return for_kernels(lay)
+    @for_kernels
+    def evaporate(self, c: Any, level: Any, tick: Any) -> Any:
+        """Return a level, f64; see `trail.evaporate`."""
+        return self.result(c, {"level": lambda: level, "tick": lambda: tick})
 
-
-def reward(rule: OwnRule | None) -> Callable[..., Any] | None:
-    """Return a function for kernels that returns a reward, i32; see `steps.own_reward`."""
-    if rule is None:
-        return None
-
-    def pay(c: Any, v: Any, cues: Any, w: Any, ant: Any, next_paper_state: Any, tick: Any) -> Any:
+    @for_kernels
+    def pay(
+        self, c: Any, v: Any, cues: Any, w: Any, ant: Any, next_paper_state: Any, tick: Any
+    ) -> Any:
+        """Return a reward, i32; see `steps.own_reward`."""
         carries, seen = trait(c.carries, ant), next_paper_state
         make = {
             "reward": lambda: event_reward(c, v, ant),
@@ -111,42 +104,30 @@ def reward(rule: OwnRule | None) -> Callable[..., Any] | None:
             "carries": lambda: carries,
             "paper_state": lambda: trait(c.paper_state, ant),
             "next_paper_state": lambda: next_paper_state,
-            "levels": lambda: _levels(c, v, cues, w, ant, -1, seen, seen, tick + 1),
-            "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick + 1),
             **_of_ants(c, v, w, ant, tick),
         }
-        return rule.bound(c)(**_made(make, rule, c, v, cues, w, ant, seen, seen, tick + 1))
+        sight = c, v, cues, w, ant, seen, seen
+        return self.result(c, make | _of_levels(self.inputs, *sight, carries, tick + 1))
 
-    return for_kernels(pay)
-
-
-def _made(
-    make: dict[str, Callable[[], Any]],
-    rule: OwnRule,
-    c: Any,
-    v: Any,
-    cues: Any,
-    w: Any,
-    ant: Any,
-    seen: Any,
-    paper_state: Any,
-    tick: Any,
-) -> dict[str, Any]:
-    """Return the inputs that a rule reads, by name; those that are not in `make` read a field."""
-    inputs = {}
-    for name in rule.inputs:
-        if name in make:
-            inputs[name] = make[name]()
-        else:
-            if name.startswith(LEVELS):
-                number = v.field_numbers[field_of(name)]
-                inputs[name] = _levels(c, v, cues, w, ant, number, seen, paper_state, tick)
-            else:
-                inputs[name] = _level(c, v, name, _place(c, w, ant), tick)
-    return inputs
+    def result(self, c: Any, make: Make) -> Any:
+        """Return the result of the rule, for functions that return its inputs."""
+        inputs = [make[name]() for name in self.inputs]
+        return self.function(*inputs, *(_number(c, place) for place in self.places))
 
 
-def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> dict[str, Callable[[], Any]]:
+def own_rules(rules: Sequence[Rule]) -> dict[Rule, OwnRule]:
+    """Return the rules of a task in kernels."""
+    firsts = accumulate((len(rule.parameters) for rule in rules), initial=0)
+    return {rule: OwnRule(rule, first) for rule, first in zip(rules, firsts, strict=False)}
+
+
+@ti.func
+def _number(c: ti.template(), place: ti.template()):
+    """Return a parameter of a rule."""
+    return c.rule_numbers[place]
+
+
+def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> Make:
     """Return the inputs of all kinds of rules that ants follow."""
     return {
         "trait": lambda: individual(c, w, ant),
@@ -156,9 +137,31 @@ def _of_ants(c: Any, v: Any, w: Any, ant: Any, tick: Any) -> dict[str, Callable[
     }
 
 
+def _of_levels(
+    names: Sequence[str], c: Any, v: Any, cues: Any, w: Any, ant: Any, seen: Any, paper_state: Any,
+    carries: Any, tick: Any,
+) -> Make:  # fmt: skip
+    """Return those inputs that are levels of the ant's cue or of fields, for rules of ants."""
+
+    def of_own_cell(name: str) -> Any:
+        return _level(c, v, name, _place(c, w, ant), tick)
+
+    ahead = partial(_levels, c, v, cues, w, ant, seen=seen, paper_state=paper_state, tick=tick)
+    levels: Make = {
+        "levels": partial(ahead, number=-1),
+        "level": lambda: cue_level(c, v, cues, carries, _place(c, w, ant), tick),
+    }
+    for name in filter(field_of, names):
+        if name.startswith(LEVELS):
+            levels[name] = partial(ahead, number=v.field_names.index(field_of(name)))
+        else:
+            levels[name] = partial(of_own_cell, name)
+    return levels
+
+
 def _level(c: Any, v: Any, name: str, index: Any, tick: Any) -> Any:
     """Return the level of a cell in the pheromone that an input names."""
-    return level_of(v.field(c, v.field_numbers[field_of(name)]), index, tick)
+    return level_of(v.field(c, v.field_names.index(field_of(name))), index, tick)
 
 
 @ti.func

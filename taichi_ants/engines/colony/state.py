@@ -7,6 +7,7 @@ The state is in NumPy arrays, which kernels change in place. Only this package r
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
@@ -48,14 +49,15 @@ from taichi_ants.files.archives import Kind
 from taichi_ants.grid.constants import STREAM_ANT, STREAM_QUEEN
 from taichi_ants.grid.randomness import stream_state, words_of
 from taichi_ants.learners.config import TrainingConfig, update_weights
-from taichi_ants.learners.learner import Learner, Memory
+from taichi_ants.learners.learner import Memory
 from taichi_ants.learners.policies import check_finite, checked_values, frozen_policy
 from taichi_ants.records import Snapshot, same
-from taichi_ants.task import Pheromone, Task
+from taichi_ants.task import Task
 from taichi_ants.task.caste import chances_in, numbers_in
 from taichi_ants.task.constants import EMPTY, FOOD, MAX_CASTES, N_ACTIONS, OBSTACLE, ROW
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import TRAIL
+from taichi_ants.task.model import Model
 from taichi_ants.worlds.world import Start, World
 
 State = TypeVar("State", bound="ColonyState")
@@ -106,14 +108,10 @@ class ColonyState:
             by a rule that needs no action values.
         is_given_actions: Whether ants take the actions passed to `Colony.act`.
         one_a_slot: Whether each slot has its own table of action values, not each world.
-        ants_change: Whether ants are born or die.
-        food_changes: Whether food grows back or wanders.
         n_nests: The number of nests in each world.
         n_kinds: The number of kinds of food in the task, at least 1.
-        n_groups: The number of groups of ants with a shared table: nests, by castes if there are.
+        pheromones: The trail, then the further fields, with or without evaporation, by number.
         memory: The size of the learner's memory for each table.
-        pheromone: The pheromone of the task, with or without evaporation.
-        fields: The further pheromones of the task by name, with or without evaporation.
         stored: The names of the arrays in a file.
         length: Length of the episode in ticks; 0 if unknown.
         ready: bool (W,), whether an episode has begun, and each change of it was completed.
@@ -195,17 +193,16 @@ class ColonyState:
             and (worlds[0].n_nests == 1 or table.shape[1] != worlds[0].n_nests)
         )
         self.n_nests, self.n_kinds = worlds[0].n_nests, max(1, len(self.task.foods))
-        self.n_groups = self.n_nests * max(1, len(self.task.castes))
         for name, caste in self.task.castes.items():
             if caste.nest is not None and caste.nest >= self.n_nests:
                 raise AntsError(
                     f"`task.castes.{name}.nest` is {caste.nest}, but the world has "
                     f"{count(self.n_nests, 'nest')}, numbered from 0; choose one of them."
                 )
-        self.take_task(self.task)
-        self.memory = Memory()
-        if self.learner and (self.one_a_slot or self.plans_together):
-            self.memory = padded(self.learner.memory_for(self.training, self.task.n_states))
+        self.pheromones = self.task.pheromones_while(self.learns)
+        self.memory, learner = Memory(), self.model.learner
+        if learner is not None and (self.one_a_slot or self.plans_together):
+            self.memory = padded(learner.memory_for(self.training, self.task.n_states))
         self.arrays: Arrays = {}
         self.lay_out(worlds)
         self.arrays |= (lasting := self._lasting(table))
@@ -214,21 +211,12 @@ class ColonyState:
         self.length, self.ready = 0, np.zeros(len(self.seeds), bool)
         self.delivered = np.zeros(len(self.seeds), np.int64)
 
-    def take_task(self, task: Task) -> None:
-        """Set the attributes that depend on the task."""
-        self.task, self.pheromone = task, task.pheromone_while(self.learns)
-        self.fields = task.fields_while(self.learns)
-        self.ants_change, self.food_changes = task.ants_change, task.food_changes
-
-    @property
-    def pheromones(self) -> tuple[Pheromone, ...]:
-        """All pheromones, in the order of their numbers: the trail, then the further fields."""
-        return self.pheromone, *self.fields.values()
-
-    @property
-    def learner(self) -> Learner | None:
-        """The learner; None if the ants do not learn."""
-        return learners.get(self.training.learner) if self.learns else None
+    @cached_property
+    def model(self) -> Model:
+        """The properties of the colony for which kernels are compiled."""
+        learner = learners.get(self.training.learner) if self.learns else None
+        own_tables, is_given = self.one_a_slot, self.is_given_actions
+        return Model(self.task, self.learns, learner, own_tables, is_given, self.n_nests)
 
     @property
     def plans_together(self) -> bool:
@@ -307,12 +295,6 @@ class ColonyState:
         return self._executed if "executed" in self.arrays else self.actions
 
     @property
-    def draws_ahead(self) -> bool:
-        """Whether ants draw their next action before they learn from the last one."""
-        learner = self.learner
-        return learner is not None and learner.draws_next_action
-
-    @property
     def occupied(self) -> np.ndarray:
         """Whether an ant is on each cell, bool (W, grid.size)."""
         return self.arrays["ground"].reshape(len(self.seeds), -1) >> 4 != 0
@@ -362,20 +344,20 @@ class ColonyState:
     @property
     def _group_axes(self) -> dict[str, int]:
         """The numbers of nests and castes, if there are several."""
-        axes = {"nest": self.n_nests, "caste": self.n_groups // self.n_nests}
+        axes = {"nest": self.n_nests, "caste": self.model.n_groups // self.n_nests}
         return {name: n for name, n in axes.items() if n > 1}
 
     @property
     def owners(self) -> int:
         """The number of tables in each world: one for each slot, or for each nest and caste."""
-        return self.capacity if self.one_a_slot else self.n_groups
+        return self.capacity if self.one_a_slot else self.model.n_groups
 
     @property
     def tables_of_ants(self) -> np.ndarray:
         """The table of `owners` by which the last ant in each slot acts, int32 (W, capacity)."""
         if self.one_a_slot:
             return np.tile(np.arange(self.capacity, dtype=np.int32), (len(self.seeds), 1))
-        return self.nests * np.int32(self.n_groups // self.n_nests) + self.castes
+        return self.nests * np.int32(self.model.n_groups // self.n_nests) + self.castes
 
     @property
     def stimuli(self) -> np.ndarray:
@@ -432,7 +414,7 @@ class ColonyState:
         ground = self.part("ground", world).copy()
         ground[ant_cells] = EMPTY
         carries = self.carrying[world, living]
-        fields = {name: self._levels(world, name) for name in (TRAIL, *self.fields)}
+        fields = {name: self._levels(world, name) for name in (TRAIL, *self.task.fields)}
         of_ants, of_cells = np.zeros(len(ant_cells), np.int32), np.zeros(self.grid.size, np.uint8)
         if self.n_kinds > 1:
             of_ants = self._kinds[world, living].astype(np.int32)
@@ -479,7 +461,7 @@ class ColonyState:
         expiry clocks, int32 (grid.size,). If the pheromone is dense, it has levels, float32, and
         the clock is 0. The level of a cell is max(stored - clock, 0).
         """
-        check_one_of("field", field, (TRAIL, *self.fields))
+        check_one_of("field", field, (TRAIL, *self.task.fields))
         number = self.task.number_of(field)
         return self.stored_pheromone(world, number).copy(), self.trail_clock(world, number)
 
@@ -524,7 +506,7 @@ class ColonyState:
         self.worlds, self.grid = worlds, worlds[0].grid
         self.changed = np.zeros(len(worlds), bool)
         most = max(len(world.foods) for world in worlds)
-        self.make_room_for_food(most if self.food_changes else 0)
+        self.make_room_for_food(most if self.model.food_changes else 0)
         self.arrays |= self._constants()
 
     def make_room_for_food(self, n: int) -> None:
@@ -566,7 +548,7 @@ class ColonyState:
 
     def set_task(self, task: Task) -> None:
         """Set a task for which the colony has the right arrays and kernels."""
-        self.take_task(task)
+        self.task, self.pheromones = task, task.pheromones_while(self.learns)
         self.arrays["rewards"][:] = task.rewards.by_event()
         self.arrays["choice"][:] = task.choice.numbers()
         self.arrays["food_numbers"][:] = _food_numbers(task)
@@ -605,18 +587,13 @@ class ColonyState:
             kept = self.arrays["weights"] = np.empty(min(2 * len(weights), most + 1), np.float32)
         kept[: len(weights)], kept[len(weights) :] = weights, weights[-1]
 
-    @property
-    def slots_matter(self) -> bool:
-        """Whether an ant must stay in its slot; else vacant slots are always the last ones."""
-        return self.ants_change or self.one_a_slot or self.is_given_actions
-
     def sort_ants(self) -> None:
         """Sort the ants of a world roughly by cell, so that neighbours share caches.
 
         Ants have numbers, so their order does not change results. They are not sorted if slots
         matter, or if some slots are vacant, because vacant slots must be the last ones.
         """
-        if self.slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
+        if self.model.slots_matter or self.arrays["worlds"][WorldRow.LIVING].min() < self.capacity:
             return
         # Keys of 16 bits, which NumPy sorts in a tenth of the time.
         near = self.cells >> max(0, self.grid.size.bit_length() - 16)
@@ -624,7 +601,7 @@ class ColonyState:
 
     def close_gaps(self) -> None:
         """Move vacant slots behind those with ants, unless slots matter."""
-        if not self.slots_matter:
+        if not self.model.slots_matter:
             self._sort_slots(self._stages == Stage.VACANT)
 
     def _sort_slots(self, keys: np.ndarray) -> None:
@@ -672,7 +649,7 @@ class ColonyState:
             # The ground of each cell, and the mark of the ant on it, see `layout`.
             "ground": ground.reshape(-1),
             # The clock at which a cell's trail has evaporated; if dense, its level.
-            array_of(0, self.pheromone.dense): levels.reshape(-1),
+            array_of(0, self.model.dense_by_number[0]): levels.reshape(-1),
             # The same for each further field, which is empty at the start.
             **self._further_fields(len(worlds)),
             "worlds": rows,
@@ -688,8 +665,8 @@ class ColonyState:
     def _further_fields(self, n: int) -> Arrays:
         """Return empty arrays (n,) of the pheromones except the trail."""
         return {
-            array_of(number, field.dense): np.zeros(n, np.float32 if field.dense else np.int32)
-            for number, field in enumerate(self.fields.values(), start=1)
+            array_of(number, dense): np.zeros(n, np.float32 if dense else np.int32)
+            for number, dense in enumerate(self.model.dense_by_number[1:], start=1)
         }
 
     def _foods_at_start(self, ground: np.ndarray) -> Arrays:
@@ -720,20 +697,20 @@ class ColonyState:
 
     def _of_episode(self) -> Arrays:
         """Return the arrays that change in an episode, at its start."""
-        n_worlds, dense = len(self.worlds), self.pheromone.dense
+        n_worlds, dense = len(self.worlds), self.model.dense_by_number[0]
         slots, cells = n_worlds * self.capacity, n_worlds * self.grid.size
-        task, divides = self.task, self.task.labour.divides
+        model = self.model
         used = {
-            "executed": task.noise.slip > 0,
-            "state": task.sees.name != "paper" or task.noise.misread > 0,  # else the paper's state
-            "age": self.ants_change,
-            "next_action": self.draws_ahead,
-            "nest": self.n_nests > 1,
-            "kind": self.n_kinds > 1,
-            "caste": bool(task.castes),
-            "idle": divides,
-            "threshold": divides,
-            "reward": task.reward != "by_event",
+            "executed": model.slips,
+            "state": not model.sees_paper_state,
+            "age": model.ants_change,
+            "next_action": model.draws_next_action,
+            "nest": model.n_nests > 1,
+            "kind": model.n_kinds > 1,
+            "caste": model.n_castes > 0,
+            "idle": model.has_labour,
+            "threshold": model.has_labour,
+            "reward": model.has_own_reward,
         }
         made = {
             **{name: array.copy() for name, array in self._at_start().items()},
@@ -834,7 +811,7 @@ class ColonyState:
     def _constants(self) -> Arrays:
         """Return constants of worlds and settings, and scratch arrays of a tick."""
         chunks = len(self.seeds) * self.chunks
-        tables = self.n_groups if self.sharing == "shared" else 0
+        tables = self.model.n_groups if self.sharing == "shared" else 0
         pairs = self.task.n_states * ROW * tables
         sums, cells = max(1, chunks * pairs), len(self.seeds) * self.grid.size
         return {
@@ -854,8 +831,8 @@ class ColonyState:
             "spare": np.zeros_like(self.arrays["level"]),  # the next levels, with diffusion
             **{
                 f"spare_{number}": np.zeros(cells, np.float32)
-                for number, field in enumerate(self.fields.values(), start=1)
-                if field.dense
+                for number, dense in enumerate(self.model.dense_by_number)
+                if number and dense
             },
             "orders": np.zeros(len(Order), np.int32),
             "barrier": np.zeros(24, np.int64),  # see `kernels.wait_for_all`
@@ -976,7 +953,7 @@ class ColonyState:
             # Policies of castes are in the arrays of the file; theirs may no longer exist.
             known = task.with_policies("random")
             colony = cls([worlds[w] for w in facts["world_of"]], known, training, **options)
-            colony.take_task(task)
+            colony.task = task
             colony.epsilon = arguments.checked_share("epsilon", facts["epsilon"])
             colony.set_learning_rate(
                 arguments.checked_share("learning_rate", facts["learning_rate"])

@@ -6,16 +6,13 @@ import math
 import time
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from taichi_ants import runtime
 from taichi_ants.engines.colony.layout import GAVE_UP, Barrier, Order
 from taichi_ants.engines.colony.state import ColonyState
-
-if TYPE_CHECKING:
-    from taichi_ants.engines.colony.kernels import Features
 
 # Ants are sorted after this many steps of all ants, within limits in ticks.
 _STEPS_BETWEEN_SORTS, _FEWEST_TICKS, _MOST_TICKS = 2_500_000, 16, 256
@@ -120,23 +117,10 @@ class Stepper:
         from taichi_ants.engines.arguments import Launch
         from taichi_ants.engines.colony import kernels, learning
 
-        variant = kernels.variant(features_of(state))
+        variant = kernels.variant(state.model)
         if name == "ticks":
             return Launch(partial(kernels.ticks, variant, state.schedule == "by_chunk"))
         return Launch(partial(kernels.once, variant, getattr(learning, name)))
-
-
-def features_of(state: ColonyState) -> Features:
-    """Return the features of a colony for which kernels are compiled."""
-    from taichi_ants.engines.colony import kernels
-
-    return kernels.Features(
-        learner=state.learner,
-        own_tables=state.one_a_slot,
-        is_given_actions=state.is_given_actions,
-        n_nests=state.n_nests,
-        **state.task.compiled(state.learns),
-    )
 
 
 def threads_for(n_worlds: int) -> int:
@@ -144,20 +128,14 @@ def threads_for(n_worlds: int) -> int:
     return min(runtime.start().threads, n_worlds)
 
 
-def _field_numbers(state: ColonyState) -> dict[str, Any]:
-    """Return the numbers of further fields, empty without fields."""
-    fields = state.fields.values()
-    counts = {"counts_without_food": int(any(field.counts_without_food for field in fields))}
-    return (counts if fields else {}) | {
-        f"{name}_{number}": value
-        for number, field in enumerate(fields, start=1)
-        for name, value in field.numbers.items()
-    }
-
-
 def kernel_numbers(state: ColonyState) -> dict[str, Any]:
     """Return the numbers that kernels read in addition to arrays."""
-    memory = state.memory
+    memory, fields = state.memory, state.task.fields.values()
+    of_fields: dict[str, float] = {}
+    if fields:
+        of_fields["counts_without_food"] = int(any(field.counts_without_food for field in fields))
+    for number, pheromone in enumerate(state.pheromones[1:], start=1):
+        of_fields |= {f"{name}_{number}": value for name, value in pheromone.numbers.items()}
     return {
         "n_worlds": len(state.seeds),
         "n_ants": state.ants,  # at the start of an episode
@@ -166,8 +144,8 @@ def kernel_numbers(state: ColonyState) -> dict[str, Any]:
         "n_food_sources": state.n_food_sources,  # room for food sources in each world
         "size": state.grid.size,
         "length": state.length,
-        **state.pheromone.numbers,
-        **_field_numbers(state),
+        **state.pheromones[0].numbers,
+        **of_fields,
         **state.task.numbers,
         "ends_at_delivery": int(state.ends_at_delivery),
         "initial_q": state.training.initial_q,

@@ -158,7 +158,7 @@ def see(c: ti.template(), v: ti.template(), cues: ti.template(), w, ant, tick):
                 ground_left, ground_forward, ground_right, nearer
             )
         else:
-            homing = ti.static(v.field(c, cues.homing))
+            homing = ti.static(v.field(c, cues.followed))
             paper_state = vision.paper_state_homing(
                 homing.half,
                 ground_left,
@@ -218,7 +218,7 @@ def strongest_cue(
     outbound = ti.static(v.field(c, cues.outbound))
     level = ti.cast(strongest_of(c, outbound, left, forward, right, tick), v.level_type)
     if ti.static(not cues.has_compass):
-        field = ti.static(v.field(c, cues.homing))
+        field = ti.static(v.field(c, cues.followed))
         homing = ti.cast(strongest_of(c, field, left, forward, right, tick), v.level_type)
         level = ti.select(carries == 1, homing, level)
     return level
@@ -334,7 +334,7 @@ def owner_of(c: ti.template(), v: ti.template(), w, ant):
 def draw_action(c: ti.template(), v: ti.template(), w, ant, state, paper_state, tick, random_state):
     """Return the ant's action in a state, by a random stream that was advanced for it."""
     action, bits = 0, bits_of(random_state)
-    if ti.static(v.has_own_choice or v.choice == "deneubourg"):
+    if ti.static(v.own_choice or v.choice == "deneubourg"):
         if ti.static(len(v.cues) == 1):
             action = draw_by_cues(
                 c, v, ti.static(v.cues[0]), w, ant, state, paper_state, tick, bits
@@ -373,7 +373,7 @@ def draw_by_cues(
 ):  # fmt: skip
     """Return the ant's action by your own rule, or by the rule "deneubourg"."""
     action = 0
-    if ti.static(v.has_own_choice):
+    if ti.static(v.own_choice):
         action = v.own_choice(c, v, cues, w, ant, state, paper_state, tick, bits)
     else:
         action = draw_cell(c, v, cues, w, ant, state, bits)
@@ -594,7 +594,7 @@ def is_better(
             closer = ti.cast(c.closer[own_map(c, v, w, ant)], ti.i32)
             better = closer >> trait(c.heading, ant) & 1 == 1
         else:
-            better = is_stronger(ti.static(v.field(c, cues.homing)), ahead, here, tick)
+            better = is_stronger(ti.static(v.field(c, cues.followed)), ahead, here, tick)
     return better
 
 

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import taichi as ti
 
 from taichi_ants.engines.colony.layout import array_of
-from taichi_ants.engines.colony.own_rules import OwnRule
 from taichi_ants.task.constants import EMPTY, OBSTACLE, PICK_UP
 from taichi_ants.task.events import Event
 from taichi_ants.task.field import Occasion
@@ -44,16 +43,6 @@ class PheromoneArrays(NamedTuple):
     own_deposit: Any  # your rules, or None
     own_evaporation: Any
 
-    @property
-    def has_own_deposit(self) -> bool:
-        """Whether the rule of deposits is your own."""
-        return self.own_deposit is not None
-
-    @property
-    def has_own_evaporation(self) -> bool:
-        """Whether the rule of evaporation is your own."""
-        return self.own_evaporation is not None
-
 
 def pheromone_of(
     c: Any,
@@ -61,7 +50,7 @@ def pheromone_of(
     dense: bool,
     view: str,
     own_deposit: Callable[..., Any] | None,
-    own_evaporation: OwnRule | None,
+    own_evaporation: Callable[..., Any] | None,
 ) -> PheromoneArrays:
     """Return a pheromone with the arrays and numbers of an argument pack."""
     end = f"_{number}" if number else ""
@@ -74,7 +63,7 @@ def pheromone_of(
         *(getattr(c, name + end) for name in _NUMBERS),
         deposited_when=getattr(c, f"deposited_when{end}") if number else None,
         own_deposit=own_deposit,
-        own_evaporation=own_evaporation and own_evaporation.bound(c),
+        own_evaporation=own_evaporation,
     )
 
 
@@ -113,7 +102,7 @@ def deposit(
 
     `carries` and `event` are those after the ant's action, `paper_state` is that before it.
     """
-    if ti.static(field.has_own_deposit):
+    if ti.static(field.own_deposit):
         level = level_of(field, index, tick)
         laid = field.own_deposit(
             c, v, w, ant, level, index, carried, carries, event, paper_state, tick
@@ -167,9 +156,9 @@ def lay(
 def evaporate(c: ti.template(), v: ti.template(), index, tick):
     """Evaporate the dense pheromones of a cell for one tick."""
     for field in ti.static(v.dense_fields(c)):
-        if ti.static(field.has_own_evaporation):
+        if ti.static(field.own_evaporation):
             if c.ground[index] != OBSTACLE:  # rocks and the outside hold no trail
-                level = field.own_evaporation(level=field.levels[index], tick=tick)
+                level = field.own_evaporation(c, field.levels[index], tick)
                 field.levels[index] = ti.cast(level, ti.f32)
         else:
             field.levels[index] = pheromone.evaporated(field.levels[index], field.decay)

@@ -206,7 +206,7 @@ def test_what_does_not_fit_is_refused(make, says):
         ({"castes": {"a": {"share": 1, "ants": 2}}}, "give one of them"),
         ({"castes": {"a": {"threshold": 3}}}, "leave it out unless `task.labour.rule`"),
         ({"labour": "thresholds"}, "ants have no thresholds; add a caste"),
-        ({"castes": {"a": {"lays": ["trail", "home"]}}}, "it must be one of all, none, trail"),
+        ({"castes": {"a": {"lays": "trail, home"}}}, "it must be one of all, none, trail"),
         ({"castes": {"a": {"k": 2}}}, "because `task.choice.rule` is 'greedy'"),
         ({"castes": {"a": {"homing_cue": "home"}}}, "it must be one of compass, trail"),
         ({"castes": {"a": {"threshold": -1}}}, r"`task\.castes\.a\.threshold\.value` is -1"),

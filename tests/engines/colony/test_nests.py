@@ -126,7 +126,7 @@ def test_ants_deliver_to_their_own_queen_alone():
             nests = colony.nests[delivers]
             assert (far[nests, colony.cells[delivers]] == 1).all()
             happened += np.bincount(nests, minlength=2)
-            if not colony.ants_change:
+            if not colony.model.ants_change:
                 gained = colony.outcome().returns - returns
                 assert (colony.rewards.sum(axis=1, where=acted) == gained).all()
     assert happened.min() > 3

@@ -1,0 +1,118 @@
+"""The model: the properties of a task, its table and its worlds for which kernels are compiled."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from taichi_ants.task.constants import ROW
+from taichi_ants.task.field import COMPASS, TRAIL
+from taichi_ants.task.task import Task
+
+
+class Cues(NamedTuple):
+    """The cues of some ants: numbers of pheromones, and their views.
+
+    Ants with food follow the pheromone `followed`, see `steps.cue_level`, which is their homing cue
+    unless that is the compass. `half` says whether the view of the outbound cue is "half".
+    """
+
+    outbound: int
+    followed: int
+    has_compass: bool
+    half: bool
+    homing_view: str
+
+
+class Model:
+    """The properties that decide which kernels a colony needs; kernels read the rest as numbers.
+
+    A model never changes. Models with equal properties are equal, and share kernels. A model does
+    not pay for features that it does not use: kernels without births, deaths or food that changes
+    are faster, and compile much faster.
+
+    Args:
+        learns: Whether ants learn, so that trails evaporate as in training.
+        learner: The `Learner`; None if the ants do not learn.
+        own_tables: Whether there is a table for each slot, not one for each world and group.
+        is_given_actions: Whether ants take given actions.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        learns: bool,
+        learner: Any = None,
+        own_tables: bool = False,
+        is_given_actions: bool = False,
+        n_nests: int = 1,
+    ) -> None:
+        self.learner, self.own_tables, self.is_given_actions = learner, own_tables, is_given_actions
+        self.observation, self.traffic = task.sees, task.traffic
+        self.slips, self.misreads = task.noise.slip > 0, task.noise.misread > 0
+        self.ants_change, self.food_changes = task.ants_change, task.food_changes
+        self.has_labour = task.labour.divides
+        self.has_foods, self.has_loads = bool(task.foods), task.has_loads
+        self.n_nests, self.n_kinds = n_nests, max(1, len(task.foods))
+        self.n_castes = len(task.castes)  # 0: ants have no castes
+        # Whether the ants of a caste have different exploration rates.
+        self.epsilon_varies = any(caste.epsilon_spread for caste in task.castes.values())
+        # In a world: nests by castes.
+        self.n_groups = n_nests * max(1, self.n_castes)
+        # Whether deliveries are counted by nest and kind.
+        self.counts_by_nest_and_kind = n_nests > 1 or self.n_kinds > 1
+        # Whether ants must stay in their slots; else vacant slots are always the last ones.
+        self.slots_matter = self.ants_change or own_tables or is_given_actions
+
+        self.draws_next_action = learner is not None and learner.draws_next_action
+        # Each ant learns into its own table, or all ants of a world into one table.
+        self.independent = learner is not None and own_tables
+        self.together = learner is not None and not own_tables
+        self.begins = self.independent and learner.begin is not None
+        self.plans_together = self.together and learner.plans
+        self.n_numbers = task.n_states * ROW  # of a table: state-action pairs, and unused
+        self.n_pairs = self.n_numbers * self.n_groups  # of all tables that ants of a world share
+
+        # By number of the pheromone, the trail first; only the views of cues are compiled.
+        pheromones, pairs = task.pheromones_while(learns), task.all_cues
+        self.dense_by_number = tuple(pheromone.dense for pheromone in pheromones)
+        self.views = tuple(
+            pheromone.view if any(number in pair for pair in pairs) else "half"
+            for number, pheromone in enumerate(pheromones)
+        )
+        self.dense = any(self.dense_by_number)
+        carriers_follow = task.number_of(task.choice.carriers_follow or COMPASS)
+        self.cues = tuple(self._cues(*pair, carriers_follow) for pair in pairs)  # of all castes
+        followed = {number for cues in self.cues for number in (cues.outbound, cues.followed)}
+        self.sees_dense = any(self.dense_by_number[number] for number in followed)
+        self.reads = tuple(task.number_of(name) for name in self.observation.reads)
+        self.is_papers = self.observation.name == "paper"
+        # The paper's state is the state index, unless ants misread cells.
+        self.sees_paper_state = self.is_papers and not self.misreads
+        # Whether the cell of an ant must show that the ant carries food.
+        under_carriers = any(self.views[cue] == "strongest_under_carriers" for cue in followed)
+        self.sees_ants = not self.is_papers or under_carriers
+
+        # Your own rules, in the order of their parameters, and where they are used.
+        self.rules, self.choice = task.own_rules, task.choice.rule
+        self.choice_rule, self.reward_rule = task.choice.own_rule, task.own_reward
+        self.has_own_reward = self.reward_rule is not None
+        self.deposit_rules = tuple(pheromone.own_deposit for pheromone in pheromones)
+        self.evaporation_rules = tuple(pheromone.own_evaporation for pheromone in pheromones)
+        # The names of all pheromones, if one of your rules can read them.
+        self.field_names = (TRAIL, *task.fields) if self.rules else ()
+        # Whether pheromones are laid one after the other, because rules of deposits read others.
+        self.lays_in_turn = any(rule.kind == "deposit" and rule.fields for rule in self.rules)
+        self.reads_stimulus = any("stimulus" in rule.inputs for rule in self.rules)
+
+    def _cues(self, outbound: int, homing: int, carriers_follow: int) -> Cues:
+        half = self.views[outbound] == "half"
+        if homing >= 0:
+            return Cues(outbound, homing, False, half, self.views[homing])
+        followed = carriers_follow if carriers_follow >= 0 else outbound
+        return Cues(outbound, followed, True, half, "")
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Model) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(vars(self).values()))
