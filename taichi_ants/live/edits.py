@@ -97,6 +97,6 @@ def checked(edit: object, interventions: Interventions) -> Intervention:
     if isinstance(cells, str):
         flat = colony.worlds[0].region(cells).tolist()
     else:
-        flat = [language.flat_index(colony.grid, cell) for cell in cells]
+        flat = language.flat_indices(colony.grid, cells)
     # `Clear` stands for any intervention with cells.
     return replace(cast(language.Clear, intervention), cells=flat)

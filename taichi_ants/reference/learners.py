@@ -26,7 +26,6 @@ class ReferenceLearner:
 
     Attributes:
         draws_next_action: Whether the next action is drawn before the update, as in SARSA.
-        shares: Whether all ants of a world can learn into one table: the update is `error` alone.
         hyperparameters: The settings that only this learner has, with their defaults.
         rows: The table, n_states lists of 5 np.float32, which are faster here than an array.
         model: For learners that plan, the last transition of each visited pair, in the order of
@@ -34,7 +33,6 @@ class ReferenceLearner:
     """
 
     draws_next_action = False
-    shares = True
     hyperparameters: ClassVar[Mapping[str, float]] = {}
 
     def __init__(
@@ -142,8 +140,6 @@ class DoubleQ(ReferenceLearner):
     Ants act by the mean of both tables.
     """
 
-    shares = False
-
     def begin_run(self) -> None:
         self._tables = [[list(row) for row in self.rows] for _ in "AB"]
 
@@ -166,7 +162,6 @@ class DoubleQ(ReferenceLearner):
 class SarsaLambda(Sarsa):
     """SARSA(lambda) with replacing traces (Singh and Sutton 1996) for the most recent pairs."""
 
-    shares = False
     hyperparameters: ClassVar = {"trace_decay": 0.9, "trace_length": 32}
 
     def begin(self) -> None:
@@ -190,7 +185,6 @@ class NStepSarsa(Sarsa):
     A pair is updated n steps later, or at the end of the episode.
     """
 
-    shares = False
     hyperparameters: ClassVar = {"n_steps": 4}
 
     def begin(self) -> None:
@@ -216,7 +210,6 @@ class PrioritizedSweeping(DynaQ):
     All updates use the model, also the update of the present step.
     """
 
-    shares = False
     hyperparameters: ClassVar = {"planning_steps": 5, "threshold": 0.0001}
 
     def begin_run(self) -> None:

@@ -46,7 +46,7 @@ from taichi_ants.grid.constants import (
 )
 from taichi_ants.grid.hexgrid import AxialGrid, axial
 from taichi_ants.grid.randomness import Stream, choose, stream_state
-from taichi_ants.interventions import Intervention, flat_index, indices
+from taichi_ants.interventions import Intervention, flat_indices
 from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL
@@ -97,7 +97,7 @@ class _World:
 
         Has no effect if the first cell has none of them, or the other one is not free.
         """
-        cell, to = (flat_index(self.colony.grid, cell) for cell in change.cells)
+        cell, to = flat_indices(self.colony.grid, change.cells)
         what, colony = int(self.view("ground")[cell]), self.colony
         if what not in (OBSTACLE, FOOD, QUEEN) or not self._can_be_free(to):
             yield
@@ -216,9 +216,10 @@ class _World:
         return self._add(_in_turn(orders, n), np.resize(wanted, n), heading)
 
     def _index(self, cells: Sequence[Any] | str) -> np.ndarray:
-        """Return the flat indices of cells, or of those of a region; AntsError if it is missing."""
-        world, grid = self.colony.worlds[self.w], self.colony.grid
-        return world.region(cells) if isinstance(cells, str) else indices(grid, cells)
+        """Return the flat indices of cells, or of those of a region, without duplicates."""
+        if isinstance(cells, str):
+            return self.colony.worlds[self.w].region(cells)
+        return np.array(list(dict.fromkeys(flat_indices(self.colony.grid, cells))), np.int64)
 
     def view(self, name: str) -> np.ndarray:
         """Return a view of the world's part of an array."""
