@@ -22,7 +22,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -51,9 +51,6 @@ from taichi_ants.task import Task
 from taichi_ants.task.constants import EMPTY, FOOD, N_ACTIONS, OBSTACLE, QUEEN, ROW
 from taichi_ants.task.field import TRAIL
 from taichi_ants.worlds.world import World
-
-if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony
 
 Change = Iterator[None]  # yields once, between its checks and its effects
 REACH = 8  # cells; twice the radius of the largest brush on the live page
@@ -409,6 +406,7 @@ class Interventions:
     """Changes of some worlds of a colony, and of the start of their later episodes.
 
     Args:
+        colony: A `Colony`, which imports this module.
         worlds: Numbers of the worlds to change, None for all. Worlds of a colony share the numbers
             of the task, epsilon, the learning rate and the number of ants at the start, so these
             can only change in all worlds that are still running.
@@ -424,7 +422,7 @@ class Interventions:
     """
 
     def __init__(
-        self, colony: Colony, worlds: Sequence[int] | None = None, lasting: bool = True
+        self, colony: Any, worlds: Sequence[int] | None = None, lasting: bool = True
     ) -> None:
         self.colony, self.ants, self.lasting = colony, colony.ants, lasting
         self.length: int | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,9 @@ from taichi_ants.engines.colony.stepping import Stepper
 from taichi_ants.errors import AntsError
 from taichi_ants.protocol import ProtocolEvent, When, checked_protocol
 
-if TYPE_CHECKING:
-    from taichi_ants.engines.colony.colony import Colony
-
 
 class Timetable:
-    """The events of a protocol in the episodes of a colony.
+    """The events of a protocol in the episodes of a `Colony`, which imports this module.
 
     A context manager for an episode that has begun. At its end, the numbers and tables of the
     colony are again those of its beginning; `ColonyState.begin` resets the worlds.
@@ -27,7 +24,7 @@ class Timetable:
         AntsError: An event cannot happen in an episode of `length` ticks, or in this colony.
     """
 
-    def __init__(self, colony: Colony, protocol: Any, length: int) -> None:
+    def __init__(self, colony: Any, protocol: Any, length: int) -> None:
         self._colony, self._events, self._length = colony, checked_protocol(protocol), length
         self._at: dict[int, list[tuple[int, ProtocolEvent]]] = {}  # by tick: indices and events
         for number, event in enumerate(self._events):
