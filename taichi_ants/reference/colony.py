@@ -39,12 +39,10 @@ from taichi_ants.reference.choice import (
 )
 from taichi_ants.reference.food_sources import FoodSources
 from taichi_ants.reference.geometry import Cell, neighbour, queens_of
-from taichi_ants.reference.learners import LEARNERS
+from taichi_ants.reference.learners import LEARNERS, learn_together
 from taichi_ants.reference.observations import AHEAD, OBSERVATIONS, TURNS, codes_in_view, observe
-from taichi_ants.reference.own_observations import state_by
-from taichi_ants.reference.own_rules import choose_by_rule, pay
+from taichi_ants.reference.own_rules import choose_by_rule, pay, state_by
 from taichi_ants.reference.random_stream import RandomStream, pick, stream_state
-from taichi_ants.reference.sharing import learn_together
 from taichi_ants.reference.world_state import WorldState
 from taichi_ants.task import Caste, Task
 from taichi_ants.task.constants import EMPTY, GIVE, PICK_UP
