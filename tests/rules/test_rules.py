@@ -24,6 +24,7 @@ from taichi_ants import (
 )
 from taichi_ants.engines import own_rules as own_rules_of_kernels
 from taichi_ants.interventions import SetTask
+from taichi_ants.reference import own_rules
 from taichi_ants.rules import exp, log, pick, power, registry
 from taichi_ants.rules.inputs import KINDS
 from taichi_ants.task import Choice, Observation, observations
