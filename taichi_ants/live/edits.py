@@ -47,13 +47,11 @@ def values(interventions: Interventions) -> dict[str, Value]:
         values["epsilon"] = Value(colony.epsilon, 0.0, 1.0, 0.01, "epsilon")
     if colony.sharing != "frozen":
         values["learning_rate"] = Value(colony.learning_rate, 0.0, 1.0, 0.001, "learning_rate")
-    if pheromone.deposit != "none":
-        values["deposit"] = Value(
-            int(pheromone.level), 1, max(1000, int(pheromone.level)), 1, _path("level")
-        )
-    for name, largest in (("slope", 100), ("cap", 10_000)):
-        if (number := getattr(pheromone, name)) is not None:
-            values[name] = Value(int(number), 1, max(largest, int(number)), 1, _path(name))
+    numbers = (("deposit", "level", 1000), ("slope", "slope", 100), ("cap", "cap", 10_000))
+    for name, setting, largest in numbers:
+        number = getattr(pheromone, setting)
+        if number is not None and not (setting == "level" and pheromone.deposit == "none"):
+            values[name] = Value(int(number), 1, max(largest, int(number)), 1, _path(setting))
     falls, given = pheromone.evaporation != "none", colony.task.pheromone
     if given.evaporation == "none":
         given = replace(given, evaporation="linear")
