@@ -430,8 +430,8 @@ class Interventions:
         numbers = range(n) if worlds is None else entries_of(worlds)
         if not numbers or not all(isinstance(w, (int, np.integer)) and 0 <= w < n for w in numbers):
             raise AntsError(
-                f"worlds is {shown(worlds)}; it must be a list of one or more numbers from 0 to {n - 1}, "
-                "or None for all worlds."
+                f"worlds is {shown(worlds)}; it must be a list of one or more numbers from 0 to "
+                f"{n - 1}, or None for all worlds."
             )
         self.worlds = tuple(dict.fromkeys(map(int, numbers)))
         self._first = colony.worlds
