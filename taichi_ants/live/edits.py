@@ -52,10 +52,10 @@ def values(interventions: Interventions) -> dict[str, Value]:
         number = getattr(pheromone, setting)
         if number is not None and not (setting == "level" and pheromone.deposit == "none"):
             values[name] = Value(int(number), 1, max(largest, int(number)), 1, _path(setting))
-    falls, given = pheromone.evaporation != "none", colony.task.pheromone
-    if given.evaporation == "none":
-        given = replace(given, evaporation="linear")
-    if (given.lasting if falls else given).dense == pheromone.dense:
+    falls, evaporating = pheromone.evaporation != "none", colony.task.pheromone
+    if evaporating.evaporation == "none":
+        evaporating = replace(evaporating, evaporation="linear")
+    if (evaporating.lasting if falls else evaporating).dense == pheromone.dense:
         flag = "evaporation_in_training" if colony.learns else "evaporation_in_evaluation"
         switches: dict[str, Edit] = {str(n): {"task": {flag: bool(n)}} for n in (0, 1)}
         if colony.task.pheromone.evaporation == "none":

@@ -256,13 +256,13 @@ class _World:
 
         AntsError if they would have no room for the ants, or no food to learn from.
         """
-        everywhere, colony = self.all, self.colony
-        if not everywhere.lasting:
+        of_all, colony = self.all, self.colony
+        if not of_all.lasting:
             yield
             return
-        start = everywhere.starts[self.w].copy()
+        start = of_all.starts[self.w].copy()
         start[cells] = contents
-        ants, room = max(everywhere.ants, colony.ants), np.count_nonzero(start == EMPTY)
+        ants, room = max(of_all.ants, colony.ants), np.count_nonzero(start == EMPTY)
         if ants > room:
             raise AntsError(
                 f"{count(ants, 'ant')} start each episode, but this change would leave "
@@ -274,7 +274,7 @@ class _World:
                 "leave one."
             )
         yield
-        everywhere.starts[self.w], everywhere.changed = start, True
+        of_all.starts[self.w], of_all.changed = start, True
 
     def _fill(self, cells: np.ndarray, what: int, kind: int, loads: int | None = None) -> None:
         """Make cells without ants and queens EMPTY, OBSTACLE or FOOD, by default with all loads."""
