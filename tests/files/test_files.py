@@ -15,7 +15,6 @@ import pytest
 
 from taichi_ants import files
 from taichi_ants.errors import AntsError
-from taichi_ants.files.tables import column
 
 NOBODY = 65534
 

@@ -10,7 +10,7 @@ from random_castes import drawn_castes
 from random_choices import NOISE
 from random_colonies import RandomColony, random_colony, with_nests
 from random_rewards import random_rewards
-from same_colonies import assert_equal
+from same_colonies import assert_equal, equal_ticks
 
 from taichi_ants import AntsError, Colony, TrainingConfig, World, learners, worlds
 from taichi_ants.reference import ReferenceColony
@@ -96,16 +96,8 @@ def test_every_tick_in_crowded_micro_worlds(kernel):
         )
         colony, plain = both(drawn)
         for ticks, world in ((11, None), (8, without_rocks(drawn.world) if seed % 2 else None)):
-            colony.begin_episode(ticks, world)
-            plain.begin_episode(world)
-            assert_equal(colony, plain)
-            for tick in range(ticks):
-                if not plain.over:
-                    colony.tick()
-                    plain.tick(last=tick == ticks - 1)
-                    assert_equal(colony, plain)
-            colony.end_episode()
-            plain.end_episode()
+            for _ in equal_ticks(colony, plain, ticks, world):
+                pass
             record = plain.records[-1]
             happened += [
                 record.births > 0,
@@ -165,16 +157,8 @@ def test_every_tick_with_several_nests_and_kinds_of_food(kernel, seen_strangers)
             continue  # kernels are compiled for a number of nests
         colony, plain = both(drawn)
         for ticks in (13, 9):
-            colony.begin_episode(ticks)
-            plain.begin_episode()
-            assert_equal(colony, plain)
-            for tick in range(ticks):
-                if not plain.over:
-                    colony.tick()
-                    plain.tick(last=tick == ticks - 1)
-                    assert_equal(colony, plain)
-            colony.end_episode()
-            plain.end_episode()
+            for _ in equal_ticks(colony, plain, ticks):
+                pass
             record, nests_of = plain.records[-1], [nest for nest, _ in plain.records[-1].delivered]
             happened += [
                 record.births > 0,
@@ -224,19 +208,12 @@ def test_every_tick_with_castes_and_division_of_labour(kernel):
             continue
         colony, plain = both(drawn)
         for ticks in (13, 9):
-            colony.begin_episode(ticks)
-            plain.begin_episode()
-            assert_equal(colony, plain)
-            for tick in range(ticks):
-                if not plain.over:
-                    idle = colony.idle & colony.living
-                    colony.tick()
-                    plain.tick(last=tick == ticks - 1)
-                    assert_equal(colony, plain)
-                    now = colony.idle & colony.living
+            idle = None
+            for _ in equal_ticks(colony, plain, ticks):
+                now = colony.idle & colony.living
+                if idle is not None:
                     happened[4:] += [(idle & ~now).any(), (now & ~idle).any()]
-            colony.end_episode()
-            plain.end_episode()
+                idle = now
             record = plain.records[-1]
             several = len({ant.caste for ant in plain.ants.values()}) == castes
             happened[:4] += [record.births > 0, record.deaths > 0, record.deliveries > 0, several]
@@ -279,18 +256,12 @@ def test_misread_cells_show_no_further_pheromone(monkeypatch, noise):
         drawn = random_colony(seed, fields="aB", changes=True, **rules)
         drawn = replace(drawn, task=replace(drawn.task, observation="levels"), q_values=None)
         colony, plain = both(drawn)
-        colony.begin_episode(20)
-        plain.begin_episode()
-        for tick in range(20):
-            if not plain.over:
-                colony.tick()
-                plain.tick(last=tick == 19)
-                assert_equal(colony, plain)
-                for ant in plain.ants.values():
-                    misread, ant.misread = ant.misread, {}
-                    hidden += levels_seen(plain.world, ant) != ant.state
-                    shown += ant.state % 64 > 0
-                    ant.misread = misread
+        for _ in equal_ticks(colony, plain, 20):
+            for ant in plain.ants.values():
+                misread, ant.misread = ant.misread, {}
+                hidden += levels_seen(plain.world, ant) != ant.state
+                shown += ant.state % 64 > 0
+                ant.misread = misread
     assert shown > 100
     assert (hidden > 20) == (noise == "misread")
 
